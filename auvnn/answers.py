@@ -1,0 +1,97 @@
+"""What the verbs answer: plain data first, drawn and written the same way everywhere."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tempfile
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from auvnn.catalogue import Catalogue
+
+# Names, not imports: an answer stands below the floor that draws it.
+DRAWERS = Catalogue(
+    "report page",
+    {
+        "quality": "auvnn.report.pages.quality:PAGE",
+        "comparison": "auvnn.report.pages.comparison:PAGE",
+        "diagnosis": "auvnn.report.pages.diagnosis:PAGE",
+        "improvement": "auvnn.report.pages.improvement:PAGE",
+        "training": "auvnn.report.pages.training:PAGE",
+        "demo": "auvnn.report.pages.demo:PAGE",
+    },
+    "auvnn.report_pages",
+)
+
+
+def plain(value: Any) -> Any:
+    """Turn numpy and tensors into plain JSON data; NaN and infinity become null."""
+    if isinstance(value, dict):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    if isinstance(value, (bool, str)) or value is None:
+        return value
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    if isinstance(value, np.bool_):
+        return bool(value)
+    if isinstance(value, (float, np.floating)):
+        return float(value) if math.isfinite(value) else None
+    if hasattr(value, "detach"):
+        return plain(value.detach().cpu().numpy())
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    return str(value)
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a file beside its place and move it there, so that a kill never leaves half a file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        # mkstemp makes files private; a report is meant to be read by whoever may read its folder.
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    return path
+
+
+class Answer:
+    """Base of everything a verb answers: `to_dict` is the JSON of the public contract."""
+
+    kind: ClassVar[str]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON answer as plain data, its `schema` first."""
+        raise TypeError(f"{type(self).__name__} does not say what it answers")
+
+    def write(self, folder: str | Path, *, report: bool = True) -> Path:
+        """Write `<kind>.json`, and with `report` also `report.html` and `figures/`, into a folder."""
+        folder = Path(folder)
+        path = write_text(folder / f"{self.kind}.json", json.dumps(self.to_dict(), indent=1, allow_nan=False))
+        if report:
+            DRAWERS.get(self.kind).write(self, folder)
+        return path
+
+    def figures(self) -> dict[str, Any]:
+        """Return the answer's matplotlib figures by name."""
+        return DRAWERS.get(self.kind).figures(self)
+
+    def plot(self) -> Any:
+        """Return the one figure that says most, for a notebook."""
+        return next(iter(self.figures().values()))
+
+    def report(self, path: str | Path) -> Path:
+        """Write the answer as one self-contained HTML file and return its path."""
+        return write_text(Path(path), DRAWERS.get(self.kind).page(self))

@@ -1,0 +1,36 @@
+"""`auvnn add`: add effects, refit, and compare before and after on held-out data."""
+
+from __future__ import annotations
+
+from auvnn.cli.job import Answering, Job, Verb
+
+
+def _run(job: Job) -> Answering:
+    from auvnn.diagnosis import add
+    from auvnn.diagnosis.words import parameters
+
+    effects, log, test = job.names("effect"), job.log(), job.held_out()
+    model, say = job.model(log), job.say
+    better = add(model, log, effects, test=test, derivative=job["derivative"], progress=say.progress)
+    better.model.save(job.folder / "model")
+    better.write(job.folder)
+    data = better.to_dict()
+    say(f"assumed   {data['held_out']}")
+    job.warn(data["warnings"])
+    for name, values in data["parameters"].items():
+        say(f"fitted    {name}: {parameters({'parameters': values})}")
+    for step in data["waterfall"]:
+        error = "unknown" if step["error"] is None else f"{step['error']:.4g}"
+        say(f"error     {step['step']}: {error}")
+    gain = f"{data['gain']['value']:.4g} +- {data['gain']['std']:.2g}" if data["gain"]["std"] else "unknown"
+    verdict = "accepted" if data["accepted"] else "not accepted: the held-out error does not fall enough"
+    say(f"result    {verdict} (fall from the refitted model: {gain})", style="bold")
+    return better
+
+
+VERB = Verb(
+    summary="add effects, refit, and compare before and after on held-out data",
+    reads=("log", "mapping", "model", "test"),
+    writes=("improvement.json", "model/", "report.html", "figures/"),
+    run=_run,
+)

@@ -1,0 +1,132 @@
+"""A verb as a Hydra application: compose, look before leaping, run each job in its own folder."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import hydra
+from hydra.core.hydra_config import HydraConfig
+from hydra.errors import HydraException
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from auvnn.answers import write_text
+from auvnn.cli.compose import Composer, mended, quoted
+from auvnn.cli.faults import OK, outcome
+from auvnn.cli.folder import created, locked, refuse_taken, written
+from auvnn.cli.job import Job, Verb, files
+from auvnn.cli.speech import Speaker, complain, one_line
+from auvnn.cli.words import Words
+from auvnn.config import config_dir
+from auvnn.errors import ConfigError
+
+
+def run_verb(name: str, verb: Verb, arguments: list[str]) -> int:
+    """Run one verb with its command-line arguments and return the exit status.
+
+    Raises:
+        AuvnnError: the arguments are wrong; nothing has been touched.
+    """
+    words = Words.split(arguments)
+    composer = Composer(name, words.config_dir)
+    overrides = composer.checked([mended(w) for w in words.overrides], sweep=words.multirun)
+    config = composer.compose(overrides)
+    if words.shows:
+        _hydra(name, [*words.flags, *overrides], lambda _: None)
+        return OK
+    out = _dated(name) if config.out is None else Path(str(config.out)).expanduser()
+    overrides.append(f"out={quoted(out)}")
+    refuse_taken(out, overwrite=config.overwrite is True)
+    statuses: list[int] = []
+    with contextlib.ExitStack() as stack:
+        if config.dry_run:
+            # Hydra makes its folders whatever we do; these go away again.
+            nowhere = quoted(stack.enter_context(tempfile.TemporaryDirectory()))
+            overrides += [f"hydra.run.dir={nowhere}", f"hydra.sweep.dir={nowhere}"]
+        else:
+            stack.enter_context(created(out))
+            if words.multirun:
+                stack.enter_context(locked(out))
+        _hydra(name, [*words.flags, *overrides], lambda job: statuses.append(_job(name, verb, composer, job)))
+    failed = [number for number, status in enumerate(statuses) if status != OK]
+    if words.multirun and failed:
+        complain(f"auvnn {name}: {len(failed)} of {len(statuses)} jobs failed: {', '.join(map(str, failed))}")
+    return min((statuses[n] for n in failed), default=OK)
+
+
+def _job(name: str, verb: Verb, composer: Composer, config: DictConfig) -> int:
+    """Run one job of perhaps many; whatever befalls it is its own affair."""
+    own = HydraConfig.get()
+    number = own.job.get("num") if own.mode is not None and own.mode.name == "MULTIRUN" else None
+    root = own.run.dir if number is None else own.sweep.dir
+    out = Path(str(config.out)) / os.path.relpath(own.runtime.output_dir, str(root))
+    label = f"auvnn {name}" if number is None else f"auvnn {name} (job {number})"
+    status = outcome(label, lambda: _run(verb, composer, config, out), None if config.dry_run else out)
+    with contextlib.suppress(OSError):
+        out.rmdir()  # made by Hydra; taken away if nothing came into it
+    return status
+
+
+def _run(verb: Verb, composer: Composer, config: DictConfig, out: Path) -> None:
+    options = composer.options(config)
+    say = Speaker(only_json=options["json"])
+    for key in verb.reads:
+        # A model may also be a name, which is not ours to judge.
+        if options[key] is not None and (key != "model" or _is_path(options[key])):
+            files(options, key)
+    refuse_taken(out, overwrite=config.overwrite is True)
+    if options["dry_run"]:
+        for key in verb.reads:
+            if options[key] is not None:
+                say(f"would read   {key}={options[key]}")
+        say(f"would write  {', '.join(verb.writes)} in {out}")
+        return
+    with written(out, overwrite=config.overwrite is True) as folder:
+        answer = verb.run(Job(options, out, folder, say))
+        write_text(folder / ".hydra" / "config.yaml", OmegaConf.to_yaml(config))
+        write_text(folder / ".hydra" / "overrides.yaml", OmegaConf.to_yaml(HydraConfig.get().overrides.task))
+    say(f"written   {', '.join(verb.writes)} in {out}")
+    if "report.html" in verb.writes:
+        say(f"report    {out / 'report.html'}", style="bold")
+    say.answer(answer.to_dict())
+
+
+def _hydra(name: str, arguments: list[str], task: Callable[[DictConfig], Any]) -> None:
+    """Run a task as a Hydra application that leaves its errors to us."""
+    with _seen([f"auvnn {name}", *arguments]):
+        try:
+            hydra.main(version_base="1.3", config_path=str(config_dir()), config_name=name)(task)()
+        except (HydraException, OmegaConfBaseException) as error:
+            raise ConfigError(one_line(error)) from None
+
+
+@contextlib.contextmanager
+def _seen(arguments: list[str]) -> Iterator[None]:
+    before, full = sys.argv, os.environ.get("HYDRA_FULL_ERROR")
+    sys.argv, os.environ["HYDRA_FULL_ERROR"] = arguments, "1"
+    try:
+        yield
+    finally:
+        sys.argv = before
+        if full is None:
+            del os.environ["HYDRA_FULL_ERROR"]
+        else:
+            os.environ["HYDRA_FULL_ERROR"] = full
+
+
+def _is_path(source: Any) -> bool:
+    return any(sign in str(source) for sign in ("/", "\\", ".", "~"))
+
+
+def _dated(verb: str) -> Path:
+    stem = f"{time.strftime('%Y-%m-%d_%H-%M-%S')}_{verb}"
+    names = itertools.chain([stem], (f"{stem}_{n}" for n in itertools.count(2)))
+    return next(path for path in (Path("outputs") / name for name in names) if not path.exists())

@@ -1,0 +1,29 @@
+"""`auvnn check`: what was read, repaired, implausible and excited in a log."""
+
+from __future__ import annotations
+
+from auvnn.cli.job import Answering, Job, Verb
+
+_STYLE = {"error": "red", "warning": "yellow"}
+
+
+def _run(job: Job) -> Answering:
+    log = job.log()
+    quality = log.quality()
+    quality.write(job.folder)
+    findings = quality.to_dict()["findings"]
+    for finding in findings:
+        level = finding["level"]
+        words = f"{finding['where']}: {finding['what']}. {finding['cure']}"
+        job.say(f"{level:<9} {words}", style=_STYLE.get(level))
+    if not findings:
+        job.say("result    nothing to complain of")
+    return quality
+
+
+VERB = Verb(
+    summary="quality report of a log: what was read, repaired, implausible, excited",
+    reads=("log", "mapping"),
+    writes=("quality.json", "report.html", "figures/"),
+    run=_run,
+)

@@ -1,0 +1,253 @@
+"""Composing a verb's options with Hydra, and saying in one line what is wrong with them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from hydra import compose, initialize_config_dir
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import Override
+from hydra.errors import HydraException
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from auvnn.catalogue import unknown_name
+from auvnn.cli.speech import one_line
+from auvnn.config import MAX_BYTES, config_dir
+from auvnn.errors import ConfigError
+
+_KEYED = re.compile(r"([A-Za-z_][\w./@]*)=(.*)", re.DOTALL)
+_RESOLVER = re.compile(r"\$\{\s*([A-Za-z_][\w.]*)\s*:")
+# Hydra's own parts are objects named in its configuration; nobody else's may be.
+_CODE_KEYS = {"_target_", "_args_", "_partial_", "()", "class"}
+_RESERVED = ("hydra.mode", "hydra.searchpath", "hydra.output_subdir", "hydra.run.dir", "hydra.sweep.dir")
+_HYDRAS_OWN = ("hydra._internal.core_plugins.", "hydra_plugins.")
+
+
+def mended(word: str) -> str:
+    """Quote a value that Hydra's grammar cannot take as it stands, such as a path with brackets in it."""
+    match = _KEYED.fullmatch(word)
+    if match is None or match[2][:1] in ("'", '"', "{"):
+        return word
+    try:
+        OverridesParser.create().parse_override(word)
+    except (HydraException, RecursionError):
+        plain_list = re.fullmatch(r"\[([^\[\]{}'\"]*)\]", match[2])
+        if plain_list:
+            return f"{match[1]}=[{','.join(quoted(item.strip()) for item in plain_list[1].split(','))}]"
+        return word if match[2].startswith("[") else f"{match[1]}={quoted(match[2])}"
+    return word
+
+
+def quoted(value: object) -> str:
+    """Return a text as Hydra's grammar takes it, whatever stands in it."""
+    # Backslashes stand for themselves unless a quote follows, as in Hydra's grammar.
+    escaped = re.sub(r"(\\*)('|$)", lambda m: m[1] * 2 + ("\\'" if m[2] else ""), str(value))
+    return f"'{escaped}'"
+
+
+class Composer:
+    """Composes one verb's options.
+
+    Args:
+        verb: name of the verb and of its primary config.
+        folder: further folder of configs, as given with --config-dir.
+    """
+
+    def __init__(self, verb: str, folder: str | None = None) -> None:
+        """Compose the verb's defaults, against which overrides are judged."""
+        self.verb = verb
+        self.folder = Path(folder).absolute() if folder else None
+        if self.folder is not None:
+            if not self.folder.is_dir():
+                raise ConfigError(f"--config-dir {folder}: there is no such folder")
+            for path in sorted(self.folder.rglob("*.yaml")):
+                _refuse_bomb(path)
+        self.defaults = self._hydra([])
+        self.known = {str(key) for key in self.defaults} - {"hydra"}
+        choices = {str(g): c for g, c in self.defaults.hydra.runtime.choices.items()}
+        self.groups = {g: self._members(g) for g in choices if "/" not in g}
+        self.optional = {g for g in self.groups if choices[g] is None}
+
+    def _hydra(self, words: list[str]) -> DictConfig:
+        search = [f"hydra.searchpath=['file://{self.folder}']"] if self.folder else []
+        with initialize_config_dir(str(config_dir()), version_base="1.3"):
+            return compose(self.verb, [*words, *search], return_hydra_config=True)
+
+    def _members(self, group: str) -> list[str]:
+        places = [config_dir(), *([self.folder] if self.folder else [])]
+        return sorted({path.stem for place in places for path in (place / group).glob("*.yaml")})
+
+    def checked(self, words: list[str], *, sweep: bool = False) -> list[str]:
+        """Return the overrides as Hydra takes them, each one known to be read and to be meant.
+
+        Raises:
+            ConfigError: something is wrong with one of them; one line says what, and what was meant.
+        """
+        parsed = [o for o in map(self._parse, words) if not self._says_none(o)]
+        for override in parsed:
+            key, _, value = str(override.input_line).partition("=")
+            if override.is_sweep_override() and key == "out":
+                raise ConfigError(f"out={value}: each job gets a folder of its own below one out=")
+            if override.is_sweep_override() and not sweep:
+                raise ConfigError(f"{key}={value}: write a list as {key}=[{value}], or add --multirun")
+            if override.key_or_group in self.groups:
+                self._check_member(override)
+        groups = [_first(o) for o in parsed if o.key_or_group in self.groups]
+        chosen = self._hydra(groups) if groups else self.defaults
+        return [self._check_key(override, chosen) for override in parsed]
+
+    def compose(self, checked: list[str]) -> DictConfig:
+        """Return the composed options; of a sweep, those of its first job.
+
+        Raises:
+            ConfigError: they do not go together, or something in them could run code.
+        """
+        try:
+            config = self._hydra([_first(OverridesParser.create().parse_override(word)) for word in checked])
+        except (HydraException, OmegaConfBaseException, ValueError, RecursionError) as error:
+            raise ConfigError(one_line(error)) from None
+        self._judge(config)
+        return config
+
+    def _parse(self, text: str) -> Override:
+        word = one_line(text, 80)
+        if word.startswith("~"):
+            raise ConfigError(f"{word}: an option cannot be taken away; set it to null instead")
+        for name in _RESOLVER.findall(text):
+            raise ConfigError(f"{word}: ${{{name}:...}} is refused; write the value itself")
+        if any(key in text for key in ("_target_", "_args_", "_partial_")):
+            raise ConfigError(f"{word}: options name members of catalogues, never Python code")
+        if "=" not in text:
+            near = f"log={word}" if "log" in self.known else "key=value"
+            raise ConfigError(f"'{word}' is not of the form key=value; did you mean {near}?")
+        key = text.partition("=")[0]
+        if key in _RESERVED:
+            raise ConfigError(f"{key} cannot be set; use out=, --multirun and --config-dir")
+        try:
+            return OverridesParser.create().parse_override(text)
+        except (HydraException, RecursionError):
+            raise ConfigError(
+                f"'{word}' cannot be read; a value with special characters goes in quotes, {key}=\"'...'\", "
+                f"a list is [a,b], a mapping '{{a: 1, b: 2}}'"
+            ) from None
+
+    def _says_none(self, override: Override) -> bool:
+        """Say whether an optional group is set to null, which it is already and Hydra cannot be told."""
+        return override.key_or_group in self.optional and override.value() is None
+
+    def _check_member(self, override: Override) -> None:
+        group = override.key_or_group
+        swept = override.is_sweep_override()
+        options = list(override.sweep_string_iterator()) if swept else [override.value()]
+        for option in options if not isinstance(options[0], list) else options[0]:
+            if option not in self.groups[group]:
+                raise ConfigError(unknown_name(group, str(option), self.groups[group]))
+
+    def _check_key(self, override: Override, chosen: DictConfig) -> str:
+        key, word = override.key_or_group, str(override.input_line)
+        if override.is_add() or key in self.groups or re.match(r"hydra[./]", key):
+            return word
+        paths = set(_paths(chosen)) - {"hydra"}
+        if any(OmegaConf.select(chosen, head, default=None) == {} for head in _heads(key)):
+            return f"++{word}"  # a mapping whose keys are the user's own
+        for head in _heads(key):
+            if head not in paths:
+                raise ConfigError(self._unknown(head, paths))
+        return word
+
+    def _unknown(self, key: str, paths: Iterable[str]) -> str:
+        everything = {*paths, *self.known, *self.groups}
+        level = key.rpartition(".")[0]
+        return unknown_name(
+            "option", key, [p for p in everything if p.rpartition(".")[0] == level] or self.known
+        )
+
+    def _judge(self, config: DictConfig) -> None:
+        for key in config:
+            if str(key) not in {*self.known, *self.groups, "hydra"}:
+                raise ConfigError(self._unknown(str(key), ()))
+        for path, value in _leaves(OmegaConf.to_container(config, resolve=False)):
+            if path[-1] in _CODE_KEYS and not str(value).startswith(_HYDRAS_OWN):
+                raise ConfigError(f"{'.'.join(path)}: options name members of catalogues, never Python code")
+            for name in _RESOLVER.findall(str(value)):
+                raise ConfigError(f"{'.'.join(path)}: ${{{name}:...}} is refused; write the value itself")
+
+    def options(self, config: DictConfig) -> dict[str, Any]:
+        """Return a composed job's options as plain data, of the kinds that the defaults show.
+
+        Raises:
+            ConfigError: an option is missing, or of another kind than its default.
+        """
+        missing = sorted(OmegaConf.missing_keys(config))
+        if missing:
+            raise ConfigError(f"{missing[0]}= is needed; auvnn {self.verb} --help shows how")
+        try:
+            plain = OmegaConf.to_container(config, resolve=True)
+        except OmegaConfBaseException as error:
+            raise ConfigError(one_line(error)) from None
+        assert isinstance(plain, dict)
+        options: dict[str, Any] = {str(key): value for key, value in plain.items() if key != "hydra"}
+        for key, value in options.items():
+            problem = _wrong_kind(value, OmegaConf.select(self.defaults, key, default=None))
+            if problem:
+                raise ConfigError(f"{key}={value}: {problem}")
+        return options
+
+
+def _wrong_kind(value: Any, default: Any) -> str | None:
+    if isinstance(default, bool):
+        return None if isinstance(value, bool) else "true or false is needed"
+    if isinstance(default, int):
+        good = isinstance(value, int) and not isinstance(value, bool)
+        return None if good else "a whole number is needed"
+    if isinstance(default, float):
+        good = isinstance(value, (int, float)) and not isinstance(value, bool)
+        return None if good else "a number is needed"
+    if isinstance(default, str):
+        return None if isinstance(value, str) else f"a word is needed, such as {default}"
+    return None
+
+
+def _first(override: Override) -> str:
+    if override.is_sweep_override():
+        return f"{override.get_key_element()}={next(iter(override.sweep_string_iterator()))}"
+    return str(override.input_line)
+
+
+def _heads(key: str) -> Iterator[str]:
+    parts = key.split(".")
+    return (".".join(parts[: n + 1]) for n in range(len(parts)))
+
+
+def _refuse_bomb(path: Path) -> None:
+    """Refuse a config that could exhaust the machine while it is parsed: Hydra sets no limit."""
+    text = path.read_bytes()
+    if len(text) > MAX_BYTES:
+        raise ConfigError(f"{path}: is larger than {MAX_BYTES} bytes; a config holds a few kilobytes")
+    if re.search(rb"(^|[\s\[{,:-])\*\w", re.sub(rb"#.*", b"", text)):
+        raise ConfigError(f"{path}: YAML aliases are refused; write the value out")
+
+
+def _paths(config: DictConfig, head: str = "") -> Iterator[str]:
+    for key in config:
+        path = f"{head}{key}"
+        yield path
+        if path == "hydra" or OmegaConf.is_missing(config, str(key)):
+            continue
+        if isinstance(config[key], DictConfig):
+            yield from _paths(config[key], f"{path}.")
+
+
+def _leaves(data: Any, path: tuple[str, ...] = ()) -> Iterable[tuple[tuple[str, ...], Any]]:
+    if isinstance(data, dict):
+        for key, value in data.items():
+            yield from _leaves(value, (*path, str(key)))
+    elif isinstance(data, list):
+        for value in data:
+            yield from _leaves(value, path)
+    elif path:
+        yield path, data

@@ -1,0 +1,69 @@
+"""The `auvnn` command: pops the verb and runs that verb's Hydra application."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from auvnn.catalogue import Catalogue
+from auvnn.cli.faults import INTERRUPTED, OK, TERMINATED, Terminated, outcome
+from auvnn.cli.speech import complain
+
+VERBS = Catalogue(
+    "verb",
+    {
+        "check": "auvnn.cli.check:VERB",
+        "simulate": "auvnn.cli.simulate:VERB",
+        "train": "auvnn.cli.train:VERB",
+        "compare": "auvnn.cli.compare:VERB",
+        "diagnose": "auvnn.cli.diagnose:VERB",
+        "add": "auvnn.cli.add:VERB",
+        "remove": "auvnn.cli.remove:VERB",
+        "demo": "auvnn.cli.demo:VERB",
+    },
+    "auvnn.verbs",
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `auvnn` with its arguments, those of the process by default, and return the exit status."""
+    verb, *rest = [*(sys.argv[1:] if arguments is None else arguments)] or ["--help"]
+    label = "auvnn" if verb.startswith("-") else f"auvnn {verb}"
+    statuses: list[int] = []
+    _prepare()
+    try:
+        ended = outcome(label, lambda: statuses.append(_dispatch(verb, rest)))
+    except KeyboardInterrupt as end:
+        asked = isinstance(end, Terminated)
+        how = "ended on request" if asked else "interrupted"
+        complain(f"{label}: {how}; {end or 'what was unfinished has been taken away'}")
+        return TERMINATED if asked else INTERRUPTED
+    return ended or statuses[0]
+
+
+def _dispatch(verb: str, rest: list[str]) -> int:
+    if verb in ("--help", "-h", "help", "--version"):
+        from auvnn import __version__
+        from auvnn.cli.overview import overview
+
+        print(f"auvnn {__version__}" if verb == "--version" else overview())
+        return OK
+    found = VERBS.get(verb)
+    from auvnn.cli.application import run_verb
+
+    return run_verb(verb, found, rest)
+
+
+def _prepare() -> None:
+    """Let SIGTERM end a run as Ctrl-C does, and let no character be unprintable."""
+
+    def end(_signal: int, _frame: Any) -> None:
+        raise Terminated
+
+    signal.signal(signal.SIGTERM, end)
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(errors="replace")

@@ -1,0 +1,378 @@
+"""Which physical effect is missing? Test all, fit the leading ones, keep what pays on runs left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.answers import Answer
+from auvnn.diagnosis.explain import Explanation, explain, standard_errors, weigh
+from auvnn.diagnosis.nuisance import Layout, lay_out, stated
+from auvnn.diagnosis.score import Score, inflation, score, similarity
+from auvnn.diagnosis.unknown import depends_on
+from auvnn.effects import EFFECTS
+from auvnn.errors import ConfigError, InputError
+from auvnn.logs import Log
+from auvnn.metrics.windows import CHANNELS, Windows, cut_windows
+from auvnn.models import GreyBox
+from auvnn.training.prediction_error import (
+    TRUST,
+    Statistics,
+    answers,
+    motion,
+    parameters_of,
+    reduce,
+    set_parameters,
+)
+
+Array = NDArray[np.float64]
+HORIZON, WARMUP = 5.0, 3.0
+ALPHA = 0.05
+# "Something is missing, but nothing that has a name" is a claim of its own: where no effect pays on runs left
+# out, it takes stronger grounds than the test that opened the search.
+ALPHA_UNKNOWN = 0.001
+# Explanations are refitted in full, nonlinearly, as long as their one-step evidence is within reach of the best.
+LEADERS, REACH, REACH_SHARE = 4, 30.0, 0.5
+# Odds of twenty to one: below that two explanations are not told apart.
+ODDS = float(np.log(20.0))
+# Slow residuals count as something missing when they are significant and not negligible.
+SLOW_Z, SLOW_SHARE = 4.0, 0.05
+
+
+@dataclass
+class Diagnosis(Answer):
+    """What is missing in a model; `to_dict` is `diagnosis.json` of the public contract."""
+
+    kind = "diagnosis"
+    model: str
+    log: str
+    verdict: str
+    missing: list[str]
+    steps: list[dict[str, Any]]
+    candidates: list[dict[str, Any]]
+    unexplained: float
+    depends_on: dict[str, dict[str, float]]
+    next_experiment: dict[str, Any] | None
+    warnings: list[str]
+    derivative: dict[str, Any]
+    global_p_value: float
+    similarity: tuple[list[str], Array] = field(default_factory=lambda: ([], np.eye(0)))
+    explanation: Explanation | None = None
+
+    @property
+    def story(self) -> list[str]:
+        """The answer as a few plain sentences."""
+        from auvnn.diagnosis.words import tell
+
+        return tell(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON answer."""
+        from auvnn.answers import plain
+
+        names = ("model", "log", "derivative", "verdict", "missing", "steps", "candidates", "unexplained",
+                 "depends_on", "next_experiment", "warnings", "global_p_value", "story")
+        return plain({"schema": "auvnn/diagnosis/1", **{n: getattr(self, n) for n in names}})
+
+
+def candidates_for(model: GreyBox, log: Log, wanted: Sequence[str] | None) -> tuple[list[str], dict[str, list[str]]]:
+    """Return the effects that can be asked for, and for the others which channels they lack."""
+    names = EFFECTS.names() if wanted is None else list(wanted)
+    needs: dict[str, list[str]] = {}
+    usable = []
+    for name in names:
+        kind = EFFECTS.get(name)
+        absent = [c for c in kind.channels if not _has(log, c)]
+        needs[name] = absent
+        if not absent and (name not in model.effect_names):
+            usable.append(name)
+    return usable, needs
+
+
+def _has(log: Log, channel: str) -> bool:
+    if channel in ("phi", "theta", "psi"):
+        return True
+    return all(channel in run.channels for run in log.runs)
+
+
+def windows_for(model: GreyBox, log: Log) -> Windows:
+    """Cut a log for fitting: windows of 5 s, or shorter where that leaves fewer than twelve."""
+    horizon = float(np.clip(log.duration / 12, 1.0, HORIZON))
+    return cut_windows(log, horizon, warmup=WARMUP, kind=model.actuation, partial=True)
+
+
+def diagnose(
+    model: GreyBox,
+    log: Log,
+    effects: Sequence[str] | None = None,
+    *,
+    max_effects: int = 4,
+    progress: Callable[[str], None] | None = None,
+) -> Diagnosis:
+    """Say which physical effects a model lacks, by a log.
+
+    A global test decides whether anything is missing; only then are names tried. Each is fitted jointly with
+    the coefficients that are uncertain, weighed by its evidence, and kept only if free running on runs left
+    out improves by more than its own uncertainty. Then the search goes on with the effect in the model.
+
+    Args:
+        model: the model as known.
+        log: measurements; cross-validated over its runs. A test log has no place here.
+        effects: names to consider; the whole catalogue by default.
+        max_effects: look for at most this many.
+        progress: told in words what is being done.
+
+    Raises:
+        ConfigError: an unknown effect.
+        InputError: the log has too little that can be used.
+    """
+    say = progress or (lambda words: None)
+    if max_effects < 1:
+        raise ConfigError(f"max_effects={max_effects} must be at least 1")
+    usable, needs = candidates_for(model, log, effects)
+    windows = windows_for(model, log)
+    if len(windows) < 4:
+        raise InputError(f"{log.name} gives only {len(windows)} windows of free running: record a longer log")
+    layout = lay_out(model, usable)
+    search = _Search(layout, windows, usable, say)
+    return search.run(model, log, needs, max_effects)
+
+
+class _Search:
+    """One diagnosis under way."""
+
+    def __init__(self, layout: Layout, windows: Windows, usable: list[str], say: Callable[[str], None]) -> None:
+        self.layout, self.windows, self.usable, self.say = layout, windows, usable, say
+        self.base = [n for n in layout.names if n not in usable or n in layout.nuisance]
+        self.floor = TRUST * motion(windows) + 1e-9
+
+    def statistics(self, found: Explanation) -> tuple[Statistics, Layout]:
+        """Linearise towards every parameter at a fit."""
+        model = self.layout.model.rebuilt(self.layout.model.copied_effects())
+        set_parameters(model, found.names, found.fitted.theta)
+        sums, _, _ = reduce(self.windows, answers(model, self.windows, found.fitted.initial, self.layout.names),
+                            found.fitted.sigma)
+        return sums, replace(self.layout, model=model)
+
+    def run(self, model: GreyBox, log: Log, needs: dict[str, list[str]], most: int) -> Diagnosis:
+        """Search for one effect after the other."""
+        self.say("fitting the uncertain coefficients")
+        current = explain(self.layout, self.windows, self.base, ())
+        first, chosen, steps = current, [], []
+        table: dict[str, dict[str, Any]] = {}
+        similar: tuple[list[str], Array] = ([], np.eye(0))
+        noise_floor = None
+        global_p = 1.0
+        while True:
+            remaining = [n for n in self.usable if n not in chosen]
+            self.say(f"testing {len(remaining)} effects at the null")
+            sums, at = self.statistics(current)
+            base = [*self.base, *[c for c in chosen if c not in self.base]]
+            scores = {n: score(sums, at, base, n, chosen) for n in remaining}
+            p_value = _together([s.p_value for s in scores.values() if s.degrees])
+            if not table:
+                global_p = p_value
+                similar = (remaining, similarity(sums, at, base, remaining))
+                table = self._table(scores, current, similar, needs)
+            missing_something = p_value < ALPHA
+            if not missing_something or not remaining or len(chosen) >= most:
+                verdict = "unknown" if self._slow(current) else "adequate"
+                steps.append({"verdict": verdict, "effects": [], "p_value": p_value})
+                break
+            verdict, best, tried = self._choose(scores, at, base, chosen, current)
+            for explanation in tried:
+                if not chosen:
+                    self._fill(table, explanation, first)
+            if best is None:
+                verdict = "unknown" if p_value < ALPHA_UNKNOWN or self._slow(current) else "adequate"
+                steps.append({"verdict": verdict, "effects": [], "p_value": p_value})
+                break
+            new = [e for e in best.effects if e not in chosen]
+            steps.append({"verdict": verdict, "effects": new, "p_value": p_value})
+            if verdict == "ambiguous":
+                break
+            chosen = list(best.effects)
+            current = best
+            if noise_floor is None:
+                noise_floor = best
+        missing = [e for s in steps for e in s["effects"]]
+        order = sorted(table.values(), key=lambda c: (missing.index(c["effect"]) if c["effect"] in missing else 99,
+                                                      -c.pop("_order")))
+        verdict = steps[0]["verdict"]
+        before, after = _excess(first, current), _excess(current, current)
+        unexplained = float(np.clip(after / before, 0.0, 1.0)) if before > 0 else 0.0
+        depends = {}
+        if verdict == "unknown" or steps[-1]["verdict"] == "unknown":
+            depends = depends_on(current.fitted.model, log, self.windows)
+        return Diagnosis(
+            model.vehicle.name, log.name, verdict, missing, steps, order,
+            0.0 if verdict == "adequate" else unexplained, depends, None, self._warnings(model, log),
+            {"method": f"none: free-running windows of {self._length():g} s with estimated initial states",
+             "bandwidth_hz": None},
+            global_p, similar, current,
+        )
+
+    def _length(self) -> float:
+        times = self.windows.times[:, self.windows.warmup:]
+        return round(float((times[:, -1] - times[:, 0]).max()), 3)
+
+    def _choose(self, scores: dict[str, Score], at: Layout, base: list[str], chosen: list[str],
+                current: Explanation) -> tuple[str, Explanation | None, list[Explanation]]:
+        """Refit the leading effects and return the verdict, the best, and all that were refitted."""
+        leading = sorted((s for s in scores.values() if s.degrees), key=lambda s: -s.evidence)[:LEADERS]
+        top = leading[0].evidence if leading else 0.0
+        leading = [s for s in leading if s.p_value < ALPHA and s.evidence > min(top - REACH, REACH_SHARE * top)]
+        tried = []
+        for candidate in leading:
+            self.say(f"fitting {candidate.effect}")
+            guess = at.model.rebuilt(at.model.copied_effects())
+            set_parameters(guess, [candidate.effect], np.where(np.isfinite(candidate.estimate), candidate.estimate,
+                                                               parameters_of(at.model, [candidate.effect])))
+            tried.append(explain(self.layout, self.windows, base, [*chosen, candidate.effect], start=current.fitted,
+                                 guess=replace(at, model=guess), sigma=current.fitted.sigma, iterations=6))
+        if not tried:
+            return "unknown", None, []
+        factor = min(self._factor(e) for e in tried)
+        current = weigh(self.layout, current, factor)
+        tried = sorted((weigh(self.layout, e, factor) for e in tried), key=lambda e: -e.evidence)
+        paying = [e for e in tried if e.evidence > current.evidence and self._pays(e, self._without(e, base, current))]
+        if not paying:
+            return "unknown", None, tried
+        best = paying[0]
+        rivals = [e for e in paying[1:] if best.evidence - e.evidence < ODDS]
+        if rivals:
+            names = tuple(e.effects[-1] for e in [best, *rivals])
+            return "ambiguous", replace(best, effects=(*chosen, *names)), tried
+        # The weights follow the errors that the winner leaves.
+        final = explain(self.layout, self.windows, base, best.effects, start=best.fitted,
+                        guess=replace(at, model=best.fitted.model))
+        return "named", final, [final, *tried[1:]] if tried[0] is best else [final, *tried]
+
+    def _factor(self, explanation: Explanation) -> float:
+        sums = explanation.fitted.statistics
+        return inflation(sums.slope, sums.hessian.sum(0), sums.run)
+
+    def _without(self, after: Explanation, base: list[str], current: Explanation) -> Explanation:
+        """Return the same model without the effect, everything else refitted.
+
+        Where the effect is a coefficient group that is uncertain anyway, that group stays as stated.
+        """
+        effect = after.effects[-1]
+        if effect not in base:
+            return current
+        names = [n for n in base if n != effect]
+        return explain(self.layout, self.windows, names, after.effects[:-1], start=current.fitted,
+                       sigma=current.fitted.sigma, iterations=6)
+
+    def _pays(self, after: Explanation, before: Explanation) -> bool:
+        """Whether the error on what was left out falls by more than its own uncertainty."""
+        gain = before.left_out - after.left_out
+        return float(gain.sum()) > float(np.sqrt(len(gain)) * gain.std(ddof=1))
+
+    def _slow(self, explanation: Explanation) -> bool:
+        """Whether the errors left are slower than white noise: something is missing, with a name or without."""
+        sums = explanation.fitted.statistics
+        count, pairs = sums.count.sum(0), sums.pairs.sum(0)
+        spent = 12 * len(sums.cost) * count / max(count.sum(), 1.0)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            slow = sums.channel.sum(0) / np.maximum(count - spent, 1.0)
+            fast = np.maximum(sums.rough.sum(0) / (2 * pairs), self.floor**2)
+            z = (slow / fast - 1.0) * np.sqrt(count)
+            share = 1.0 - fast / slow
+        return bool(np.any((count > 0) & (z > SLOW_Z) & (share > SLOW_SHARE)))
+
+    def _table(self, scores: dict[str, Score], current: Explanation, similar: tuple[list[str], Array],
+               needs: dict[str, list[str]]) -> dict[str, dict[str, Any]]:
+        names, matrix = similar
+        excess = max(_excess(current, current), max((s.gain for s in scores.values()), default=0.0), 1e-12)
+        table: dict[str, dict[str, Any]] = {}
+        for name, absent in needs.items():
+            found = scores.get(name)
+            entry: dict[str, Any] = {"effect": name, "p_value": None, "explained": None, "cv_before": None,
+                                     "cv_after": None, "parameters": {}, "confusable_with": [], "needs": absent,
+                                     "_order": -np.inf}
+            if found is not None:
+                row = names.index(name)
+                near = sorted(((matrix[row, j], names[j]) for j in range(len(names)) if j != row), reverse=True)
+                described = self.layout.model.effect(name).parameters_of
+                entry.update(
+                    p_value=found.p_value, explained=float(np.clip(found.gain / excess, 0.0, 1.0)),
+                    cv_before=current.cv, cv_after=_promised(current, found),
+                    parameters={p.name: {"value": v, "std": s, "unit": p.unit}
+                                for p, v, s in zip(described, found.estimate, found.std, strict=True)},
+                    confusable_with=[{"effect": n, "similarity": float(v)} for v, n in near if v >= 0.5],
+                    _order=found.evidence,
+                )
+            table[name] = entry
+        return table
+
+    def _fill(self, table: dict[str, dict[str, Any]], explanation: Explanation, before: Explanation) -> None:
+        """Replace the one-step figures of an effect by those of its own fit."""
+        for name in explanation.effects:
+            columns = _columns(self.layout, explanation.names, name)
+            std, _ = standard_errors(explanation, columns)
+            described = self.layout.model.effect(name).parameters_of
+            values = explanation.fitted.theta[columns]
+            table[name].update(
+                cv_before=before.cv,
+                cv_after=float(np.sqrt(_scaled_left_out(explanation, before) / before.left_out_count.sum())),
+                parameters={p.name: {"value": v, "std": s, "unit": p.unit}
+                            for p, v, s in zip(described, values, std, strict=True)},
+            )
+
+    def _warnings(self, model: GreyBox, log: Log) -> list[str]:
+        found = list(model.vehicle.warnings)
+        if len(log.runs) < 2:
+            found.append("the log holds one run: what is left out in turn are stretches of it")
+        if not stated(model):
+            found.append("no coefficient of the model is uncertain: any error of theirs will be given a name")
+        return found
+
+
+def _columns(layout: Layout, names: Sequence[str], wanted: str) -> NDArray[np.int64]:
+    at = 0
+    for name in names:
+        size = len(layout.columns[name])
+        if name == wanted:
+            return np.arange(at, at + size)
+        at += size
+    raise KeyError(wanted)
+
+
+def _together(p_values: list[float]) -> float:
+    """Return one p-value for many dependent tests: Bonferroni's, which holds whatever the dependence."""
+    return float(min(1.0, len(p_values) * min(p_values))) if p_values else 1.0
+
+
+def _excess(explanation: Explanation, weights: Explanation) -> float:
+    """Return the weighted squared error above what white noise alone would leave."""
+    sums, sigma = explanation.fitted.statistics, weights.fitted.sigma
+    noise = np.nan_to_num(weights.fitted.statistics.noise())
+    usable = np.isfinite(sigma)
+    count = sums.count.sum(0)
+    spent = 12 * len(sums.cost) * count / max(count.sum(), 1.0)
+    above = sums.channel.sum(0) - (count - spent) * noise**2
+    return float(np.maximum(above[usable] / sigma[usable] ** 2, 0.0).sum())
+
+
+def _promised(current: Explanation, found: Score) -> float:
+    left = max(current.left_out.sum() - (found.gain - found.degrees), 0.0)
+    return float(np.sqrt(left / max(current.left_out_count.sum(), 1.0)))
+
+
+def _scaled_left_out(explanation: Explanation, before: Explanation) -> float:
+    """Return an explanation's left-out error in the weights of the explanation before it."""
+    mine, theirs = explanation.fitted.sigma, before.fitted.sigma
+    if np.allclose(mine[np.isfinite(mine)], theirs[np.isfinite(mine)]):
+        return float(explanation.left_out.sum())
+    usable = np.isfinite(mine)
+    sums = explanation.fitted.statistics.channel.sum(0)[usable]
+    inflated = explanation.left_out.sum() / max(explanation.fitted.statistics.cost.sum(), 1e-12)
+    return float((sums / theirs[usable] ** 2).sum() * inflated)
+
+
+__all__ = ["CHANNELS", "Diagnosis", "candidates_for", "diagnose", "windows_for"]

@@ -1,0 +1,150 @@
+"""Fit explanations to a log and judge them on runs left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.diagnosis.nuisance import Layout, priors, scales, stated
+from auvnn.diagnosis.score import inflation
+from auvnn.metrics.windows import Windows
+from auvnn.training.prediction_error import Fitted, Priors, Statistics, fit
+
+Array = NDArray[np.float64]
+# Runs left out at a time where there are many, and stretches where there is one run only.
+FOLDS = 5
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A set of effects fitted jointly with what is uncertain.
+
+    Attributes:
+        effects: what is supposed to be missing.
+        fitted: the fit.
+        names: effects whose parameters were free, in order of their columns.
+        evidence: logarithm of the marginal likelihood, up to a constant that all explanations share.
+        left_out: (B,) weighted squared error of each window, fitted without its fold.
+        left_out_count: (B,) samples of each window.
+    """
+
+    effects: tuple[str, ...]
+    fitted: Fitted
+    names: tuple[str, ...]
+    evidence: float
+    left_out: Array
+    left_out_count: Array
+
+    @property
+    def cv(self) -> float:
+        """Root-mean-square weighted error on what was left out; one is noise alone."""
+        return float(np.sqrt(self.left_out.sum() / max(self.left_out_count.sum(), 1.0)))
+
+
+def folds(windows: Windows) -> NDArray[np.int64]:
+    """Return each window's fold, (B,): by run where there are several, else by stretch of time."""
+    runs = np.unique(windows.run)
+    if len(runs) >= 2:
+        return np.searchsorted(runs, windows.run) % FOLDS
+    return (np.arange(len(windows)) * min(FOLDS, len(windows)) // max(len(windows), 1)).astype(np.int64)
+
+
+def left_out(statistics: Statistics, theta: Array, held: Priors, fold: NDArray[np.int64]) -> Array:
+    """Return each window's weighted squared error under parameters fitted without its fold, (B,).
+
+    The fit is linear about the fit on everything, from the windows' own sums: no run is simulated again.
+    """
+    cost = np.empty(len(fold))
+    for f in np.unique(fold):
+        keep = fold != f
+        if not keep.any():
+            keep = fold == f
+        hessian = statistics.hessian[keep].sum(0) + np.diag(held.precision)
+        gradient = statistics.slope[keep].sum(0) - held.precision * (theta - held.mean)
+        step = np.linalg.lstsq(hessian, gradient, rcond=1e-12)[0] if len(theta) else theta
+        out = ~keep if (~keep).any() else keep
+        cost[out] = (statistics.cost[out] - 2 * statistics.slope[out] @ step
+                     + np.einsum("i,bij,j->b", step, statistics.hessian[out], step))
+    return cost
+
+
+def explain(
+    layout: Layout,
+    windows: Windows,
+    base: Sequence[str],
+    effects: Sequence[str],
+    *,
+    start: Fitted | None = None,
+    guess: Layout | None = None,
+    sigma: Array | None = None,
+    iterations: int = 15,
+) -> Explanation:
+    """Fit effects jointly with the base and judge them on folds left out.
+
+    Args:
+        layout: stated values and columns.
+        windows: of the log.
+        base: effects that are free anyway: stated uncertainties and effects found before.
+        effects: effects asked for; a stated uncertainty among them is set free.
+        start: a fit whose initial states and weights to start from.
+        guess: a layout whose model holds values to start from.
+        sigma: fixed weights; estimated where absent.
+        iterations: at most this many steps of the fit.
+    """
+    names = tuple(dict.fromkeys([*base, *effects]))
+    held = priors(layout, names, free=effects)
+    model = (guess or layout).model
+    fitted = fit(model, windows, names, held, initial=None if start is None else start.initial, sigma=sigma,
+                 iterations=iterations)
+    cost = left_out(fitted.statistics, fitted.theta, held, folds(windows))
+    count = fitted.statistics.count[:, np.isfinite(fitted.sigma)].sum(1)
+    return Explanation(tuple(effects), fitted, names, 0.0, cost, count)
+
+
+def weigh(layout: Layout, explanation: Explanation, factor: float) -> Explanation:
+    """Return the explanation with its evidence: Laplace's approximation with priors of plausible size.
+
+    Args:
+        layout: stated values.
+        explanation: to be weighed.
+        factor: variance of the scores over that of white noise; divides the data's say.
+
+    Reference: MacKay (1992), Neural Computation 4(3).
+    """
+    fitted, prior = explanation.fitted, []
+    uncertain = stated(layout.model)
+    means = []
+    for name in explanation.names:
+        mean = layout.means[name]
+        means.append(mean)
+        size = scales(layout, name)
+        if name in uncertain and name not in explanation.effects:
+            size = uncertain[name] * np.maximum(np.abs(mean), 1e-3)
+        prior.append(np.broadcast_to(size, mean.shape))
+    size = np.concatenate(prior)
+    away = (fitted.theta - np.concatenate(means)) / size
+    data = float(fitted.statistics.cost.sum()) / factor
+    information = fitted.statistics.hessian.sum(0) * size[:, None] * size / factor
+    volume = np.linalg.slogdet(information + np.eye(len(size)))[1]
+    return replace(explanation, evidence=-0.5 * (data + float(away @ away) + volume))
+
+
+def standard_errors(explanation: Explanation, columns: NDArray[np.int64]) -> tuple[Array, float]:
+    """Return standard errors of some parameters, and the inflation that went into them.
+
+    Args:
+        explanation: a fit.
+        columns: positions within its own parameter vector.
+    """
+    statistics, fitted = explanation.fitted.statistics, explanation.fitted
+    covariance = fitted.covariance()
+    others = np.setdiff1d(np.arange(len(fitted.theta)), columns)
+    total = statistics.hessian.sum(0) + np.diag(fitted.priors.precision)
+    carry = np.linalg.lstsq(total[np.ix_(others, others)], total[np.ix_(others, columns)], rcond=1e-12)[0]
+    by_window = statistics.slope[:, columns] - statistics.slope[:, others] @ carry
+    information = total[np.ix_(columns, columns)] - total[np.ix_(columns, others)] @ carry
+    factor = inflation(by_window, information, statistics.run)
+    return np.sqrt(np.maximum(np.diag(covariance)[columns], 0.0) * factor), factor

@@ -1,0 +1,237 @@
+"""Add effects to a model, refit, and compare before and after on data that was held out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from auvnn.answers import Answer, plain
+from auvnn.diagnosis.bake import baked
+from auvnn.diagnosis.compare import stitch
+from auvnn.diagnosis.diagnose import windows_for
+from auvnn.diagnosis.explain import Explanation, explain, standard_errors
+from auvnn.diagnosis.nuisance import lay_out
+from auvnn.effects import EFFECTS
+from auvnn.errors import ConfigError
+from auvnn.logs import Log
+from auvnn.logs.noise import noise_std
+from auvnn.logs.overlap import leakage
+from auvnn.metrics.one_step import choose_derivative, one_step, scores
+from auvnn.metrics.rollouts import HORIZONS, Rolled, Scale, scale_of, table
+from auvnn.models import GreyBox
+
+Array = NDArray[np.float64]
+BLOCKS = 20
+
+
+@dataclass
+class Improvement(Answer):
+    """What adding effects did; `to_dict` is `improvement.json` of the public contract.
+
+    Attributes:
+        model: name of the model before.
+        accepted: whether the held-out error fell by more than its own uncertainty.
+        better: the model with the effects.
+        refitted_model: the model as given, its uncertain coefficients refitted.
+    """
+
+    kind = "improvement"
+    name: str
+    log: str
+    test: str
+    effects: list[str]
+    accepted: bool
+    before: dict[str, Any]
+    refitted: dict[str, Any]
+    after: dict[str, Any]
+    gain: dict[str, float]
+    waterfall: list[dict[str, Any]]
+    parameters: dict[str, dict[str, dict[str, Any]]]
+    coefficients: dict[str, dict[str, dict[str, Any]]]
+    held_out: str
+    model: GreyBox
+    refitted_model: GreyBox
+    warnings: list[str] = field(default_factory=list)
+    series: list[dict[str, Any]] = field(default_factory=list)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON answer."""
+        names = ("log", "test", "effects", "accepted", "before", "refitted", "after", "gain", "waterfall",
+                 "parameters", "coefficients", "held_out", "warnings")
+        return plain({"schema": "auvnn/improvement/1", "model": self.name, **{n: getattr(self, n) for n in names}})
+
+
+def add(
+    model: GreyBox,
+    log: Log,
+    effects: str | Sequence[str],
+    *,
+    test: Log | None = None,
+    derivative: dict[str, Any] | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Improvement:
+    """Add effects, fit them jointly with the uncertain coefficients on `log`, and judge on held-out data.
+
+    Args:
+        model: the model as known; it is not changed.
+        log: what to fit on.
+        effects: names.
+        test: what to judge on; by default the last run of `log`, or the last 30 % of a single one.
+        derivative: how accelerations are obtained where they were not measured.
+        progress: told in words what is being done.
+
+    Raises:
+        ConfigError: an unknown effect, one that is there already, or one named twice.
+        InputError: the same data on both sides.
+    """
+    say = progress or (lambda words: None)
+    names = [effects] if isinstance(effects, str) else list(effects)
+    _check(model, names)
+    held_out = f"{test.name} is held out" if test is not None else ""
+    if test is None:
+        log, test, held_out = log.split()
+    else:
+        leakage(log, test)
+    windows = windows_for(model, log)
+    layout = lay_out(model, names)
+    base = [n for n in layout.names if n not in names or n in layout.nuisance]
+    say("refitting the uncertain coefficients alone")
+    # A coefficient group that is itself to be added stays as stated in the model that is compared with.
+    nothing = explain(layout, windows, [n for n in base if n not in names], ())
+    models, fits = [("as given", model), ("coefficients refitted", baked(model, layout, nothing))], [nothing]
+    for count in range(1, len(names) + 1):
+        say(f"fitting with {', '.join(names[:count])}")
+        found = explain(layout, windows, base, names[:count], start=fits[-1].fitted)
+        fits.append(found)
+        models.append((names[count - 1], baked(model, layout, found)))
+    final, best = models[-1][1], fits[-1]
+    say("free running on the held-out data")
+    scale, how = scale_of(test), choose_derivative(test, derivative)
+    results, rolled = {}, {}
+    for step, candidate in models:
+        horizons = HORIZONS if step in ("as given", "coefficients refitted") or candidate is final else ("5",)
+        rollout, kept = table(candidate, test, scale, horizons)
+        results[step] = {"rollout": rollout}
+        rolled[step] = kept
+        if len(horizons) > 1:
+            results[step]["one_step"] = scores(one_step(candidate, test, how))
+    key = "5" if "5" in rolled["as given"] else next(iter(rolled["as given"]), "full")
+    last = names[-1]
+    gain, std = paired_gain(rolled["coefficients refitted"][key], rolled[last][key], scale)
+    accepted = bool(np.isfinite(gain) and gain > std)
+    waterfall = [{"step": s, "error": results[s]["rollout"][key]["total"]} for s, _ in models]
+    waterfall.append({"step": "noise floor", "error": noise_floor(final, rolled[last][key], test, scale)})
+    warnings = _warnings(layout, best, accepted, gain, std)
+    if key != "5":
+        warnings.append(f"no held-out stretch is 5 s long: gain and waterfall are for horizon {key}")
+    return Improvement(
+        model.vehicle.name, log.name, test.name, names, accepted,
+        *({"one_step": results[s]["one_step"], "rollout": results[s]["rollout"]}
+          for s in ("as given", "coefficients refitted", last)),
+        {"value": gain, "std": std}, waterfall, _values(layout, best, names),
+        _values(layout, best, [n for n in layout.nuisance if n not in names]), held_out, final, models[1][1],
+        warnings,
+        [{"run": run.number, "t": run.t, "measured": run.nu,
+          "before": stitch(rolled["as given"][key], run.number, run.nu),
+          "refitted": stitch(rolled["coefficients refitted"][key], run.number, run.nu),
+          "after": stitch(rolled[last][key], run.number, run.nu)} for run in test.runs],
+    )
+
+
+def _check(model: GreyBox, names: list[str]) -> None:
+    if not names:
+        raise ConfigError("no effect to add: name one, for example effect=ocean_current")
+    for name in names:
+        EFFECTS.get(name)
+        if names.count(name) > 1:
+            raise ConfigError(f"effect {name} is named twice: name it once")
+        if name in model.effect_names:
+            raise ConfigError(f"the model has {name} already: remove it first, or name another effect")
+
+
+def paired_gain(before: Rolled, after: Rolled, scale: Scale) -> tuple[float, float]:
+    """Return by how much the total error falls, and its standard error by leaving out blocks of windows.
+
+    Blocks of neighbouring windows hold the correlation within them (Kuensch 1989, Annals of Statistics 17(3)).
+    """
+    value = before.total(scale) - after.total(scale)
+    count = len(before.windows)
+    block = np.arange(count) * min(BLOCKS, count) // max(count, 1)
+    without = [before.total(scale, block != b) - after.total(scale, block != b) for b in np.unique(block)]
+    n = len(without)
+    if n < 2:
+        return value, float("inf")
+    return value, float(np.sqrt((n - 1) / n * np.sum((np.array(without) - np.mean(without)) ** 2)))
+
+
+def noise_floor(model: GreyBox, rolled: Rolled, log: Log, scale: Scale, seed: int = 0) -> float:
+    """Return the free-running error that a perfect model would show: noise of the outputs and of the start.
+
+    The model's own predictions stand for the truth; they are started again from states with noise as large
+    as the log's and compared with noisy copies of themselves.
+    """
+    from auvnn.metrics.free_run import initial_states, moved, predict
+
+    noise_nu = np.nanmean([np.nan_to_num(np.asarray(noise_std(r.t, r.nu))) for r in log.runs], axis=0)
+    angle = np.nanmean([np.nan_to_num(np.asarray(noise_std(r.t, 2 * r.quaternion[:, 1:]))) for r in log.runs], axis=0)
+    rng = np.random.default_rng(seed)
+    windows = rolled.windows
+    states = initial_states(model, windows)
+    kick = np.concatenate([np.zeros((len(windows), 3)), rng.normal(size=(len(windows), 3)) * angle,
+                           rng.normal(size=(len(windows), 6)) * noise_nu], axis=1)
+    with torch.no_grad():
+        true = predict(model, windows, states)[1].numpy()
+        started = predict(model, windows, moved(states, torch.as_tensor(kick)))[1].numpy()
+    error = true + rng.normal(size=true.shape) * noise_nu - started
+    mask = windows.mask[..., 6:12].numpy().copy()
+    mask[:, 0] = 0.0
+    good = np.isfinite(error).all((1, 2))
+    if not good.any():
+        return float("nan")
+    squared = (error[good] ** 2 * mask[good]).sum((0, 1)) / np.maximum(mask[good].sum((0, 1)), 1.0)
+    value = np.sqrt(squared) / np.where(scale.std > 0, scale.std, np.nan)
+    return float(np.nanmean(value[scale.excited])) if scale.excited.any() else float("nan")
+
+
+def _values(layout: Any, found: Explanation, names: Sequence[str]) -> dict[str, dict[str, dict[str, Any]]]:
+    out: dict[str, dict[str, dict[str, Any]]] = {}
+    at = 0
+    for name in found.names:
+        size = len(layout.columns[name])
+        columns = np.arange(at, at + size)
+        at += size
+        if name not in names:
+            continue
+        std, _ = standard_errors(found, columns)
+        out[name] = {p.name: {"value": v, "std": s, "unit": p.unit} for p, v, s in
+                     zip(layout.model.effect(name).parameters_of, found.fitted.theta[columns], std, strict=True)}
+    return out
+
+
+def _warnings(layout: Any, found: Explanation, accepted: bool, gain: float, std: float) -> list[str]:
+    out = []
+    if not accepted:
+        out.append(f"not accepted: the held-out error falls by {gain:.3g}, its own uncertainty is {std:.3g}")
+    if not found.fitted.converged:
+        out.append("the fit had not settled when it was stopped: read the parameters with care")
+    at = 0
+    for name in found.names:
+        for p in layout.model.effect(name).parameters_of:
+            value = found.fitted.theta[at]
+            at += 1
+            if value <= p.low + 1e-9 * abs(p.low) or value >= p.high - 1e-9 * abs(p.high):
+                if p.null not in (p.low, p.high) or value != p.null:
+                    out.append(f"{name}.{p.name} ended at its bound {value:g} {p.unit}: the data ask for more")
+    covariance = found.fitted.covariance()
+    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    rho = covariance / size[:, None] / size
+    labels = [f"{n}.{p.name}" for n in found.names for p in layout.model.effect(n).parameters_of]
+    pairs = [(i, j) for i in range(len(labels)) for j in range(i) if abs(rho[i, j]) > 0.99]
+    for i, j in pairs[:5]:
+        out.append(f"{labels[j]} and {labels[i]} cannot be told apart on this log (correlation {rho[i, j]:.3f})")
+    return out

@@ -1,0 +1,99 @@
+"""Where a model fails: the residual wrench by degree of freedom and regime."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.logs import Log, Run
+from auvnn.metrics.one_step import OneStep
+
+Array = NDArray[np.float64]
+AXES = ("X", "Y", "Z", "K", "M", "N")
+WORDS = {"X": "surge", "Y": "sway", "Z": "heave", "K": "roll", "M": "pitch", "N": "yaw"}
+BINS = 6
+UNITS = {"speed": "m/s", "turn rate": "rad/s", "attitude": "rad", "heading": "rad", "command": "share of largest",
+         "depth": "m", "time": "s"}
+
+
+def regimes(run: Run) -> dict[str, Array]:
+    """Return what a run's residual is sorted by, each (N,), in the units of `UNITS`."""
+    found = {
+        "speed": np.linalg.norm(run.nu[:, :3], axis=1),
+        "turn rate": np.linalg.norm(run.nu[:, 3:], axis=1),
+        # Angle between the body's and the world's vertical: roll and pitch in one.
+        "attitude": np.arccos(np.clip(1 - 2 * (run.quaternion[:, 1] ** 2 + run.quaternion[:, 2] ** 2), -1, 1)),
+        "heading": run.euler[:, 2],
+        "time": run.t - run.t[0],
+    }
+    if run.command is not None:
+        size = np.linalg.norm(run.command, axis=1)
+        top = np.nanmax(size) if np.isfinite(size).any() else 0.0
+        found["command"] = size / top if top > 0 else size
+    if run.position is not None:
+        found["depth"] = run.position[:, 2]
+    return found
+
+
+def locate(log: Log, parts: list[OneStep]) -> dict[str, dict[str, Any]]:
+    """Return by regime the bins' edges, the residual's root mean square (6, bins) and the samples in each bin."""
+    values = [regimes(run) for run in log.runs]
+    wrench = np.concatenate([p.wrench for p in parts])
+    found: dict[str, dict[str, Any]] = {}
+    for name in UNITS:
+        if not all(name in v for v in values):
+            continue
+        x = np.concatenate([v[name] for v in values])
+        good = np.isfinite(x) & np.isfinite(wrench).all(1)
+        if good.sum() < 10 * BINS or np.ptp(x[good]) < 1e-9:
+            continue
+        if name in ("heading", "time", "depth"):
+            edges = np.linspace(x[good].min(), x[good].max(), BINS + 1)
+        else:
+            # Bins of equal content: speeds and angles crowd near zero.
+            edges = np.unique(np.quantile(x[good], np.linspace(0, 1, BINS + 1)))
+        if len(edges) < 3:
+            continue
+        index = np.clip(np.digitize(x[good], edges[1:-1]), 0, len(edges) - 2)
+        count = np.bincount(index, minlength=len(edges) - 1)
+        total = np.stack([np.bincount(index, weights=wrench[good, k] ** 2, minlength=len(edges) - 1)
+                          for k in range(6)])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found[name] = {"edges": edges.tolist(), "unit": UNITS[name], "rms": np.sqrt(total / count),
+                           "count": count}
+    return found
+
+
+def failures(parts: list[OneStep], located: dict[str, dict[str, Any]], floor: Array, limit: int = 8
+             ) -> list[dict[str, Any]]:
+    """Return where the error sits, in plain words, largest first.
+
+    A place's share is what its bin holds of the residual's energy above the noise floor, all six degrees of
+    freedom together, forces and moments made comparable by their floors.
+    """
+    wrench = np.concatenate([p.wrench for p in parts])
+    unit = np.where(floor > 0, floor, 1e-9)
+    energy = np.nanmean((wrench / unit) ** 2, axis=0) - 1.0
+    whole = float(np.maximum(energy, 0.0).sum())
+    if not np.isfinite(whole) or whole <= 0:
+        return []
+    samples = len(wrench)
+    found = []
+    for k, axis in enumerate(AXES):
+        share = max(energy[k], 0.0) / whole
+        if share >= 0.01:
+            found.append({"channel": axis, "where": f"{WORDS[axis]}, everywhere", "share": float(share)})
+        for name, place in located.items():
+            above = np.maximum((place["rms"][k] / unit[k]) ** 2 - 1.0, 0.0) * place["count"]
+            if not np.isfinite(above).any() or np.nansum(above) <= 0:
+                continue
+            at = int(np.nanargmax(above))
+            density = (above[at] / max(place["count"][at], 1)) / max(np.nansum(above) / place["count"].sum(), 1e-30)
+            if density > 1.5 and above[at] / samples / whole >= 0.01:
+                low, high = place["edges"][at], place["edges"][at + 1]
+                found.append({"channel": axis, "where": f"{WORDS[axis]}, {name} from {low:.3g} to {high:.3g} "
+                              f"{place['unit']}: {density:.1f} times its average",
+                              "share": float(above[at] / samples / whole)})
+    return sorted(found, key=lambda f: -f["share"])[:limit]

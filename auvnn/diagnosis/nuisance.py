@@ -1,0 +1,101 @@
+"""What is uncertain in a model besides the effect that is asked for: its coefficients, by their stated amounts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.effects import EFFECTS
+from auvnn.effects.inertia_factors import InertiaFactors
+from auvnn.models import GreyBox
+from auvnn.training.prediction_error import Priors
+
+Array = NDArray[np.float64]
+
+# Groups of the model file's `uncertainty` and the effect that varies each.
+GROUPS = ("added_mass", "linear_damping", "quadratic_damping", "inertia")
+# An effect that is already part of the model was fitted or stated: it may move by its plausible scale.
+# A candidate is all but free, so that its prior neither pulls the estimate nor leaves it without bound.
+FREE = 10.0
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Which columns of the parameter vector belong to which effect.
+
+    Attributes:
+        model: holds all the effects named, candidates at their nulls.
+        names: effects in order of their columns.
+        columns: effect to columns.
+        nuisance: effects that stand for stated uncertainty.
+        means: what was stated of each effect's parameters before anything was fitted.
+    """
+
+    model: GreyBox
+    names: tuple[str, ...]
+    columns: dict[str, NDArray[np.int64]]
+    nuisance: tuple[str, ...]
+    means: dict[str, Array]
+
+    def of(self, names: Sequence[str]) -> NDArray[np.int64]:
+        """Return the columns of several effects, joined."""
+        parts = [self.columns[n] for n in names]
+        return np.concatenate(parts) if parts else np.zeros(0, dtype=np.int64)
+
+
+def stated(model: GreyBox) -> dict[str, float]:
+    """Return the relative standard deviation of each coefficient group that the vehicle has at all."""
+    known = {"added_mass": True, "inertia": True}
+    vehicle = model.vehicle
+    elements = len(vehicle.damping_elements) > 0
+    known["linear_damping"] = vehicle.linear_damping is not None or elements
+    known["quadratic_damping"] = vehicle.quadratic_damping is not None or elements
+    return {g: float(vehicle.uncertainty[g]) for g in GROUPS if known[g] and vehicle.uncertainty.get(g, 0.0) > 0}
+
+
+def lay_out(model: GreyBox, candidates: Sequence[str]) -> Layout:
+    """Return the model with nuisance terms and candidates in it, those not there yet at their nulls."""
+    groups = list(stated(model))
+    effects = model.copied_effects()
+    present = [str(e.name) for e in effects]
+    for name in dict.fromkeys([*groups, *candidates]):
+        if name in present:
+            continue
+        kind = InertiaFactors if name == "inertia" else EFFECTS.get(name)
+        effects.append(kind.build(model.vehicle, model.actuation))
+    full = model.rebuilt(effects)
+    columns, means, at = {}, {}, 0
+    for effect in full.effects:
+        size = len(effect.parameters_of)
+        columns[str(effect.name)] = np.arange(at, at + size)
+        means[str(effect.name)] = effect.theta.detach().numpy().copy()
+        at += size
+    return Layout(full, tuple(columns), columns, tuple(groups), means)
+
+
+def priors(layout: Layout, names: Sequence[str], free: Sequence[str] = ()) -> Priors:
+    """Return the priors of the named effects' parameters, joined in the order given.
+
+    Args:
+        layout: of the model.
+        names: effects.
+        free: those of them that are asked for: their stated uncertainty is left out.
+    """
+    uncertain = stated(layout.model)
+    mean, precision = [], []
+    for name in names:
+        stated_values = layout.means[name]
+        mean.append(stated_values)
+        if name in uncertain and name not in free:
+            precision.append((uncertain[name] * np.maximum(np.abs(stated_values), 1e-3)) ** -2)
+        else:
+            precision.append((FREE * scales(layout, name)) ** -2)
+    return Priors(np.concatenate(mean) if mean else np.zeros(0), np.concatenate(precision) if mean else np.zeros(0))
+
+
+def scales(layout: Layout, name: str) -> Array:
+    """Return the plausible departure of an effect's parameters from their nulls, (p,)."""
+    return np.array([p.scale for p in layout.model.effect(name).parameters_of])

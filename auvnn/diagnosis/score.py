@@ -1,0 +1,166 @@
+"""Is an effect missing? One test at the null for every effect, with what else is uncertain taken out.
+
+At the fitted null the residual's slope towards an effect's parameters (the score) is compared with what chance
+allows. Coefficients that are merely uncertain take their share first, weighted by their stated amounts. The
+variance holds for residuals that are correlated in time: it is the larger of the white-noise one and the
+one that the windows' own scores show, neighbours included (Newey and West, 1987).
+
+Reference: Rao (1948) for the score test; Newey and West (1987), Econometrica 55(3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from auvnn.diagnosis.nuisance import Layout, priors, scales, stated
+from auvnn.training.prediction_error import Statistics, parameters_of
+
+Array = NDArray[np.float64]
+# Shares of a parameter's information below this are rounding.
+TINY = 1e-10
+
+
+@dataclass(frozen=True)
+class Score:
+    """The test of one effect.
+
+    Attributes:
+        effect: name.
+        p_value: of the hypothesis that nothing but the stated uncertainty is at work.
+        statistic: quadratic form of the score, inflation divided out.
+        degrees: parameters that the log says anything about.
+        inflation: variance of the score over that of white noise, at least one.
+        estimate: (p,) one-step estimate of the parameters.
+        std: (p,) its standard errors, inflated.
+        evidence: natural logarithm of the Bayes factor for the effect, with parameters of plausible size.
+        gain: fall of the weighted squared error that the estimate promises.
+    """
+
+    effect: str
+    p_value: float
+    statistic: float
+    degrees: int
+    inflation: float
+    estimate: Array
+    std: Array
+    evidence: float
+    gain: float
+
+
+def project(statistics: Statistics, layout: Layout, base: Sequence[str], effect: str, free: Sequence[str] = ()
+            ) -> tuple[Array, Array, Array]:
+    """Return score (B, p) by window, its gradient at the null (p,) and information (p, p), the base taken out.
+
+    The effect itself is left out of the base where it stands for a stated uncertainty.
+    """
+    others = [n for n in base if n != effect]
+    f, c = layout.of(others), layout.columns[effect]
+    total = statistics.hessian.sum(0)
+    held = priors(layout, others, free)
+    theta = parameters_of(layout.model, others)
+    inner = total[np.ix_(f, f)] + np.diag(held.precision)
+    carry = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
+    by_window = statistics.slope[:, c] - statistics.slope[:, f] @ carry.T
+    gradient = by_window.sum(0) + carry @ (held.precision * (theta - held.mean))
+    information = total[np.ix_(c, c)] - carry @ total[np.ix_(f, c)]
+    return by_window, gradient, 0.5 * (information + information.T)
+
+
+def inflation(by_window: Array, information: Array, run: Array) -> float:
+    """Return how much more the scores vary from window to window than white noise would have it, at least one.
+
+    Neighbouring windows of a run count with Bartlett's weight of one half.
+    """
+    centred = by_window - by_window.mean(0)
+    spread = centred.T @ centred
+    next_to = run[1:] == run[:-1]
+    lagged = centred[1:][next_to].T @ centred[:-1][next_to]
+    spread = spread + 0.5 * (lagged + lagged.T)
+    values, vectors = np.linalg.eigh(information)
+    keep = values > TINY * max(values.max(initial=0.0), 1e-300)
+    if not keep.any():
+        return 1.0
+    white = vectors[:, keep] / np.sqrt(values[keep])
+    count = len(by_window)
+    ratio = np.trace(white.T @ spread @ white) / keep.sum() * count / max(count - 1, 1)
+    return float(max(1.0, ratio))
+
+
+def score(statistics: Statistics, layout: Layout, base: Sequence[str], effect: str, free: Sequence[str] = ()) -> Score:
+    """Test one effect at the fitted null; see the module's text."""
+    by_window, gradient, information = project(statistics, layout, base, effect, free)
+    factor = inflation(by_window, information, statistics.run)
+    scale = scales(layout, effect)
+    now = parameters_of(layout.model, [effect])
+    # Work in units of the plausible scale, so that one threshold tells what the log says nothing about.
+    values, vectors = np.linalg.eigh(information * scale[:, None] * scale)
+    seen = values > max(TINY * values.max(initial=0.0), 1e-8)
+    if not seen.any():
+        size = len(scale)
+        return Score(effect, 1.0, 0.0, 0, factor, now, np.full(size, np.nan), -0.0, 0.0)
+    values, vectors = values[seen], vectors[:, seen]
+    along = vectors.T @ (gradient * scale) / values  # one-step estimate, in scales
+    spread = factor / values
+    prior = _prior_variance(layout, effect, vectors)
+    if prior is None:
+        centre = np.zeros(len(values))
+        statistic = float(np.sum(along**2 / spread))
+        evidence = 0.5 * float(np.sum(along**2 / spread - along**2 / (spread + 1.0) - np.log1p(1.0 / spread)))
+    else:
+        # The coefficient counts as missing only beyond what was stated of it.
+        mean = layout.means[effect]
+        centre = vectors.T @ ((mean - now) / scale)
+        off = along - centre
+        within, beyond = np.diag(spread) + prior, np.diag(spread + 1.0)
+        statistic = float(off @ np.linalg.solve(within, off))
+        evidence = 0.5 * float(statistic - off @ np.linalg.solve(beyond, off)
+                               + np.linalg.slogdet(within)[1] - np.linalg.slogdet(beyond)[1])
+    degrees = len(values)
+    windows = len(by_window)
+    p_value = float(stats.f.sf(statistic / degrees, degrees, max(windows - degrees, 4)))
+    estimate = now + scale * (vectors @ along)
+    std = scale * np.sqrt(np.einsum("ij,j,ij->i", vectors, spread, vectors))
+    gain = float(np.sum((along - centre) ** 2 * values))
+    return Score(effect, p_value, statistic, degrees, factor, estimate, std, evidence, gain)
+
+
+def _prior_variance(layout: Layout, effect: str, vectors: Array) -> Array | None:
+    if effect not in layout.nuisance:
+        return None
+    variance = (stated(layout.model)[effect] * layout.means[effect] / scales(layout, effect)) ** 2
+    return vectors.T @ (variance[:, None] * vectors)
+
+
+def similarity(statistics: Statistics, layout: Layout, base: list[str], names: list[str]) -> Array:
+    """Return how much of each effect's trace in the log another one can imitate, (n, n), row by column.
+
+    Entry (a, b) is the share of the squared sensitivity to a's parameters, each at its plausible scale, that
+    lies in the span of b's, after what else is uncertain has been taken out of both.
+    """
+    out = np.eye(len(names))
+    total = statistics.hessian.sum(0)
+    for i, a in enumerate(names):
+        for j, b in enumerate(names):
+            if i == j:
+                continue
+            others = [n for n in base if n not in (a, b)]
+            f = layout.of(others)
+            ca, cb = layout.columns[a], layout.columns[b]
+            both = np.concatenate([ca, cb])
+            inner = total[np.ix_(f, f)] + np.diag(priors(layout, others).precision)
+            carry = np.linalg.solve(inner, total[np.ix_(f, both)]) if len(f) else np.zeros((0, len(both)))
+            left = total[np.ix_(both, both)] - total[np.ix_(both, f)] @ carry
+            sa, sb = scales(layout, a), scales(layout, b)
+            unit = np.concatenate([sa, sb])
+            left = left * unit[:, None] * unit
+            k = len(ca)
+            # One standard error of b's own noise keeps directions that the log cannot see from imitating anything.
+            inside = left[:k, k:] @ np.linalg.solve(left[k:, k:] + np.eye(len(cb)), left[k:, :k])
+            whole = np.trace(left[:k, :k])
+            out[i, j] = float(np.clip(np.trace(inside) / whole, 0.0, 1.0)) if whole > 1e-12 else 0.0
+    return out

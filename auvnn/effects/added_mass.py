@@ -1,0 +1,22 @@
+"""Added mass that differs from the nominal one."""
+
+from __future__ import annotations
+
+from auvnn.effects.base import Body, Moment, axis_scale
+from auvnn.effects.factors import AxisFactors
+
+
+class AddedMass(AxisFactors):
+    """Factors on the added mass, and so on its Coriolis terms too.
+
+    M_A <- S M_A S with S = diag(sqrt(f)). Reference: Fossen (2011), chapter 6; SNAME (1950).
+    """
+
+    name = "added_mass"
+    cause = "the added mass is not the nominal one"
+    symbol = "M_A"
+    reference = "Fossen (2011), chapter 6"
+
+    def body(self, body: Body, moment: Moment | None) -> Body:
+        """Scale the added mass."""
+        return body.but(added_mass=body.added_mass * axis_scale(self.theta).to(body.added_mass))

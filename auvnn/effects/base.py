@@ -1,0 +1,248 @@
+"""What an effect is: physical parameters, a null at which it vanishes, and the hooks by which it acts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import torch
+from torch import Tensor, nn
+
+from auvnn.catalogue import unknown_name
+from auvnn.errors import ConfigError
+
+AXES = ("X", "Y", "Z", "K", "M", "N")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One physical parameter of an effect.
+
+    Attributes:
+        name: as in the public contract.
+        unit: SI; "1" for a pure number.
+        null: the value at which the effect vanishes exactly (all parameters at their null).
+        scale: a plausible size of the departure from the null: the prior's standard deviation.
+        low: smallest admissible value.
+        high: largest admissible value.
+        probes: values at which to linearise instead, where the slope at the null says nothing.
+    """
+
+    name: str
+    unit: str
+    null: float
+    scale: float
+    low: float
+    high: float
+    probes: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Body:
+    """What the body is at one moment; tensors in SI, leading shapes broadcast against the state's.
+
+    Attributes:
+        mass: kg.
+        weight: N.
+        buoyancy: N.
+        cg: centre of gravity from the body origin, m, (..., 3).
+        cb: centre of buoyancy, m, (..., 3).
+        inertia: about the centre of gravity, kg m2, (..., 3, 3).
+        added_mass: (..., 6, 6), positive for ordinary bodies.
+        linear: linear damping, (..., 6, 6), or None.
+        quadratic: quadratic damping, (..., 6, 6), or None.
+        element_linear: linear coefficients of displaced elements, (..., e, 6), or None.
+        element_quadratic: quadratic coefficients of displaced elements, (..., e, 6), or None.
+    """
+
+    mass: Tensor
+    weight: Tensor
+    buoyancy: Tensor
+    cg: Tensor
+    cb: Tensor
+    inertia: Tensor
+    added_mass: Tensor
+    linear: Tensor | None
+    quadratic: Tensor | None
+    element_linear: Tensor | None
+    element_quadratic: Tensor | None
+
+    def but(self, **changes: Tensor) -> Body:
+        """Return the same body with some of its properties changed."""
+        return replace(self, **changes)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a hook may know of the moment: state and inputs, (..., size) in SI, NED and FRD.
+
+    Attributes:
+        time: s since the start of the run, (...).
+        position: NED, m, (..., 3).
+        rotation: body to NED, (..., 3, 3).
+        nu: velocity of the body origin over ground, (..., 6).
+        nu_r: velocity through the water, (..., 6); equal to `nu` inside `water`.
+        nu_c_dot: acceleration of the water in body axes, (..., 6); zero inside `water`.
+        command: what was commanded over this interval, (..., n).
+        fins: fin angles, rad, (..., m), or None.
+        voltage: V, (...), or None.
+        altitude: m, (...), or None.
+    """
+
+    time: Tensor
+    position: Tensor
+    rotation: Tensor
+    nu: Tensor
+    nu_r: Tensor
+    nu_c_dot: Tensor
+    command: Tensor
+    fins: Tensor | None = None
+    voltage: Tensor | None = None
+    altitude: Tensor | None = None
+
+
+@dataclass(frozen=True)
+class Sensed:
+    """What sensors report, (..., size): position NED m, quaternion, velocity, its derivative or None."""
+
+    position: Tensor
+    quaternion: Tensor
+    nu: Tensor
+    nu_dot: Tensor | None = None
+
+
+@dataclass(frozen=True)
+class Response:
+    """An actuator's answer to a constant demand over one step, N, (..., n) each.
+
+    Attributes:
+        end: thrust at the end of the step.
+        mean: its average over the step.
+        slope: rise over the step of the straight line with the same mean and first moment, so that an
+            integrator that sees only this line gets impulse and timing right, however short the lag.
+        start: thrust just after the step began.
+    """
+
+    end: Tensor
+    mean: Tensor
+    slope: Tensor
+    start: Tensor
+
+
+class Effect(nn.Module):
+    """A physical cause: an `nn.Module` whose parameters are physical, in SI units.
+
+    A member overrides the hooks that it touches and leaves the rest alone; a hook left alone costs
+    nothing. With every parameter at its null an effect must vanish exactly, so that "is it missing?"
+    is one question for all of them: how the residual changes with the parameters at the null.
+
+    Hooks, along the signal path:
+        `command`: the commands of a whole stretch, before the thruster curves (dead band, delay).
+        `respond`: dynamics between the demanded and the actual thrust (lag); at most one effect has it.
+        `thrust`: the thrust of each actuator (gain, voltage, loss by inflow).
+        `water`: velocity and acceleration of the water, NED.
+        `body`: mass, centres, inertia, added mass, buoyancy, damping coefficients.
+        `wrench`: any further force and moment on the body.
+        `sense`: what the sensors make of the state.
+    """
+
+    name: ClassVar[str]
+    cause: ClassVar[str]
+    symbol: ClassVar[str]
+    reference: ClassVar[str]
+    channels: ClassVar[tuple[str, ...]] = ()
+    excludes: ClassVar[tuple[str, ...]] = ()
+    time_varying: ClassVar[bool] = False
+
+    theta: nn.Parameter
+
+    def __init__(self, parameters: tuple[Parameter, ...], values: Mapping[str, float] | None = None) -> None:
+        """Keep the parameters' descriptions and start them at `values`, the rest at their nulls.
+
+        Raises:
+            ConfigError: a name is unknown, or a value is no number or out of bounds.
+        """
+        super().__init__()
+        self.parameters_of = parameters
+        self._index = {p.name: i for i, p in enumerate(parameters)}
+        start = [p.null for p in parameters]
+        for key, value in (values or {}).items():
+            if key not in self._index:
+                raise ConfigError(unknown_name(f"parameter of {self.name}", key, self._index))
+            start[self._index[key]] = self._checked(parameters[self._index[key]], value)
+        self.theta = nn.Parameter(torch.tensor(start, dtype=torch.float64))
+
+    def _checked(self, parameter: Parameter, value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise ConfigError(f"{self.name}.{parameter.name} must be a number, not {value!r}")
+        if not parameter.low <= value <= parameter.high:
+            raise ConfigError(
+                f"{self.name}.{parameter.name} = {value:g} {parameter.unit} is out of bounds: "
+                f"choose from {parameter.low:g} to {parameter.high:g}"
+            )
+        return float(value)
+
+    @classmethod
+    def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
+        """Return the parameters that the effect has on this vehicle, driven by "thrusters" or "wrench"."""
+        raise TypeError(f"{cls.__name__} does not describe its parameters")
+
+    @classmethod
+    def build(cls, vehicle: Any, actuation: str, values: Mapping[str, float] | None = None) -> Effect:
+        """Make the effect for a vehicle, at `values` and otherwise at the null."""
+        return cls(cls.describe(vehicle, actuation), values)
+
+    def value(self, name: str) -> Tensor:
+        """Return one parameter as a scalar tensor."""
+        return self.theta[self._index[name]]
+
+    def values(self) -> dict[str, float]:
+        """Return the parameters by name."""
+        return {p.name: float(v) for p, v in zip(self.parameters_of, self.theta.detach(), strict=True)}
+
+    @classmethod
+    def hooks(cls) -> tuple[str, ...]:
+        """Return the names of the hooks that the effect overrides."""
+        return tuple(h for h in HOOKS if getattr(cls, h) is not getattr(Effect, h))
+
+    def command(self, command: Tensor, times: Tensor) -> Tensor:
+        """Change the commands of a stretch: (..., T, n) held from `times` (..., T), to the same shape."""
+        return command
+
+    def respond(self, state: Tensor, demand: Tensor, step: Tensor) -> Response:
+        """Return how the thrust goes from `state` under a constant demand over `step` seconds, (..., n)."""
+        return Response(demand, demand, torch.zeros_like(demand), demand)
+
+    def thrust(self, thrust: Tensor, moment: Moment) -> Tensor:
+        """Change the actuators' thrust, N (or the wrench, where it is commanded), (..., n)."""
+        return thrust
+
+    def water(self, moment: Moment) -> tuple[Tensor, Tensor]:
+        """Return velocity m/s and acceleration m/s2 of the water, NED, (..., 3) each."""
+        zero = torch.zeros_like(moment.position)
+        return zero, zero
+
+    def body(self, body: Body, moment: Moment | None) -> Body:
+        """Change the body; `moment` is None unless the class is `time_varying`."""
+        return body
+
+    def wrench(self, moment: Moment, body: Body) -> Tensor:
+        """Return a further wrench on the body, N and N m, about the body origin, (..., 6)."""
+        return torch.zeros_like(moment.nu)
+
+    def sense(self, sensed: Sensed) -> Sensed:
+        """Turn what is into what the sensors report."""
+        return sensed
+
+
+HOOKS = ("command", "respond", "thrust", "water", "body", "wrench", "sense")
+
+
+def axis_scale(factors: Tensor) -> Tensor:
+    """Return the 6x6 pattern sqrt(f_i f_j): scales a diagonal by f and keeps a matrix positive definite.
+
+    Clipped at a tiny positive number so that the slope stays finite at the bound.
+    """
+    root = torch.sqrt(torch.clamp(factors, min=1e-12))
+    return root.unsqueeze(-1) * root.unsqueeze(-2)

@@ -1,0 +1,27 @@
+"""The errors that auvnn raises: each says what is wrong, where, and how to mend it, in one line."""
+
+from __future__ import annotations
+
+
+class AuvnnError(ValueError):
+    """Something in what the user gave cannot be used; the message is one line for a person."""
+
+
+class InputError(AuvnnError):
+    """A file or a table cannot be read or must not be trusted."""
+
+
+class ConfigError(AuvnnError):
+    """An option is unknown, of the wrong type, out of range, or contradicts another."""
+
+
+class ModelError(AuvnnError):
+    """A vehicle or a saved model is not physical, not complete, or not intact."""
+
+
+class MissingExtra(AuvnnError):
+    """An optional package is missing; the message names the command that installs it."""
+
+    def __init__(self, package: str, extra: str, purpose: str) -> None:
+        """Say which package is missing for what, and how to get it."""
+        super().__init__(f"{purpose} needs the package '{package}': pip install 'auvnn[{extra}]'")

@@ -1,0 +1,193 @@
+"""The log: one vehicle's runs, the one currency of everything that measures, fits or compares."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from auvnn.errors import ConfigError, InputError
+from auvnn.logs.repair import Repair
+from auvnn.logs.run import MIN_SAMPLES, Run
+
+if TYPE_CHECKING:
+    from auvnn.logs.quality import Quality
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """Runs of one vehicle, and what was done to them on reading.
+
+    Args:
+        runs: the runs, with the same columns and different numbers.
+        name: what to call the log in words and file names.
+        paths: the files it was read from; empty for a log made in memory.
+        repairs: what was mended or noted while reading.
+        sha256: of the files' bytes where it was read, of the samples where it was made in memory.
+
+    Raises:
+        InputError: there is no run, a number occurs twice, or the runs' columns differ.
+    """
+
+    runs: tuple[Run, ...]
+    name: str = "log"
+    paths: tuple[Path, ...] = ()
+    repairs: tuple[Repair, ...] = ()
+    sha256: str = ""
+    unknown: tuple[str, ...] = field(default=(), kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Check that the runs belong together."""
+        object.__setattr__(self, "runs", tuple(self.runs))
+        object.__setattr__(self, "repairs", tuple(self.repairs))
+        if not self.runs:
+            raise InputError(f"log '{self.name}' has no run")
+        numbers = [run.number for run in self.runs]
+        if len(set(numbers)) != len(numbers):
+            twice = sorted({n for n in numbers if numbers.count(n) > 1})
+            raise InputError(f"log '{self.name}': run numbers {twice} occur twice; number the runs apart")
+        first = _signature(self.runs[0])
+        for run in self.runs[1:]:
+            differ = sorted(first ^ _signature(run))
+            if differ:
+                raise InputError(
+                    f"log '{self.name}': runs {self.runs[0].number} and {run.number} differ in "
+                    f"{', '.join(differ)}: one log holds one vehicle; read them as separate logs"
+                )
+        if not self.sha256:
+            object.__setattr__(self, "sha256", self._content_hash())
+
+    @classmethod
+    def read(cls, path: str | Path | Sequence[str | Path], mapping: Any = None) -> Log:
+        """Read a log from one file or several.
+
+        Args:
+            path: a CSV or Parquet file, or a list of files; rows of different files are never joined.
+            mapping: a mapping file's path, its content as a dict, or None for canonical columns.
+
+        Raises:
+            InputError: a file cannot be read or its content must not be trusted.
+            ConfigError: the mapping is wrong.
+        """
+        from auvnn.logs.reading import read
+
+        return cls(**vars(read(path, mapping)))
+
+    @classmethod
+    def from_runs(cls, runs: Iterable[Run], name: str = "log", repairs: Iterable[Repair] = ()) -> Log:
+        """Make a log of runs in memory."""
+        return cls(tuple(runs), name=name, repairs=tuple(repairs))
+
+    @property
+    def path(self) -> Path | None:
+        """The file the log was read from, the first of several, None for a log made in memory."""
+        return self.paths[0] if self.paths else None
+
+    @property
+    def samples(self) -> int:
+        """Number of samples of all runs."""
+        return sum(run.samples for run in self.runs)
+
+    @property
+    def duration(self) -> float:
+        """Sum of the runs' durations, s."""
+        return sum(run.duration for run in self.runs)
+
+    @property
+    def kind(self) -> str:
+        """What actuates the vehicle: "thrusters" where there are thruster commands, else "wrench"."""
+        return self.runs[0].kind
+
+    @property
+    def n_thrusters(self) -> int:
+        """Number of thruster commands, 0 for a log with a wrench alone."""
+        thrusters = self.runs[0].thrusters
+        return 0 if thrusters is None else thrusters.shape[1]
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of the columns with samples, in the order in which they are written, `run` first."""
+        names = [name for name, _ in self.runs[0].columns()]
+        return ["run", *(n for n in names if any(n in run.channels for run in self.runs))]
+
+    @cached_property
+    def _quality(self) -> Quality:
+        from auvnn.logs.quality import assess
+
+        return assess(self)
+
+    def quality(self) -> Quality:
+        """Return what was read, repaired, implausible and excited; computed once."""
+        return self._quality
+
+    def select(self, numbers: int | Iterable[int]) -> Log:
+        """Return a log of the runs with these numbers, in this order."""
+        wanted = [numbers] if isinstance(numbers, int) else list(numbers)
+        by_number = {run.number: run for run in self.runs}
+        for number in wanted:
+            if number not in by_number:
+                raise ConfigError(f"log '{self.name}' has no run {number}; there are: {sorted(by_number)}")
+        return self._part([by_number[n] for n in wanted])
+
+    def split(self, test_fraction: float = 0.3) -> tuple[Log, Log, str]:
+        """Return what to fit on, what to hold out, and a sentence that says which is which.
+
+        The last run is held out; of a single run the last `test_fraction` of its time.
+        """
+        run, *others = self.runs
+        if others:
+            held = others[-1]
+            words = f"run {held.number}, the last of '{self.name}', is held out ({held.samples} samples)"
+            return self._part(self.runs[:-1]), self._part([held]), words
+        if not 0.0 < test_fraction < 1.0:
+            raise ConfigError(f"test_fraction must lie between 0 and 1, not {test_fraction}")
+        at = int(np.searchsorted(run.t, run.t[0] + (1.0 - test_fraction) * run.duration))
+        if min(at, run.samples - at) < MIN_SAMPLES:
+            raise InputError(
+                f"log '{self.name}': {run.samples} samples cannot be split into two parts of at least "
+                f"{MIN_SAMPLES}; name a test log with test="
+            )
+        words = (
+            f"the last {100 * test_fraction:.0f} % of the single run of '{self.name}', "
+            f"from t = {run.t[at]:.6g} s, are held out ({run.samples - at} samples)"
+        )
+        return self._part([run.cut(slice(0, at))]), self._part([run.cut(slice(at, None))]), words
+
+    def write(self, path: str | Path, overwrite: bool = False) -> Path:
+        """Write the log with canonical columns as `.parquet` or `.csv`; reading it back gives the same log.
+
+        Raises:
+            InputError: the file is there already and `overwrite` is false.
+            ConfigError: the name ends in neither `.parquet` nor `.csv`.
+        """
+        from auvnn.logs.writing import write
+
+        return write(self, Path(path), overwrite)
+
+    def _part(self, runs: Iterable[Run]) -> Log:
+        return replace(self, runs=tuple(runs))
+
+    def _content_hash(self) -> str:
+        digest = hashlib.sha256()
+        for run in self.runs:
+            for name, column in run.columns():
+                digest.update(name.encode())
+                digest.update(np.ascontiguousarray(column).tobytes())
+        return digest.hexdigest()
+
+
+def _signature(run: Run) -> set[str]:
+    """Return the names of the blocks a run has, thrusters and fins with their number."""
+    names = {
+        b for b in ("nu_dot", "position", "wrench", "altitude", "voltage") if getattr(run, b) is not None
+    }
+    for block in ("thrusters", "fins"):
+        value = getattr(run, block)
+        if value is not None:
+            names.add(f"{block} ({value.shape[1]})")
+    return names

@@ -1,0 +1,262 @@
+"""The mapping file: a user's own columns turned into the canonical ones, by data alone.
+
+A value passes through these steps, in this order: the curve `(value - neutral) / span` cut to [-1, 1],
+`value * scale + offset`, the unit (`angles`, `rates`, `time`), and last the frame (`FLU` to `FRD`, `ENU`
+to `NED`). A `scale: -1` therefore turns a sign in the frame in which the file was recorded.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping as MappingType
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.catalogue import unknown_name
+from auvnn.config import read_yaml
+from auvnn.errors import ConfigError, InputError
+from auvnn.logs.channels import EULER, FIXED, QUATERNION, is_canonical
+from auvnn.logs.readers.base import Table
+from auvnn.logs.repair import Repair
+
+_KEYS = ("columns", "frame", "angles", "rates", "quaternion", "time", "run")
+_COLUMN_KEYS = ("from", "scale", "offset", "curve", "value")
+_TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_RATES = ("p", "q", "r", "dp", "dq", "dr")
+_NO_SIGNAL = 65535.0
+
+
+@dataclass(frozen=True)
+class Column:
+    """How one canonical column is made: from a column of the file, or a constant."""
+
+    source: str | None
+    scale: float = 1.0
+    offset: float = 0.0
+    neutral: float | None = None
+    span: float = 1.0
+    value: float = 0.0
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """A mapping file's content, checked.
+
+    Args:
+        columns: canonical name to how it is made; names not listed are taken from the file as they are.
+        body: frame in which velocities, accelerations and the wrench are given, "FRD" or "FLU".
+        world: frame in which attitude and position are given, "NED" or "ENU".
+        angles: "rad" or "deg", of phi, theta, psi and the fins.
+        rates: "rad" or "deg", of p, q, r and their derivatives.
+        quaternion: "wxyz", or "xyzw" where the columns qw qx qy qz, in this order, hold x, y, z, w.
+        time_unit: unit of `t`: "s", "ms", "us" or "ns".
+        run: column that numbers or names the runs, None for `run`, "file" for one run per file.
+        where: the mapping's file, for messages.
+    """
+
+    columns: dict[str, Column] = field(default_factory=dict)
+    body: str = "FRD"
+    world: str = "NED"
+    angles: str = "rad"
+    rates: str = "rad"
+    quaternion: str = "wxyz"
+    time_unit: str = "s"
+    run: str | None = None
+    where: str = "mapping"
+
+    @classmethod
+    def read(cls, source: str | Path | MappingType[str, Any] | Mapping | None) -> Mapping:
+        """Read a mapping from a YAML file or a dict; None gives the mapping that changes nothing.
+
+        Raises:
+            ConfigError: a key or a value is unknown.
+            InputError: the file cannot be read.
+        """
+        if source is None:
+            return cls()
+        if isinstance(source, Mapping):
+            return source
+        if isinstance(source, MappingType):
+            return _build(dict(source), "mapping")
+        return _build(read_yaml(Path(source)), str(source))
+
+    def apply(self, table: Table, where: str) -> Table:
+        """Return the table under canonical names; columns that were not asked for keep theirs.
+
+        Raises:
+            InputError: a column named in the mapping is not in the file, or is text.
+        """
+        result = Table({}, table.rows, {}, set(), list(table.repairs))
+        used: set[str] = set()
+        for name, column in self.columns.items():
+            if column.source is None:
+                result.columns[name] = np.full(table.rows, column.value)
+                continue
+            values = self._source(table, name, column.source, where)
+            used.add(column.source)
+            if column.source in table.seconds:
+                result.seconds.add(name)
+            result.columns[name] = self._convert(values, column, name, where, result)
+        if self.run not in (None, "file"):
+            self._source(table, "run", str(self.run), where, numbers=False)
+        for name in table.names:
+            if name in self.columns and name not in used:
+                words = f"column '{name}' of the file replaced by the mapping's"
+                result.repairs.append(Repair(words, where, 1, "info"))
+            elif name not in used:
+                kind = "columns" if name in table.columns else "text"
+                getattr(result, kind)[name] = getattr(table, kind)[name]
+                if name in table.seconds:
+                    result.seconds.add(name)
+        self._units(result)
+        return result
+
+    def _source(self, table: Table, name: str, source: str, where: str, numbers: bool = True) -> NDArray[Any]:
+        if source in table.columns:
+            return table.columns[source]
+        if source in table.text:
+            if not numbers:
+                return np.empty(0)
+            bad = table.text[source].bad
+            raise InputError(f"{where}: column '{source}' for '{name}' is no column of numbers: {bad}")
+        raise InputError(f"{where}: {self.where} takes '{name}' from a column that is not there: "
+                         f"{unknown_name('column', source, table.names)}")  # fmt: skip
+
+    def _convert(
+        self, raw: NDArray[Any], column: Column, name: str, where: str, result: Table
+    ) -> NDArray[Any]:
+        if column.neutral is None and column.scale == 1.0 and column.offset == 0.0:
+            return raw
+        values = raw.astype(np.float64)
+        if column.neutral is not None:
+            silent = (values <= 0.0) | (values == _NO_SIGNAL)
+            if silent.any() and column.neutral > 0.0:
+                values[silent] = np.nan
+                words = f"values of '{column.source}' that mean no signal (0, 65535) read as missing"
+                result.repairs.append(Repair(words, where, int(silent.sum())))
+            values = (values - column.neutral) / column.span
+            beyond = int((np.abs(values) > 1.0).sum())
+            if beyond:
+                words = f"commands of '{name}' beyond neutral plus or minus span cut to [-1, 1]"
+                result.repairs.append(Repair(words, where, beyond, "warning", "give the curve its true span"))
+                values = np.clip(values, -1.0, 1.0)
+        return values * column.scale + column.offset
+
+    def _units(self, table: Table) -> None:
+        degree = math.pi / 180.0
+        fins = tuple(n for n in table.columns if n.startswith("fin_") and is_canonical(n))
+        for unit, names in ((self.angles, EULER + fins), (self.rates, _RATES)):
+            for name in names if unit == "deg" else ():
+                if name in table.columns:
+                    table.columns[name] = table.columns[name] * degree
+        if self.quaternion == "xyzw" and all(n in table.columns for n in QUATERNION):
+            x, y, z, w = (table.columns[n] for n in QUATERNION)
+            table.columns.update(zip(QUATERNION, (w, x, y, z), strict=True))
+
+    def seconds(self, values: NDArray[Any], already: bool) -> NDArray[np.float64]:
+        """Return the column `t` in seconds; integers in a finer unit are counted from their first value."""
+        factor = 1.0 if already else _TIME_UNITS[self.time_unit]
+        if values.dtype != np.float64:
+            # Subtracting first keeps the digits that a float64 of the date would lose.
+            values = (values - values[0]).astype(np.float64)
+        return values * factor
+
+
+def _build(data: dict[str, Any], where: str) -> Mapping:
+    _known(data, _KEYS, where)
+    frame = _section(data, "frame", where)
+    _known(frame, ("body", "world"), f"{where}: frame")
+    time = data.get("time", {})
+    time = {"unit": time} if isinstance(time, str) else _section(data, "time", where)
+    _known(time, ("unit",), f"{where}: time")
+    columns = {name: _column(name, value, where) for name, value in _section(data, "columns", where).items()}
+    return Mapping(
+        columns=columns,
+        body=_one_of(frame.get("body", "FRD"), ("FRD", "FLU"), f"{where}: frame: body"),
+        world=_one_of(frame.get("world", "NED"), ("NED", "ENU"), f"{where}: frame: world"),
+        angles=_one_of(data.get("angles", "rad"), ("rad", "deg"), f"{where}: angles"),
+        rates=_one_of(data.get("rates", "rad"), ("rad", "deg"), f"{where}: rates"),
+        quaternion=_one_of(data.get("quaternion", "wxyz"), ("wxyz", "xyzw"), f"{where}: quaternion"),
+        time_unit=_one_of(time.get("unit", "s"), tuple(_TIME_UNITS), f"{where}: time: unit"),
+        run=_run(data.get("run"), where),
+        where=where,
+    )
+
+
+def _run(value: Any, where: str) -> str | None:
+    if isinstance(value, MappingType):
+        _known(value, ("from",), f"{where}: run")
+        value = value.get("from")
+        if not isinstance(value, str):
+            raise ConfigError(f"{where}: run: 'from' must name a column, not {value!r}")
+        return value
+    if value is None or value == "file":
+        return value
+    raise ConfigError(f"{where}: run: {value!r} is neither {{from: column}} nor 'file' (one run per file)")
+
+
+def _column(name: str, value: Any, where: str) -> Column:
+    here = f"{where}: columns: {name}"
+    if not is_canonical(name):
+        numbered = ("thruster_1", "fin_1")
+        raise ConfigError(f"{where}: columns: {unknown_name('canonical column', name, (*FIXED, *numbered))}")
+    if isinstance(value, str):
+        return Column(value)
+    if not isinstance(value, MappingType):
+        raise ConfigError(f"{here}: must name a column or say {{from: column, ...}}, not {value!r}")
+    _known(value, _COLUMN_KEYS, here)
+    if "value" in value:
+        if len(value) > 1:
+            raise ConfigError(f"{here}: 'value' is a constant and stands alone")
+        return Column(None, value=_number(value["value"], f"{here}: value"))
+    source = value.get("from", name)
+    if not isinstance(source, str):
+        raise ConfigError(f"{here}: 'from' must be a column's name, not {source!r}")
+    numbers: dict[str, float] = {
+        k: _number(value[k], f"{here}: {k}") for k in ("scale", "offset") if k in value
+    }
+    if numbers.get("scale") == 0.0:
+        raise ConfigError(f"{here}: scale: 0 would wipe the column out; use 'value: 0' for a constant")
+    if "curve" in value:
+        curve = value["curve"]
+        if not isinstance(curve, MappingType):
+            raise ConfigError(f"{here}: curve must be {{neutral: ..., span: ...}}, not {curve!r}")
+        _known(curve, ("neutral", "span"), f"{here}: curve")
+        for key in ("neutral", "span"):
+            if key not in curve:
+                raise ConfigError(f"{here}: curve needs '{key}'")
+            numbers[key] = _number(curve[key], f"{here}: curve: {key}")
+        if numbers["span"] == 0.0:
+            raise ConfigError(f"{here}: curve: span must not be 0")
+    return Column(source, **numbers)
+
+
+def _section(data: dict[str, Any], key: str, where: str) -> dict[str, Any]:
+    value = data.get(key)
+    if value is None:
+        return {}
+    if not isinstance(value, MappingType):
+        raise ConfigError(f"{where}: '{key}' must hold `name: value` lines, not {value!r}")
+    return dict(value)
+
+
+def _known(data: MappingType[str, Any], keys: tuple[str, ...], where: str) -> None:
+    for key in data:
+        if key not in keys:
+            raise ConfigError(f"{where}: {unknown_name('key', str(key), keys)}")
+
+
+def _one_of(value: Any, choices: tuple[str, ...], where: str) -> str:
+    if value not in choices:
+        raise ConfigError(f"{where}: {unknown_name('choice', str(value), choices)}")
+    return str(value)
+
+
+def _number(value: Any, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ConfigError(f"{where}: {value!r} is not a finite number")
+    return float(value)

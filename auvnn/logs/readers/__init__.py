@@ -1,0 +1,75 @@
+"""The catalogue of log formats: a new format is one file and one line here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from auvnn.catalogue import Catalogue
+from auvnn.errors import InputError
+from auvnn.logs.readers.base import Reader, Table, Text
+from auvnn.logs.repair import Repair
+
+__all__ = ["READERS", "Reader", "Table", "Text", "choose"]
+
+# Formats that are certain by their first bytes come before the one that is any text.
+READERS = Catalogue(
+    "log format",
+    {
+        "parquet": "auvnn.logs.readers.parquet:ParquetReader",
+        "csv": "auvnn.logs.readers.csv:CsvReader",
+    },
+    "auvnn.readers",
+)
+
+_FOREIGN = {
+    b"\x1f\x8b": "a gzip archive: unpack it first",
+    b"\x28\xb5\x2f\xfd": "a zstd archive: unpack it first",
+    b"PK\x03\x04": "a zip archive or a spreadsheet: unpack it, or export the sheet as CSV",
+    b"\x89MCAP": "an MCAP recording: export its topics as CSV or Parquet",
+    b"\x89HDF": "HDF5 (or MATLAB v7.3): export the arrays as CSV or Parquet",
+    b"MATLAB": "a MATLAB file: export the arrays as CSV or Parquet",
+    b"#ROSBAG": "a ROS 1 bag: export its topics as CSV or Parquet",
+    b"SQLite format 3": "a SQLite file (a ROS 2 bag?): export its topics as CSV or Parquet",
+    b"\xa3\x95": "an ArduPilot DataFlash log: export its messages as CSV or Parquet",
+    b"ULog": "a PX4 ULog: export its topics as CSV or Parquet",
+    b"ARROW1": "a Feather file: save it as Parquet",
+}
+
+
+def choose(path: Path) -> tuple[Reader, list[Repair]]:
+    """Return the reader for a file, by content first and by name second.
+
+    Raises:
+        InputError: the file cannot be opened, is empty, or has no known format.
+    """
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(4096)
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file; check the path") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder; name the log file in it, or a list of files") from None
+    except (OSError, ValueError) as problem:
+        raise InputError(f"{path}: cannot be read: {problem}") from None
+    if not head:
+        raise InputError(f"{path}: is empty (0 bytes); the recording or the copy failed")
+    suffix = path.suffix.lower()
+    readers: list[Reader] = [READERS.get(name)() for name in READERS.names()]
+    fitting = [reader for reader in readers if reader.recognises(head)]
+    for reader in fitting:
+        if suffix in reader.suffixes:
+            return reader, []
+    for magic, what in _FOREIGN.items():
+        if head.startswith(magic):
+            raise InputError(f"{path}: is {what}")
+    if not fitting:
+        what = "zeros only" if not head.strip(b"\0") else "neither text nor a known format"
+        known = ", ".join(reader.name for reader in readers)
+        raise InputError(f"{path}: holds {what}; a log is one of: {known}")
+    reader = fitting[0]
+    # Any name may hold text; only a name that promises another format is worth a word.
+    promised = [other.name for other in readers if suffix in other.suffixes]
+    if not promised:
+        return reader, []
+    what = f"the name says {promised[0]}, the content is {reader.name} and was read as such"
+    return reader, [Repair(what, str(path), 1, "warning", "give the file its right name")]

@@ -1,0 +1,72 @@
+"""What every log format hands over: a table of named numbers, and what was noted while reading it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.logs.repair import Repair
+
+
+@dataclass
+class Text:
+    """A column that is not numbers.
+
+    Args:
+        bad: where the first cell that is no number stands, and what it says.
+        codes: number of the label in each row, (N,), -1 for an empty cell; None where labels abound.
+        labels: the labels in the order of their first appearance.
+    """
+
+    bad: str
+    codes: NDArray[np.intp] | None = None
+    labels: Sequence[str] = ()
+
+
+@dataclass
+class Table:
+    """Columns under the names they have in the file.
+
+    Args:
+        columns: name to float64 (N,), NaN for a missing cell; int64 where a float would lose digits.
+        rows: N.
+        text: columns that are not numbers.
+        seconds: names of columns that already hold seconds, because the file stored dates or durations.
+        repairs: what the reader mended or noted.
+    """
+
+    columns: dict[str, NDArray[Any]]
+    rows: int
+    text: dict[str, Text] = field(default_factory=dict)
+    seconds: set[str] = field(default_factory=set)
+    repairs: list[Repair] = field(default_factory=list)
+
+    @property
+    def names(self) -> list[str]:
+        """All names, of numbers and of text."""
+        return [*self.columns, *self.text]
+
+
+class Reader(ABC):
+    """One file format; add one by putting a class like this into the catalogue of readers."""
+
+    name: ClassVar[str]
+    suffixes: ClassVar[tuple[str, ...]]
+
+    @abstractmethod
+    def recognises(self, head: bytes) -> bool:
+        """Say from the first bytes of a file (at most 4096) whether it has this format."""
+
+    @abstractmethod
+    def read(self, path: Path) -> Table:
+        """Read the whole file.
+
+        Raises:
+            InputError: it is damaged or holds no table; no other error may leave a reader.
+        """

@@ -1,0 +1,78 @@
+"""Write a log with canonical columns; what is written reads back as it was."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from auvnn.errors import ConfigError, InputError
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from auvnn.logs.log import Log
+
+HASH_KEY = "auvnn.sha256"
+
+
+def frame_hash(frame: pl.DataFrame) -> str:
+    """Return the SHA-256 of a table of numbers: column names and the bytes of their float64 values."""
+    digest = hashlib.sha256()
+    for series in frame:
+        digest.update(series.name.encode())
+        digest.update(np.ascontiguousarray(series.to_numpy(), dtype=np.float64).tobytes())
+    return digest.hexdigest()
+
+
+def to_frame(log: Log) -> pl.DataFrame:
+    """Return the log as one table, `run` first, then the canonical columns, then the others."""
+    import polars as pl
+
+    names: dict[str, None] = {}
+    for run in log.runs:
+        names.update(dict.fromkeys(name for name, _ in run.columns()))
+    data = {"run": np.repeat([r.number for r in log.runs], [r.samples for r in log.runs])}
+    per_run = [dict(run.columns()) for run in log.runs]
+    for name in names:
+        parts = [c.get(name, np.full(r.samples, np.nan)) for c, r in zip(per_run, log.runs, strict=True)]
+        data[name] = np.concatenate(parts)
+    return pl.DataFrame(data)
+
+
+def write(log: Log, path: Path, overwrite: bool) -> Path:
+    """Write the log to `path`, whole or not at all.
+
+    Raises:
+        InputError: the file is there already and `overwrite` is false, or it cannot be written.
+        ConfigError: the name ends in neither `.parquet` nor `.csv`.
+    """
+    if path.suffix.lower() not in (".parquet", ".csv"):
+        raise ConfigError(f"a log is written as .parquet or .csv, not as '{path.name}'")
+    if path.exists() and not overwrite:
+        raise InputError(f"{path} is there already; choose another name or overwrite it explicitly")
+    frame = to_frame(log)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        os.close(handle)
+    except OSError as problem:
+        raise InputError(f"{path} cannot be written: {problem.strerror}") from problem
+    try:
+        if path.suffix.lower() == ".csv":
+            # Empty cells, not the word NaN: spreadsheets read them as missing too.
+            frame.fill_nan(None).write_csv(temporary)
+        else:
+            # Parquet's own checksums are optional and rarely checked; this one is checked on reading.
+            frame.write_parquet(temporary, metadata={HASH_KEY: frame_hash(frame)})
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except OSError as problem:
+        raise InputError(f"{path} cannot be written: {problem.strerror}") from problem
+    finally:
+        Path(temporary).unlink(missing_ok=True)
+    return path

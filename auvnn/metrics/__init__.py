@@ -1,0 +1,1 @@
+"""Score models against logs: windows, one-step residuals, free-running errors."""

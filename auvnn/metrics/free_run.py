@@ -1,0 +1,43 @@
+"""Run windows free from their initial states, and move those states by small amounts."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from auvnn.effects import Sensed
+from auvnn.metrics.windows import Windows
+from auvnn.models import GreyBox
+from auvnn.models.rollout import rollout
+from auvnn.physics.attitude import quat_multiply, rotvec_to_quat
+
+MAX_STEP = 0.05
+
+
+def predict(model: GreyBox, windows: Windows, initial: Tensor) -> tuple[Tensor, Tensor]:
+    """Run every window free from its initial state.
+
+    Args:
+        model: the model.
+        windows: B windows of L samples.
+        initial: (B, 13): position, quaternion, velocity.
+
+    Returns:
+        eta (B, L, 7) and nu (B, L, 6), of the vehicle itself and not of what sensors report.
+    """
+    run = rollout(model, initial[:, :7], initial[:, 7:], windows.inputs, windows.times, max_step=MAX_STEP,
+                  warmup=windows.warmup, check=False)
+    return run.eta, run.nu
+
+
+def initial_states(model: GreyBox, windows: Windows) -> Tensor:
+    """Return the states (B, 13) that the first measurements stand for."""
+    first = model.unsense(Sensed(windows.eta[:, 0, :3], windows.eta[:, 0, 3:], windows.nu[:, 0]))
+    return torch.cat([first.position, first.quaternion, first.nu], dim=-1).detach()
+
+
+def moved(initial: Tensor, change: Tensor) -> Tensor:
+    """Return the states (B, 13) after small changes (B, 12) of position, attitude and velocity."""
+    quaternion = quat_multiply(initial[:, 3:7], rotvec_to_quat(change[:, 3:6]))
+    quaternion = quaternion / torch.linalg.norm(quaternion, dim=-1, keepdim=True)
+    return torch.cat([initial[:, :3] + change[:, :3], quaternion, initial[:, 7:] + change[:, 6:]], dim=-1)

@@ -1,0 +1,122 @@
+"""Free-running error by horizon: windows restarted from measured states, persistence beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from auvnn.effects import Sensed
+from auvnn.errors import InputError
+from auvnn.logs import Log
+from auvnn.logs.noise import noise_std
+from auvnn.metrics.windows import VELOCITY, Windows, cut_windows
+from auvnn.models import GreyBox
+from auvnn.models.rollout import LIMIT
+from auvnn.metrics.free_run import initial_states, predict
+
+Array = NDArray[np.float64]
+HORIZONS = ("0.5", "1", "2", "5", "10", "full")
+NAMES = ("u", "v", "w", "p", "q", "r")
+CUT, EXCITED = 10.0, 3.0
+WARMUP = 3.0
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What errors are measured by: standard deviation of each velocity, and which count as excited."""
+
+    std: Array
+    excited: NDArray[np.bool_]
+
+
+def scale_of(log: Log) -> Scale:
+    """Return each velocity's standard deviation over a log, and whether it is over three times its noise."""
+    nu = np.concatenate([run.nu for run in log.runs])
+    noise = np.nanmean([np.asarray(noise_std(run.t, run.nu)) for run in log.runs], axis=0)
+    std = np.nanstd(nu, axis=0)
+    return Scale(std, (std > EXCITED * np.nan_to_num(noise)) & (std > 1e-9))
+
+
+@dataclass(frozen=True)
+class Rolled:
+    """Free runs of one horizon.
+
+    Attributes:
+        windows: what was run.
+        predicted: (B, L, 6) velocities as the sensors would report them.
+        squared: (B, 6) sum of squared errors over all samples but the first, cut where a window diverged.
+        held: (B, 6) the same for holding the initial velocity.
+        count: (B, 6) samples.
+        diverged: (B,) whether the window left what is physical.
+    """
+
+    windows: Windows
+    predicted: Array
+    squared: Array
+    held: Array
+    count: Array
+    diverged: NDArray[np.bool_]
+
+    def nrmse(self, scale: Scale, chosen: NDArray[np.bool_] | slice = slice(None), held: bool = False) -> Array:
+        """Return each velocity's error over its standard deviation, (6,); NaN where it is not excited."""
+        squared = (self.held if held else self.squared)[chosen].sum(0)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            value = np.sqrt(squared / self.count[chosen].sum(0)) / scale.std
+        return np.where(scale.excited, value, np.nan)
+
+    def total(self, scale: Scale, chosen: NDArray[np.bool_] | slice = slice(None), held: bool = False) -> float:
+        """Return the mean error of the excited velocities."""
+        value = self.nrmse(scale, chosen, held)
+        return float(np.nanmean(value)) if np.isfinite(value).any() else float("nan")
+
+
+def roll(model: GreyBox, log: Log, horizon: str, scale: Scale) -> Rolled | None:
+    """Run a model free over the windows of one horizon; None where no stretch is long enough.
+
+    Windows start every half horizon, from measured states. Outliers of single samples do not count.
+    """
+    length = np.inf if horizon == "full" else float(horizon)
+    try:
+        windows = cut_windows(log, length, None if np.isinf(length) else 0.5 * length, warmup=WARMUP,
+                              kind=model.actuation)
+    except InputError:
+        return None
+    with torch.no_grad():
+        eta, nu = predict(model, windows, initial_states(model, windows))
+        seen = model.sense(Sensed(eta[..., :3], eta[..., 3:], nu)).nu.numpy()
+    measured, mask = windows.nu.numpy(), windows.mask[..., VELOCITY].numpy().copy()
+    mask[:, 0] = 0.0
+    sound = (np.isfinite(seen) & (np.abs(seen) < LIMIT)).all(axis=-1)
+    gone = np.maximum.accumulate(~sound, axis=1)
+    diverged = gone.any(axis=1)
+    error = np.where(gone[..., None], CUT * scale.std, measured - seen)
+    error[diverged] = np.clip(error[diverged], -CUT * scale.std, CUT * scale.std)
+    stay = measured - measured[:, :1]
+    return Rolled(windows, np.where(gone[..., None], np.nan, seen), (error**2 * mask).sum(1),
+                  (stay**2 * mask).sum(1), mask.sum(1), diverged)
+
+
+def table(model: GreyBox, log: Log, scale: Scale, horizons: tuple[str, ...] = HORIZONS
+          ) -> tuple[dict[str, dict], dict[str, Rolled]]:
+    """Return `rollout` of the comparison, and the runs behind it."""
+    out: dict[str, dict] = {}
+    kept: dict[str, Rolled] = {}
+    for horizon in horizons:
+        rolled = roll(model, log, horizon, scale)
+        if rolled is None:
+            out[horizon] = {**{n: {"rmse": None, "nrmse": None} for n in NAMES}, "total": None,
+                            "persistence": None, "diverged": 0, "windows": 0}
+            continue
+        with np.errstate(invalid="ignore", divide="ignore"):
+            rmse = np.sqrt(rolled.squared.sum(0) / rolled.count.sum(0))
+        nrmse = rolled.nrmse(scale)
+        out[horizon] = {
+            **{n: {"rmse": float(rmse[k]), "nrmse": float(nrmse[k])} for k, n in enumerate(NAMES)},
+            "total": rolled.total(scale), "persistence": rolled.total(scale, held=True),
+            "diverged": int(rolled.diverged.sum()), "windows": len(rolled.windows),
+        }
+        kept[horizon] = rolled
+    return out, kept

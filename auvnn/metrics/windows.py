@@ -1,0 +1,183 @@
+"""Cut a log into windows: stretches over which a model runs free from a measured state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from auvnn.errors import InputError
+from auvnn.logs import Log, Run
+from auvnn.logs.segments import stretches
+from auvnn.models.inputs import Inputs
+
+CHANNELS = ("x", "y", "z", "phi", "theta", "psi", "u", "v", "w", "p", "q", "r",
+            "du", "dv", "dw", "dp", "dq", "dr")
+POSITION, ATTITUDE, VELOCITY, ACCELERATION = slice(0, 3), slice(3, 6), slice(6, 12), slice(12, 18)
+
+
+@dataclass(frozen=True)
+class Windows:
+    """B windows of at most L samples, each with `warmup` rows of history for the actuators.
+
+    Windows shorter than L are padded with their last row at an unchanged time and an empty mask.
+
+    Attributes:
+        run: (B,) run numbers.
+        first: (B,) index of the first sample in its run.
+        times: (B, warmup + L), s.
+        eta: (B, L, 7); zeros where there is no position.
+        nu: (B, L, 6), m/s and rad/s.
+        nu_dot: (B, L, 6), or None where accelerations were not measured.
+        inputs: commands and the like, (B, warmup + L, ...).
+        mask: (B, L, 18), 1 where a channel of `CHANNELS` was measured, else 0.
+        length: (B,) samples before the padding.
+        warmup: rows of history.
+    """
+
+    run: np.ndarray
+    first: np.ndarray
+    times: Tensor
+    eta: Tensor
+    nu: Tensor
+    nu_dot: Tensor | None
+    inputs: Inputs
+    mask: Tensor
+    length: np.ndarray
+    warmup: int
+
+    def __len__(self) -> int:
+        """Return the number of windows."""
+        return len(self.run)
+
+    @property
+    def has_position(self) -> bool:
+        """Whether any position was measured."""
+        return bool(self.mask[..., POSITION].any())
+
+    def pick(self, chosen: slice | np.ndarray) -> Windows:
+        """Return some of the windows."""
+        index = chosen if isinstance(chosen, slice) else torch.as_tensor(chosen)
+        i = self.inputs
+        inputs = Inputs(i.command[index], *(None if x is None else x[index] for x in (i.fins, i.voltage, i.altitude)))
+        return replace(
+            self, run=self.run[chosen], first=self.first[chosen], times=self.times[index], eta=self.eta[index],
+            nu=self.nu[index], nu_dot=None if self.nu_dot is None else self.nu_dot[index], inputs=inputs,
+            mask=self.mask[index], length=self.length[chosen],
+        )
+
+
+def _starts(run: Run, part: slice, horizon: float, stride: float, partial: bool) -> list[tuple[int, int]]:
+    """Return first and last sample (included) of the windows of one stretch."""
+    t = run.t[part]
+    usable = run.valid[part]
+    found, begin = [], t[0]
+    tolerance = 1e-6 * run.dt + 1e-3 * run.dt
+    while begin <= t[-1] - run.dt:
+        at = int(np.searchsorted(t, begin - tolerance))
+        while at < len(t) and not usable[at]:
+            at += 1
+        if at >= len(t) - 1:
+            break
+        end = int(np.searchsorted(t, t[at] + horizon + tolerance)) - 1
+        complete = t[-1] >= t[at] + horizon - tolerance
+        if end > at and (complete or (partial and t[end] - t[at] >= 0.5 * horizon)):
+            found.append((part.start + at, part.start + end))
+        if not complete:
+            break
+        begin = max(begin + stride, t[at] + run.dt)
+    return found
+
+
+def cut_windows(
+    log: Log,
+    horizon: float,
+    stride: float | None = None,
+    *,
+    warmup: float = 0.0,
+    kind: str | None = None,
+    partial: bool = False,
+) -> Windows:
+    """Cut a log into windows.
+
+    Windows never cross a gap or a row without commands; they start at samples whose state was measured.
+
+    Args:
+        log: the log.
+        horizon: length, s; infinity for whole stretches.
+        stride: from start to start, s; the horizon by default.
+        warmup: history for the actuators, s; rows before the run repeat its first one.
+        kind: "thrusters" or "wrench": which commands to take; by default what the log has.
+        partial: also keep a last window of at least half the length.
+
+    Raises:
+        InputError: the log has no such commands, or no stretch is long enough.
+    """
+    kind = kind or log.kind
+    pieces = []
+    for run in log.runs:
+        command = run.thrusters if kind == "thrusters" else run.wrench
+        if command is None:
+            wanted = "thruster_1 ..." if kind == "thrusters" else "tau_X ... tau_N"
+            raise InputError(f"run {run.number} has no {wanted}: the model is driven by {kind}")
+        for part in stretches(run.t, np.isfinite(command).all(axis=1), None, 2):
+            span = run.t[part.stop - 1] - run.t[part.start] if np.isinf(horizon) else horizon
+            pieces += [(run, command, a, b) for a, b in
+                       _starts(run, part, span, stride or span, partial or bool(np.isinf(horizon)))]
+    if not pieces:
+        raise InputError(f"no stretch of {log.name} is {horizon:g} s long without a gap: choose a shorter horizon")
+    length = np.array([b - a + 1 for _, _, a, b in pieces])
+    rows = int(length.max())
+    before = max((int(np.ceil(warmup / run.dt)) for run, *_ in pieces), default=0)
+    index = []
+    for _, _, a, b in pieces:
+        # Padding repeats the last row; history before the run repeats its first.
+        index.append(np.clip(np.arange(a - before, a + rows), 0, b))
+    gather = lambda get: np.stack([get(run, command)[i] for (run, command, _, _), i in zip(pieces, index, strict=True)])  # noqa: E731
+
+    def optional(name: str) -> np.ndarray | None:
+        if any(getattr(run, name) is None for run, *_ in pieces):
+            return None
+        return gather(lambda run, _: getattr(run, name))
+
+    times = gather(lambda run, _: run.t)
+    # Repeated history gets times of its own, so that the actuators have time to settle in it.
+    for row, ((run, _, a, _), i) in enumerate(zip(pieces, index, strict=True)):
+        missing = max(0, before - a)
+        times[row, :missing] = run.t[0] - run.dt * np.arange(missing, 0, -1)
+        del i
+    measured = np.concatenate(
+        [gather(lambda run, _, n=n, w=w: np.full((run.samples, w), np.nan) if getattr(run, n) is None
+                else getattr(run, n))[:, before:] for n, w in
+         (("position", 3), ("quaternion", 4), ("nu", 6), ("nu_dot", 6))], axis=-1)
+    spikes = gather(_spikes)[:, before:]
+    seen = np.isfinite(measured)
+    attitude = np.repeat(seen[..., 3:7].all(-1, keepdims=True), 3, axis=-1)
+    mask = np.concatenate([seen[..., :3], attitude, seen[..., 7:]], axis=-1) & ~spikes
+    mask &= (np.arange(rows)[None, :] < length[:, None])[..., None]
+    filled = np.where(seen, measured, 0.0)
+    filled[..., 3] = np.where(attitude[..., 0], filled[..., 3], 1.0)
+    double = {"dtype": torch.float64}
+    fins, voltage, altitude = optional("fins"), optional("voltage"), optional("altitude")
+    inputs = Inputs(torch.tensor(gather(lambda _, command: command), **double),
+                    *(None if x is None else torch.tensor(x, **double) for x in (fins, voltage, altitude)))
+    eta = torch.tensor(filled[..., :7], **double)
+    has_rate = bool(mask[..., ACCELERATION].any())
+    return Windows(
+        np.array([run.number for run, *_ in pieces]), np.array([a for _, _, a, _ in pieces]),
+        torch.tensor(times, **double), eta, torch.tensor(filled[..., 7:13], **double),
+        torch.tensor(filled[..., 13:], **double) if has_rate else None, inputs, torch.tensor(mask, **double),
+        length, before,
+    )
+
+
+def _spikes(run: Run, _: np.ndarray) -> np.ndarray:
+    """Return single-sample outliers of a run by channel, (N, 18)."""
+    found = np.zeros((run.samples, 18), dtype=bool)
+    masks = run.outliers
+    for k, name in enumerate(CHANNELS):
+        if name in masks:
+            found[:, k] = masks[name]
+    return found

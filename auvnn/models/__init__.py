@@ -1,0 +1,19 @@
+"""Physics, damping and effects as one `nn.Module`, its free running, and its files."""
+
+from auvnn.models.grey_box import GreyBox, Prepared
+from auvnn.models.inputs import Inputs
+from auvnn.models.rollout import Divergence, Trajectory, rollout
+from auvnn.models.saving import from_vehicle, load, remove, save
+
+__all__ = [
+    "Divergence",
+    "GreyBox",
+    "Inputs",
+    "Prepared",
+    "Trajectory",
+    "from_vehicle",
+    "load",
+    "remove",
+    "rollout",
+    "save",
+]

@@ -1,0 +1,146 @@
+"""From commands to thrust: static curves, allocation, and what the actuator effects make of it over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from auvnn.effects import Effect
+from auvnn.errors import ConfigError
+from auvnn.physics.thrusters import allocation_matrix, quadratic_thrust, table_thrust
+from auvnn.vehicle import Vehicle
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The thrust over T intervals, each cut into equal steps, N (or the wrench), (..., n) per entry.
+
+    Attributes:
+        mean: average thrust, [interval][step].
+        slope: rise of the equivalent straight line over the step, or None where the thrust is constant.
+        start: thrust just after the interval began, [interval]: what an accelerometer sees there.
+    """
+
+    mean: list[list[Tensor]]
+    slope: list[list[Tensor]] | None
+    start: list[Tensor]
+
+
+class Actuators(nn.Module):
+    """The thrusters of a vehicle, or a commanded wrench in their place.
+
+    Args:
+        vehicle: whose thrusters.
+        actuation: "thrusters" or "wrench".
+    """
+
+    allocation: Tensor
+    max_forward: Tensor
+    max_reverse: Tensor
+
+    def __init__(self, vehicle: Vehicle, actuation: str) -> None:
+        """Collect geometry and curves.
+
+        Raises:
+            ConfigError: `actuation` is neither, or the vehicle has no thrusters.
+        """
+        super().__init__()
+        if actuation not in ("thrusters", "wrench"):
+            raise ConfigError(f"actuation={actuation!r} is unknown: choose thrusters or wrench")
+        if actuation == "thrusters" and not vehicle.thrusters:
+            raise ConfigError(f"{vehicle.name} has no thrusters in its model file: log tau_X ... tau_N instead")
+        self.actuation = actuation
+        double = {"dtype": torch.float64}
+        if actuation == "wrench":
+            self.register_buffer("allocation", torch.eye(6, **double))
+            return
+        units = vehicle.thrusters
+        positions = torch.tensor([list(u.position) for u in units], **double)
+        directions = torch.tensor([list(u.direction) for u in units], **double)
+        self.register_buffer("allocation", allocation_matrix(positions, directions))
+        self.register_buffer("max_forward", torch.tensor([float(u.max_forward) for u in units], **double))
+        self.register_buffer("max_reverse", torch.tensor([float(u.max_reverse) for u in units], **double))
+        self.tables: list[int] = []
+        for index, unit in enumerate(units):
+            if unit.curve != "quadratic":
+                self.tables.append(index)
+                self.register_buffer(f"table_command_{index}", torch.tensor(list(unit.curve.command), **double))
+                self.register_buffer(f"table_thrust_{index}", torch.tensor(list(unit.curve.thrust), **double))
+
+    @property
+    def size(self) -> int:
+        """Number of commands."""
+        return self.allocation.shape[-1]
+
+    def static(self, command: Tensor) -> Tensor:
+        """Return the settled thrust of commands (..., n), N; a commanded wrench is its own."""
+        if self.actuation == "wrench":
+            return command
+        thrust = quadratic_thrust(command, self.max_forward, self.max_reverse)
+        if not self.tables:
+            return thrust
+        columns = list(thrust.unbind(-1))
+        for index in self.tables:
+            grid = getattr(self, f"table_command_{index}")
+            columns[index] = table_thrust(command[..., index], grid, getattr(self, f"table_thrust_{index}"))
+        return torch.stack(columns, dim=-1)
+
+    def drive(
+        self, command: Tensor, times: Tensor, effects: Sequence[Effect], substeps: int = 1, warmup: int = 0
+    ) -> Drive:
+        """Work out the thrust over a stretch, after the effects on commands and the actuators' dynamics.
+
+        The actuators are taken as settled at the first row, so that `warmup` rows of history before the
+        stretch proper let them forget it.
+
+        Args:
+            command: (..., warmup + T, n); row k is held from times[k] to times[k + 1].
+            times: (..., warmup + T), s.
+            effects: in order of action.
+            substeps: equal steps per interval.
+            warmup: rows before the stretch.
+
+        Returns:
+            The thrust over the T - 1 intervals of the stretch, and at its last row.
+        """
+        for effect in effects:
+            if "command" in effect.hooks():
+                command = effect.command(command, times.to(command))
+        demand = self.static(command)
+        lagging = [e for e in effects if "respond" in e.hooks()]
+        if not lagging:
+            rows = list(demand[..., warmup:, :].unbind(-2))
+            return Drive([[row] * substeps for row in rows], None, rows)
+        if len(lagging) > 1:
+            names = " and ".join(e.name for e in lagging)
+            raise ConfigError(f"{names} both give the actuators dynamics: keep one of them")
+        return _lagged(demand, times, lagging[0], substeps, warmup)
+
+
+def _lagged(demand: Tensor, times: Tensor, effect: Effect, substeps: int, warmup: int) -> Drive:
+    # The last row has no interval of its own; its thrust is needed only at its very start.
+    steps = torch.cat([times[..., 1:] - times[..., :-1], torch.zeros_like(times[..., :1])], dim=-1)
+    steps = steps.to(demand).unsqueeze(-1)
+    rows = demand.unbind(-2)
+    state = rows[0]
+    for k in range(warmup):
+        state = effect.respond(state, rows[k], steps[..., k, :]).end
+    mean: list[list[Tensor]] = []
+    slope: list[list[Tensor]] = []
+    start: list[Tensor] = []
+    for k in range(warmup, len(rows)):
+        h = steps[..., k, :] / substeps
+        means, slopes = [], []
+        for part in range(substeps):
+            answer = effect.respond(state, rows[k], h)
+            if part == 0:
+                start.append(answer.start)
+            means.append(answer.mean)
+            slopes.append(answer.slope)
+            state = answer.end
+        mean.append(means)
+        slope.append(slopes)
+    return Drive(mean, slope, start)

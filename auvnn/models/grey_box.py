@@ -1,0 +1,327 @@
+"""The model: known physics, six damping subnetworks beside it, and a list of effects, as one `nn.Module`."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from auvnn.effects import EFFECTS, Body, Effect, Moment, Sensed
+from auvnn.errors import ConfigError
+from auvnn.models.actuators import Actuators
+from auvnn.models.inputs import Inputs
+from auvnn.physics.attitude import quat_to_matrix
+from auvnn.physics.coriolis import coriolis_force
+from auvnn.physics.current import water_velocity
+from auvnn.physics.drag import damping_force, element_force
+from auvnn.physics.fins import fin_force
+from auvnn.physics.inertia import rigid_body_inertia
+from auvnn.physics.kinematics import eta6_to_eta7
+from auvnn.physics.restoring import restoring_force
+from auvnn.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from auvnn.models.rollout import Trajectory
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """What of the equations does not change with the state: body and inertia matrices, (..., 6, 6)."""
+
+    body: Body
+    rigid: Tensor
+    added: Tensor
+    total: Tensor
+    inverse: Tensor
+
+
+class GreyBox(nn.Module):
+    """Fossen's equations of one vehicle, with damping subnetworks and effects.
+
+    M_RB nu_dot + C_RB(nu) nu + M_A nu_r_dot + C_A(nu_r) nu_r + D(nu_r) nu_r + d(nu_r) + g(eta) = tau
+
+    D is what the vehicle's file states, d what the subnetworks add to it; either may be absent.
+
+    Args:
+        vehicle: the known numbers.
+        effects: effects in order of action; names may not repeat.
+        damping: six damping subnetworks (a `DampingBank`), or None.
+        actuation: "thrusters" or "wrench"; by default thrusters where the vehicle has them.
+
+    Raises:
+        ConfigError: effects repeat or exclude one another.
+
+    Reference: Fossen (2011), equations 6.41 to 6.60 and 8.134; Van de Ven, Flanagan and Toal (2004), eq. 15.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        effects: Iterable[Effect] = (),
+        damping: nn.Module | None = None,
+        actuation: str | None = None,
+    ) -> None:
+        """Turn the vehicle's numbers into buffers."""
+        super().__init__()
+        self.vehicle = vehicle
+        self.actuation = actuation or ("thrusters" if vehicle.thrusters else "wrench")
+        self.actuators = Actuators(vehicle, self.actuation)
+        self.damping = damping
+        members = list(effects)
+        names = [e.name for e in members]
+        for effect in members:
+            if names.count(effect.name) > 1:
+                raise ConfigError(f"effect {effect.name} is given twice: give it once, with all its parameters")
+            clash = [n for n in effect.excludes if n in names]
+            if clash:
+                raise ConfigError(f"effects {effect.name} and {clash[0]} exclude each other: keep one")
+        self.effects = nn.ModuleList(members)
+        self._by_hook = {h: [e for e in members if h in e.hooks()] for h in
+                         ("command", "respond", "thrust", "water", "body", "wrench", "sense")}
+        self.time_varying = any(e.time_varying for e in self._by_hook["body"])
+        self._constants(vehicle)
+
+    def _constants(self, vehicle: Vehicle) -> None:
+        def keep(name: str, value: Any) -> None:
+            tensor = None if value is None else torch.tensor(np.array(value, dtype=np.float64))
+            self.register_buffer(f"known_{name}", tensor, persistent=False)
+
+        keep("mass", float(vehicle.mass))
+        keep("weight", float(vehicle.mass) * float(vehicle.gravity))
+        keep("buoyancy", float(vehicle.buoyancy))
+        keep("cg", vehicle.center_of_gravity)
+        keep("cb", vehicle.center_of_buoyancy)
+        keep("inertia", vehicle.inertia)
+        keep("added_mass", vehicle.added_mass)
+        keep("linear", vehicle.linear_damping)
+        keep("quadratic", vehicle.quadratic_damping)
+        elements = vehicle.damping_elements
+        rows = {k: [list(map(list, getattr(e, k))) if k == "axes" else list(getattr(e, k)) for e in elements] or None
+                for k in ("position", "axes", "linear", "quadratic")}
+        for name, value in rows.items():
+            keep(f"element_{name}", value)
+        fins = vehicle.fins
+        for name in ("position", "axis", "area", "lift_slope", "stall"):
+            keep(f"fin_{name}", [list(map(float, getattr(f, name))) if name in ("position", "axis")
+                                 else float(getattr(f, name)) for f in fins] or None)
+
+    def _known(self, name: str) -> Any:
+        return getattr(self, f"known_{name}")
+
+    def using(self, hook: str) -> list[Effect]:
+        """Return the effects that override a hook, in order of action."""
+        return self._by_hook[hook]
+
+    @property
+    def effect_names(self) -> list[str]:
+        """Names of the effects, in order of action."""
+        return [str(e.name) for e in self.effects]
+
+    def effect(self, name: str) -> Effect:
+        """Return an effect by name.
+
+        Raises:
+            ConfigError: the model has no such effect.
+        """
+        for effect in self.effects:
+            if effect.name == name:
+                return effect
+        raise ConfigError(f"the model has no effect {name!r}; it has: {', '.join(self.effect_names) or 'none'}")
+
+    def with_effects(self, wanted: Sequence[str] | Mapping[str, Mapping[str, float] | None]) -> GreyBox:
+        """Return the model with further effects, at the given values or at their nulls.
+
+        The new model has parameters of its own; damping subnetworks and present effects are copied.
+        """
+        values = wanted if isinstance(wanted, Mapping) else dict.fromkeys(wanted)
+        new = [EFFECTS.get(n).build(self.vehicle, self.actuation, v) for n, v in values.items()]
+        return self.rebuilt([*self.copied_effects(), *new])
+
+    def copied_effects(self) -> list[Effect]:
+        """Return copies of the effects, with parameters of their own."""
+        return [copy.deepcopy(e) for e in self.effects if isinstance(e, Effect)]
+
+    def rebuilt(self, effects: Iterable[Effect], vehicle: Vehicle | None = None) -> GreyBox:
+        """Return a model with the same damping subnetworks (copied) but other effects or other numbers."""
+        model = GreyBox(vehicle or self.vehicle, effects, copy.deepcopy(self.damping), self.actuation)
+        return model.to(self._known("mass"))
+
+    def prepare(self, moment: Moment | None = None) -> Prepared:
+        """Work out body and inertia matrices; `moment` is needed only where an effect varies in time."""
+        body = Body(*(self._known(n) for n in ("mass", "weight", "buoyancy", "cg", "cb", "inertia", "added_mass",
+                                               "linear", "quadratic", "element_linear", "element_quadratic")))
+        for effect in self.using("body"):
+            body = effect.body(body, moment)
+        rigid = rigid_body_inertia(body.mass, body.inertia, body.cg)
+        total = rigid + body.added_mass
+        return Prepared(body, rigid, body.added_mass, total, torch.linalg.inv(total))
+
+    def forward(
+        self,
+        eta: Tensor,
+        nu: Tensor,
+        command: Tensor,
+        *,
+        time: Tensor | float = 0.0,
+        fins: Tensor | None = None,
+        voltage: Tensor | None = None,
+        altitude: Tensor | None = None,
+    ) -> Tensor:
+        """Return the acceleration, with the actuators settled at their commands.
+
+        Args:
+            eta: position and attitude (..., 7) with a quaternion (w, x, y, z), or (..., 6) with Euler angles.
+            nu: velocity (..., 6), m/s and rad/s, over ground, of the body origin.
+            command: thruster commands (..., n) in [-1, 1], or the wrench (..., 6), N and N m.
+            time: s since the start of the run, (...).
+            fins: fin angles (..., m), rad.
+            voltage: V, (...).
+            altitude: m, (...).
+
+        Returns:
+            nu_dot (..., 6), m/s2 and rad/s2.
+
+        Raises:
+            ConfigError: the last size of a tensor is not what the model takes.
+        """
+        sizes = (eta.shape[-1:], nu.shape[-1:], command.shape[-1:])
+        if sizes[0] not in ((6,), (7,)) or sizes[1:] != ((6,), (self.actuators.size,)):
+            raise ConfigError(
+                f"eta {tuple(eta.shape)}, nu {tuple(nu.shape)}, command {tuple(command.shape)}: the last sizes "
+                f"are 6 or 7, 6, and {self.actuators.size} ({self.actuation})"
+            )
+        if eta.shape[-1] == 6:
+            eta = eta6_to_eta7(eta)
+        inputs = Inputs(command, fins, voltage, altitude)
+        moment_time = torch.as_tensor(time, dtype=nu.dtype, device=nu.device)
+        lead = torch.broadcast_shapes(moment_time.shape, command.shape[:-1])
+        drive = self.actuators.drive(
+            command.expand(*lead, self.actuators.size).unsqueeze(-2), moment_time.expand(lead).unsqueeze(-1),
+            self.using("command"),
+        )
+        return self.nu_dot(eta[..., :3], quat_to_matrix(eta[..., 3:]), nu, drive.start[0], inputs, moment_time)
+
+    def nu_dot(
+        self,
+        position: Tensor,
+        rotation: Tensor,
+        nu: Tensor,
+        thrust: Tensor,
+        inputs: Inputs,
+        time: Tensor,
+        prepared: Prepared | None = None,
+    ) -> Tensor:
+        """Return the acceleration from the thrust that acts now; see `forward` for shapes and units."""
+        terms, prepared = self._terms(position, rotation, nu, thrust, inputs, time, prepared)
+        total = None
+        for term in terms.values():
+            total = term if total is None else total + term
+        return (prepared.inverse @ total.unsqueeze(-1)).squeeze(-1)
+
+    def wrenches(
+        self, position: Tensor, rotation: Tensor, nu: Tensor, thrust: Tensor, inputs: Inputs, time: Tensor
+    ) -> dict[str, Tensor]:
+        """Return the wrench of each term on the right-hand side of M nu_dot = ..., N and N m, (..., 6)."""
+        return self._terms(position, rotation, nu, thrust, inputs, time, None)[0]
+
+    def _terms(
+        self,
+        position: Tensor,
+        rotation: Tensor,
+        nu: Tensor,
+        thrust: Tensor,
+        inputs: Inputs,
+        time: Tensor,
+        prepared: Prepared | None,
+    ) -> tuple[dict[str, Tensor], Prepared]:
+        moment = Moment(time, position, rotation, nu, nu, torch.zeros_like(nu), inputs.command, inputs.fins,
+                        inputs.voltage, inputs.altitude)
+        nu_r, moving = nu, self.using("water")
+        if moving:
+            velocity, acceleration = moving[0].water(moment)
+            for effect in moving[1:]:
+                more, faster = effect.water(moment)
+                velocity, acceleration = velocity + more, acceleration + faster
+            nu_c, nu_c_dot = water_velocity(rotation, nu[..., 3:], velocity, acceleration)
+            nu_r = nu - nu_c
+            moment = Moment(time, position, rotation, nu, nu_r, nu_c_dot, inputs.command, inputs.fins,
+                            inputs.voltage, inputs.altitude)
+        if prepared is None or self.time_varying:
+            prepared = self.prepare(moment)
+        body, terms = prepared.body, {}
+        for effect in self.using("thrust"):
+            thrust = effect.thrust(thrust, moment)
+        terms["thrust"] = thrust @ self.actuators.allocation.mT
+        if moving:
+            terms["Coriolis"] = -coriolis_force(prepared.rigid, nu) - coriolis_force(prepared.added, nu_r)
+            terms["water acceleration"] = (prepared.added @ moment.nu_c_dot.unsqueeze(-1)).squeeze(-1)
+        else:
+            terms["Coriolis"] = -coriolis_force(prepared.total, nu)
+        if body.linear is not None or body.quadratic is not None:
+            zero = torch.zeros_like(prepared.rigid)
+            terms["damping"] = -damping_force(
+                nu_r,
+                zero if body.linear is None else body.linear,
+                zero if body.quadratic is None else body.quadratic,
+            )
+        if body.element_linear is not None:
+            drag = None
+            for k in range(body.element_linear.shape[-2]):
+                part = element_force(nu_r, self._known("element_position")[k], self._known("element_axes")[k],
+                                     body.element_linear[..., k, :], body.element_quadratic[..., k, :])
+                drag = part if drag is None else drag + part
+            terms["damping elements"] = -drag
+        if self.damping is not None:
+            terms["damping subnetworks"] = -self.damping(nu_r)
+        terms["restoring"] = -restoring_force(rotation, body.weight, body.buoyancy, body.cg, body.cb)
+        if self._known("fin_area") is not None and inputs.fins is not None:
+            terms["fins"] = fin_force(nu_r, inputs.fins, *(self._known(f"fin_{n}") for n in
+                                      ("position", "axis", "area", "lift_slope", "stall")),
+                                      float(self.vehicle.water_density))
+        for effect in self.using("wrench"):
+            terms[str(effect.name)] = effect.wrench(moment, body)
+        return terms, prepared
+
+    def sense(self, sensed: Sensed) -> Sensed:
+        """Return what the sensors report of a state."""
+        for effect in self.using("sense"):
+            sensed = effect.sense(sensed)
+        return sensed
+
+    def unsense(self, sensed: Sensed, rounds: int = 4) -> Sensed:
+        """Return the state that the sensors' report stands for, by fixed-point iteration.
+
+        Sensor effects are small corrections, so each round gains about as many digits as they are small.
+        """
+        if not self.using("sense"):
+            return sensed
+        state = sensed
+        for _ in range(rounds):
+            seen = self.sense(state)
+            rate = None
+            if sensed.nu_dot is not None and state.nu_dot is not None and seen.nu_dot is not None:
+                rate = state.nu_dot + sensed.nu_dot - seen.nu_dot
+            quaternion = state.quaternion + sensed.quaternion - seen.quaternion
+            quaternion = quaternion / torch.linalg.norm(quaternion, dim=-1, keepdim=True)
+            state = Sensed(state.position + sensed.position - seen.position, quaternion,
+                           state.nu + sensed.nu - seen.nu, rate)
+        return state
+
+    def rollout(self, eta0: Tensor, nu0: Tensor, commands: Tensor | Inputs, times: Tensor, **options: Any
+                ) -> Trajectory:
+        """Run free from a state: see `auvnn.models.rollout.rollout`."""
+        from auvnn.models.rollout import rollout
+
+        return rollout(self, eta0, nu0, commands, times, **options)
+
+    def save(self, folder: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the model as a folder: see `auvnn.models.saving.save`."""
+        from auvnn.models.saving import save
+
+        return save(self, folder, overwrite=overwrite)

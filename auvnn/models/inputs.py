@@ -1,0 +1,43 @@
+"""What drives a vehicle over a stretch of time: commands and whatever else the log knows, held per interval."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Inputs of a stretch of T rows, each held until the next row's time; (..., T, size), SI.
+
+    Attributes:
+        command: thruster commands in [-1, 1], or the commanded wrench, N and N m, (..., T, n).
+        fins: fin angles, rad, (..., T, m), or None.
+        voltage: V, (..., T), or None.
+        altitude: height above the bottom, m, (..., T), or None.
+    """
+
+    command: Tensor
+    fins: Tensor | None = None
+    voltage: Tensor | None = None
+    altitude: Tensor | None = None
+
+    def rows(self, first: int, last: int | None = None) -> Inputs:
+        """Return rows `first` to `last` (excluded)."""
+        part = slice(first, last)
+        return Inputs(
+            self.command[..., part, :],
+            None if self.fins is None else self.fins[..., part, :],
+            None if self.voltage is None else self.voltage[..., part],
+            None if self.altitude is None else self.altitude[..., part],
+        )
+
+    def each(self) -> list[Inputs]:
+        """Return the rows one by one, without their time axis; views, so that a loop need not index."""
+        count = self.command.shape[-2]
+        nothing = (None,) * count
+        fins = nothing if self.fins is None else self.fins.unbind(-2)
+        voltage = nothing if self.voltage is None else self.voltage.unbind(-1)
+        altitude = nothing if self.altitude is None else self.altitude.unbind(-1)
+        return [Inputs(*row) for row in zip(self.command.unbind(-2), fins, voltage, altitude, strict=True)]

@@ -1,0 +1,271 @@
+"""Free running: integrate a model from a state under held commands."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import torch
+from torch import Tensor
+
+from auvnn.effects import Effect
+from auvnn.errors import ConfigError
+from auvnn.models.inputs import Inputs
+from auvnn.models.limits import LIMIT
+from auvnn.physics.attitude import quat_derivative, quat_to_matrix
+from auvnn.physics.kinematics import eta6_to_eta7
+
+if TYPE_CHECKING:
+    from auvnn.models.grey_box import GreyBox
+
+
+@dataclass(frozen=True)
+class Divergence:
+    """Where a rollout left what is physical.
+
+    Attributes:
+        index: which trajectory, flattened.
+        time: s, the last time at which the state was sound.
+        term: the term of the equation of motion that pushed most, or "initial state".
+        words: the same as a sentence.
+    """
+
+    index: int
+    time: float
+    term: str
+    words: str
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A free run.
+
+    Attributes:
+        times: (..., T), s.
+        eta: (..., T, 7), NED m and quaternion.
+        nu: (..., T, 6), m/s and rad/s.
+        thrust: (..., T, n), N, just after each row's command.
+        divergences: empty where the run stayed sound; a diverged trajectory holds its last sound state.
+    """
+
+    times: Tensor
+    eta: Tensor
+    nu: Tensor
+    thrust: Tensor
+    divergences: tuple[Divergence, ...] = ()
+
+    @property
+    def diverged(self) -> bool:
+        """Whether any trajectory left what is physical."""
+        return bool(self.divergences)
+
+
+def steps_per_interval(times: Tensor, max_step: float) -> int:
+    """Return how many equal steps bring the longest interval below `max_step`.
+
+    Raises:
+        ConfigError: the step is not positive, or a time is not finite.
+    """
+    if not max_step > 0:
+        raise ConfigError(f"max_step={max_step!r} s: give a positive step")
+    if times.shape[-1] < 2:
+        return 1
+    longest = float((times[..., 1:] - times[..., :-1]).max())
+    if not math.isfinite(longest):
+        raise ConfigError("times hold NaN or infinity: remove those rows")
+    return max(1, math.ceil(longest / max_step - 1e-9))
+
+
+def rollout(
+    model: GreyBox,
+    eta0: Tensor,
+    nu0: Tensor,
+    commands: Tensor | Inputs,
+    times: Tensor,
+    *,
+    solver: str = "rk4",
+    max_step: float = 0.05,
+    warmup: int = 0,
+    check: bool = True,
+    **solver_options: Any,
+) -> Trajectory:
+    """Integrate the model from a state, each command held until the next row's time.
+
+    Args:
+        model: the model.
+        eta0: (..., 7) or (..., 6) with Euler angles.
+        nu0: (..., 6), m/s and rad/s.
+        commands: (..., warmup + T, n), or `Inputs` with as many rows.
+        times: (warmup + T) or (..., warmup + T), s, not necessarily even.
+        solver: "rk4", "midpoint" or "euler" (own, fixed step), or "torchdiffeq:METHOD".
+        max_step: longest step of the own solvers, s; each interval is cut into equal steps.
+        warmup: rows of history before the stretch, from which the actuators' state is worked out.
+        check: look for divergence; off inside function transforms.
+        **solver_options: handed to torchdiffeq (rtol, atol).
+
+    Returns:
+        The trajectory at the T times. One that diverges keeps its last sound state and is reported.
+
+    Raises:
+        ConfigError: unknown solver or option, shapes that do not fit, times that decrease or are not finite.
+    """
+    inputs = commands if isinstance(commands, Inputs) else Inputs(commands)
+    batch = _leading_shape(model, eta0, nu0, inputs, times, warmup)
+    if eta0.shape[-1] == 6:
+        eta0 = eta6_to_eta7(eta0)
+    if check and times.shape[-1] > 1 and bool((times[..., 1:] < times[..., :-1]).any()):
+        raise ConfigError("times decrease: sort the rows by time")
+    substeps = steps_per_interval(times, max_step)
+    rows = torch.broadcast_shapes(inputs.command.shape[:-1], times.shape)
+    members = [e for e in model.effects if isinstance(e, Effect)]
+    drive = model.actuators.drive(
+        inputs.command.expand(*rows, inputs.command.shape[-1]), times.expand(rows), members,
+        substeps, warmup,
+    )
+    whole, inputs, times = (inputs, times), inputs.rows(warmup), times[..., warmup:]
+    state = (eta0.expand(*batch, 7), nu0.expand(*batch, 6))
+    if solver.startswith("torchdiffeq:"):
+        from auvnn.models.torchdiffeq_solver import solve
+
+        eta, nu = solve(model, state, *whole, solver.partition(":")[2], warmup=warmup, **solver_options)
+    elif solver in TABLEAUS:
+        if solver_options:
+            raise ConfigError(f"solver {solver} has no option {sorted(solver_options)[0]!r}")
+        eta, nu = _fixed(model, state, inputs, times, drive, substeps, TABLEAUS[solver])
+    else:
+        raise ConfigError(f"no solver called '{solver}'. There are: {', '.join(TABLEAUS)}, torchdiffeq:METHOD")
+    thrust = torch.stack([row.expand(*batch, row.shape[-1]) for row in drive.start], dim=-2)
+    result = Trajectory(times, eta, nu, thrust)
+    return _checked(model, result, inputs) if check else result
+
+
+def _leading_shape(
+    model: GreyBox, eta0: Tensor, nu0: Tensor, inputs: Inputs, times: Tensor, warmup: int
+) -> torch.Size:
+    """Return the leading shape that start, inputs and times share; refuse what does not fit together."""
+    command, size = inputs.command, model.actuators.size
+    if eta0.shape[-1:] not in ((6,), (7,)):
+        raise ConfigError(
+            f"eta0 has shape {tuple(eta0.shape)}: the last size is 7 (quaternion) or 6 (Euler angles)"
+        )
+    if nu0.shape[-1:] != (6,):
+        raise ConfigError(f"nu0 has shape {tuple(nu0.shape)}: the last size is 6 (u v w p q r)")
+    if command.dim() < 2 or times.dim() < 1:
+        raise ConfigError(
+            f"commands have shape {tuple(command.shape)} and times {tuple(times.shape)}: "
+            f"give rows, (..., T, {size}) and (..., T)"
+        )
+    if command.shape[-2] != times.shape[-1]:
+        raise ConfigError(
+            f"{command.shape[-2]} rows of commands for {times.shape[-1]} times: give one row per time"
+        )
+    if command.shape[-1] != size:
+        raise ConfigError(
+            f"{command.shape[-1]} commands a row, but the model takes {size} ({model.actuation})"
+        )
+    if not 0 <= warmup < times.shape[-1]:
+        raise ConfigError(f"warmup={warmup} of {times.shape[-1]} rows: leave at least one to run from")
+    leading = {"eta0": eta0.shape[:-1], "nu0": nu0.shape[:-1], "commands": command.shape[:-2],
+               "times": times.shape[:-1]}
+    for name, tensor, sizes in (("fins", inputs.fins, 2), ("voltage", inputs.voltage, 1),
+                                ("altitude", inputs.altitude, 1)):
+        if tensor is not None:
+            if tensor.dim() < sizes or tensor.shape[-sizes] != times.shape[-1]:
+                raise ConfigError(
+                    f"{name} of shape {tuple(tensor.shape)} for {times.shape[-1]} times: give one row per time"
+                )
+            leading[name] = tensor.shape[:-sizes]
+    try:
+        return torch.broadcast_shapes(*leading.values())
+    except RuntimeError:
+        words = ", ".join(f"{name} {tuple(shape)}" for name, shape in leading.items())
+        raise ConfigError(f"leading shapes do not fit together: {words}") from None
+
+
+# Explicit schemes whose stages each need the one before only: (stage times, weights).
+TABLEAUS = {
+    "rk4": ((0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
+    "midpoint": ((0.0, 0.5), (0.0, 1.0)),
+    "euler": ((0.0,), (1.0,)),
+}
+
+
+def _fixed(model: GreyBox, state: tuple, inputs: Inputs, times: Tensor, drive: Any, substeps: int, tableau: tuple
+           ) -> tuple[Tensor, Tensor]:
+    eta, nu = state
+    position, quaternion = eta[..., :3], eta[..., 3:]
+    prepared = None if model.time_varying else model.prepare()
+    stages, weights = tableau
+    # Differences first: single precision would spoil the steps of a long log.
+    steps = ((times[..., 1:] - times[..., :-1]) / substeps).to(nu).unsqueeze(-1).unbind(-2)
+    starts = times.to(nu).unbind(-1)
+    rows = inputs.each()
+    etas, nus = [eta], [nu]
+    for k, h in enumerate(steps):
+        for part in range(substeps):
+            begin = starts[k] + part * h.squeeze(-1)
+            mean = drive.mean[k][part]
+            slope = None if drive.slope is None else drive.slope[k][part]
+            total = None
+            rate: tuple[Tensor, Tensor, Tensor] | None = None
+            for c, weight in zip(stages, weights, strict=True):
+                p, q, v = position, quaternion, nu
+                if rate is not None:
+                    p, q, v = (y + (c * h) * r for y, r in zip((p, q, v), rate, strict=True))
+                thrust = mean if slope is None else mean + (c - 0.5) * slope
+                rotation = quat_to_matrix(q)
+                rate = (
+                    (rotation @ v[..., :3].unsqueeze(-1)).squeeze(-1),
+                    quat_derivative(q, v[..., 3:]),
+                    model.nu_dot(p, rotation, v, thrust, rows[k], begin + c * h.squeeze(-1), prepared),
+                )
+                if weight:
+                    part_sum = tuple((weight * h) * r for r in rate)
+                    total = part_sum if total is None else tuple(a + b for a, b in zip(total, part_sum, strict=True))
+            assert total is not None
+            position, quaternion, nu = position + total[0], quaternion + total[1], nu + total[2]
+            quaternion = quaternion / torch.linalg.norm(quaternion, dim=-1, keepdim=True)
+        etas.append(torch.cat([position, quaternion], dim=-1))
+        nus.append(nu)
+    return torch.stack(etas, dim=-2), torch.stack(nus, dim=-2)
+
+
+def _checked(model: GreyBox, run: Trajectory, inputs: Inputs) -> Trajectory:
+    with torch.no_grad():
+        sound = torch.isfinite(run.nu).all(-1) & torch.isfinite(run.eta).all(-1) & (run.nu.abs().amax(-1) < LIMIT)
+        if bool(sound.all()):
+            return run
+        count = run.nu.shape[-2]
+        flat = sound.reshape(-1, count)
+        eta, nu = run.eta.detach().reshape(-1, count, 7).clone(), run.nu.detach().reshape(-1, count, 6).clone()
+        times = run.times.expand(sound.shape).reshape(-1, count)
+        thrust = run.thrust.reshape(-1, count, run.thrust.shape[-1])
+        command = inputs.command.expand(*sound.shape, inputs.command.shape[-1]).reshape(-1, count, model.actuators.size)
+        found = []
+        for index in torch.nonzero(~flat.all(-1)).squeeze(-1).tolist():
+            last = int(torch.nonzero(~flat[index])[0]) - 1
+            if last < 0:
+                begin = float(times[index, 0])
+                words = f"trajectory {index} starts from a state that is not finite, or faster than {LIMIT:g}"
+                found.append(Divergence(index, begin, "initial state", words))
+                eta[index, 1:], nu[index, 1:] = eta[index, 0], nu[index, 0]
+                continue
+            extra = inputs.rows(last, last + 1)
+            terms = model.wrenches(
+                eta[index, last, :3], quat_to_matrix(eta[index, last, 3:]), nu[index, last], thrust[index, last],
+                Inputs(command[index, last],
+                       *(None if x is None else x.expand(*sound.shape[:-1], *x.shape[len(x.shape) - d:])
+                         .reshape(flat.shape[0], *x.shape[len(x.shape) - d:])[index].squeeze(0)
+                         for x, d in ((extra.fins, 2), (extra.voltage, 1), (extra.altitude, 1)))),
+                times[index, last],
+            )
+            term = max(terms, key=lambda n: float(torch.nan_to_num(terms[n], nan=math.inf).abs().max()))
+            moment = float(times[index, last])
+            found.append(Divergence(index, moment, term,
+                                    f"trajectory {index} diverged after {moment:g} s; the largest term was: {term}"))
+            eta[index, last + 1:], nu[index, last + 1:] = eta[index, last], nu[index, last]
+        return Trajectory(run.times, eta.reshape(run.eta.shape), nu.reshape(run.nu.shape), run.thrust, tuple(found))
+
+
+__all__ = ["LIMIT", "TABLEAUS", "Divergence", "Trajectory", "rollout", "steps_per_interval"]

@@ -1,0 +1,93 @@
+"""Models on disk: a built-in name, a vehicle's YAML file, or a folder with weights and a manifest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from auvnn.config import dump_yaml, read_yaml
+from auvnn.effects import EFFECTS
+from auvnn.errors import ModelError
+from auvnn.models.grey_box import GreyBox
+from auvnn.storage import read_folder, tensors_from_bytes, tensors_to_bytes, write_folder
+from auvnn.vehicle import Vehicle, load_vehicle
+
+MODEL, WEIGHTS = "model.yaml", "weights.safetensors"
+SUBNETWORKS = "damping_subnetworks"
+
+
+def from_vehicle(vehicle: Vehicle, actuation: str | None = None) -> GreyBox:
+    """Return the model of a vehicle with the effects that its file states."""
+    how = actuation or ("thrusters" if vehicle.thrusters else "wrench")
+    effects = [EFFECTS.get(name).build(vehicle, how, values) for name, values in vehicle.effects.items()]
+    return GreyBox(vehicle, effects, actuation=how)
+
+
+def load(source: str | Path, actuation: str | None = None) -> GreyBox:
+    """Return the model of a built-in vehicle, a YAML file, or a saved folder.
+
+    Args:
+        source: a name, or a path.
+        actuation: "thrusters" or "wrench"; by default what the model was saved with, else thrusters where
+            the vehicle has them.
+
+    Raises:
+        ModelError: the file is damaged, incomplete, not physical, or from a newer auvnn.
+        ConfigError: an unknown name.
+    """
+    path = Path(source)
+    if not path.is_dir():
+        return from_vehicle(load_vehicle(str(source)), actuation)
+    if not (path / MODEL).exists():
+        raise ModelError(f"{path} holds no {MODEL}: give a saved model's folder, a YAML file or a built-in name")
+    files = read_folder(path)
+    data: dict[str, Any] = read_yaml(path / MODEL)
+    networks = data.pop(SUBNETWORKS, None)
+    saved_actuation = data.pop("actuation", None)
+    vehicle = Vehicle.from_dict(data, where=str(path / MODEL))
+    model = from_vehicle(vehicle, actuation or saved_actuation)
+    if networks is None:
+        return model
+    from auvnn.damping.bank import DampingBank
+
+    if WEIGHTS not in files:
+        raise ModelError(f"{path} describes damping subnetworks but holds no {WEIGHTS}: save the model again")
+    bank = DampingBank.from_description(networks)
+    expected = {k: (tuple(v.shape), v.dtype) for k, v in bank.state_dict().items()}
+    bank.load_state_dict(tensors_from_bytes(files[WEIGHTS], expected))
+    return GreyBox(model.vehicle, model.copied_effects(), bank, model.actuation)
+
+
+def save(model: GreyBox, folder: str | Path, *, overwrite: bool = False) -> Path:
+    """Write a model as a folder: `model.yaml`, the weights and a manifest with SHA-256 of each.
+
+    The folder is staged beside its place and moved there, so that a kill leaves the old one intact.
+
+    Raises:
+        InputError: the folder exists, is not empty and `overwrite` is not set.
+    """
+    data = model.vehicle.to_dict()
+    data.pop("effects", None)  # the file's order must not depend on where the effects came from
+    data["effects"] = {str(e.name): e.values() for e in model.copied_effects()}
+    data["actuation"] = model.actuation
+    files: dict[str, bytes | str] = {}
+    if model.damping is not None:
+        data[SUBNETWORKS] = model.damping.describe()
+        # Always in double precision, which holds single precision exactly: a folder has one form.
+        files[WEIGHTS] = tensors_to_bytes({k: v.double() for k, v in model.damping.state_dict().items()})
+    files[MODEL] = dump_yaml(data, str(folder))
+    path = Path(folder)
+    write_folder(path, files, overwrite=overwrite)
+    return path
+
+
+def remove(model: GreyBox, effects: str | list[str]) -> GreyBox:
+    """Return the model without one effect or several; everything else stays as it is.
+
+    Raises:
+        ConfigError: the model has no such effect.
+    """
+    names = [effects] if isinstance(effects, str) else list(effects)
+    for name in names:
+        model.effect(name)
+    return model.rebuilt(e for e in model.copied_effects() if e.name not in names)

@@ -1,0 +1,119 @@
+"""Free running through torchdiffeq: adaptive methods, and an independent check on the own integrator."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import torch
+from torch import Tensor
+from torchdiffeq import odeint
+
+from auvnn.errors import ConfigError
+from auvnn.models.inputs import Inputs
+from auvnn.models.limits import LIMIT
+from auvnn.physics.attitude import quat_derivative, quat_to_matrix
+
+if TYPE_CHECKING:
+    from auvnn.models.grey_box import GreyBox
+
+ADAPTIVE = ("dopri8", "dopri5", "bosh3", "fehlberg2", "adaptive_heun")
+FIXED = ("euler", "midpoint", "heun3", "rk4")
+# torchdiffeq has no budget by default, and enforces one by an assertion, which `python -O` removes.
+MAX_EVALUATIONS = 100_000
+
+
+def solve(
+    model: GreyBox,
+    state: tuple[Tensor, Tensor],
+    inputs: Inputs,
+    times: Tensor,
+    method: str,
+    *,
+    warmup: int = 0,
+    **tolerances: float,
+) -> tuple[Tensor, Tensor]:
+    """Integrate interval by interval, so that no step crosses a jump of the held inputs.
+
+    The actuators' own dynamics are followed in closed form inside each interval, by restarting their
+    answer from the interval's beginning.
+
+    Args:
+        model: the model.
+        state: eta (..., 7) and nu (..., 6) at the first time.
+        inputs: warmup + T rows.
+        times: (warmup + T,), s, shared by all trajectories.
+        method: one of torchdiffeq's.
+        warmup: rows of history, from which the actuators' state is worked out.
+        **tolerances: `rtol` (1e-7) and `atol` (1e-9) of adaptive methods.
+
+    Returns:
+        eta (..., T, 7) and nu (..., T, 6); NaN from where a trajectory left what is physical.
+
+    Raises:
+        ConfigError: unknown method or option, times that differ by trajectory, or a budget that ran out.
+    """
+    if method not in (*ADAPTIVE, *FIXED):
+        raise ConfigError(f"torchdiffeq has no method '{method}' for this. There are: "
+                          f"{', '.join((*ADAPTIVE, *FIXED))}")
+    if times.dim() != 1:
+        raise ConfigError("torchdiffeq takes one time axis for all trajectories: use solver=rk4 for uneven ones")
+    for name, value in tolerances.items():
+        if name not in ("rtol", "atol"):
+            raise ConfigError(f"solver torchdiffeq:{method} has no option '{name}'. There are: rtol, atol")
+        if not value > 0:
+            raise ConfigError(f"{name}={value!r}: give a positive tolerance")
+    rtol, atol = tolerances.get("rtol", 1e-7), tolerances.get("atol", 1e-9)
+    prepared = None if model.time_varying else model.prepare()
+    lagging = model.using("respond")
+    command = inputs.command
+    for effect in model.using("command"):
+        command = effect.command(command, times.to(command).expand(command.shape[:-1]))
+    demand = model.actuators.static(command)
+    rows, demands = inputs.each(), demand.unbind(-2)
+    thrust = demands[0]
+    for k in range(warmup if lagging else 0):
+        thrust = lagging[0].respond(thrust, demands[k], (times[k + 1] - times[k]).to(thrust)).end
+    y = torch.cat(state, dim=-1)
+    out = [y]
+    lost = ~torch.isfinite(y).all(-1)
+    at_rest = torch.nn.functional.pad(torch.ones_like(y[..., :1]), (3, 9))
+    y = torch.where(lost.unsqueeze(-1), at_rest, y)
+    for k in range(warmup, times.shape[0] - 1):
+        begin, end = times[k], times[k + 1]
+        entered, wanted, row, spent = thrust, demands[k], rows[k], 0
+
+        def rate(t: Tensor, y: Tensor, begin: Tensor = begin, entered: Tensor = entered,
+                 wanted: Tensor = wanted, row: Inputs = row) -> Tensor:
+            nonlocal lost, spent
+            spent += 1
+            if spent > MAX_EVALUATIONS:
+                raise ConfigError(f"torchdiffeq {method} gave up at t = {float(begin):g} s after "
+                                  f"{MAX_EVALUATIONS} evaluations: loosen rtol and atol, or use solver=rk4")
+            now = wanted
+            if lagging:
+                now = lagging[0].respond(entered, wanted, (t - begin).to(y)).end
+            rotation = quat_to_matrix(y[..., 3:7] / torch.linalg.norm(y[..., 3:7], dim=-1, keepdim=True))
+            nu = y[..., 7:]
+            change = torch.cat([
+                (rotation @ nu[..., :3].unsqueeze(-1)).squeeze(-1),
+                quat_derivative(y[..., 3:7], nu[..., 3:]),
+                model.nu_dot(y[..., :3], rotation, nu, now, row, t.to(y).expand(nu.shape[:-1]), prepared),
+            ], dim=-1)
+            # A lost trajectory would make adaptive methods shrink the step of all for ever: it is held.
+            lost = lost | ~torch.isfinite(change).all(-1) | (nu.abs().amax(-1) > LIMIT)
+            return torch.where(lost.unsqueeze(-1), torch.zeros_like(change), change)
+
+        try:
+            y = odeint(rate, y, torch.stack([begin, end]), method=method, rtol=rtol, atol=atol)[-1]
+        except AssertionError as problem:
+            raise ConfigError(
+                f"torchdiffeq {method} gave up at t = {float(begin):g} s ({problem or 'step too small'}): "
+                "loosen rtol and atol, or use solver=rk4"
+            ) from None
+        quaternion = y[..., 3:7] / torch.linalg.norm(y[..., 3:7], dim=-1, keepdim=True)
+        y = torch.cat([y[..., :3], quaternion, y[..., 7:]], dim=-1)
+        out.append(torch.where(lost.unsqueeze(-1), torch.full_like(y, torch.nan), y))
+        if lagging:
+            thrust = lagging[0].respond(entered, wanted, (end - begin).to(thrust)).end
+    run = torch.stack(out, dim=-2)
+    return run[..., :7], run[..., 7:]

@@ -1,0 +1,63 @@
+"""Thrusters: from commands to thrust, and from thrust to the wrench on the vehicle."""
+
+from __future__ import annotations
+
+import torch
+
+from auvnn.physics.products import cross
+from auvnn.shapes import Allocation, Knots, PerPart, Vectors3
+
+
+def allocation_matrix(positions: Vectors3, directions: Vectors3) -> Allocation:
+    """Return the matrix B from thrusts to the wrench: tau = B T, with columns b_i = [d_i ; r_i x d_i].
+
+    Args:
+        positions: of the thrusters in body axes, m (..., n, 3).
+        directions: of the force on the vehicle for a positive thrust, unit vectors (..., n, 3).
+
+    Returns:
+        (..., 6, n). Fossen 2011, section 12.3.
+    """
+    moments = cross(positions, directions)
+    return torch.cat((directions.expand_as(moments), moments), -1).mT
+
+
+def quadratic_thrust(command: PerPart, max_forward: PerPart, max_reverse: PerPart) -> PerPart:
+    """Return the thrust of the quadratic law: T = T_max c |c|, with another T_max in reverse.
+
+    Args:
+        command: in [-1, 1] (..., n); beyond it the law goes on, limits are the caller's.
+        max_forward: thrust at c = 1, N (n) or (..., n).
+        max_reverse: size of the thrust at c = -1, N (n) or (..., n), positive.
+
+    Returns:
+        (..., n), N. Fossen 2011, section 12.3 (T proportional to n |n|).
+    """
+    return torch.where(command > 0.0, max_forward, max_reverse) * (command.abs() * command)
+
+
+def table_thrust(command: PerPart, command_grid: Knots, thrust_grid: Knots) -> PerPart:
+    """Return the thrust of a table, linear between its points and held at its ends.
+
+    At a point of the table the slope is that of the piece to its right.
+
+    Args:
+        command: (..., n).
+        command_grid: rising commands of the table, (k) for all thrusters or (n, k) for each its own; k >= 2.
+        thrust_grid: thrust at these commands, N, of the same shape.
+
+    Returns:
+        (..., n), N.
+    """
+    c = torch.clamp(command, command_grid[..., 0], command_grid[..., -1])
+    piece = (c.unsqueeze(-1) >= command_grid[..., 1:-1]).sum(-1)
+    left, base = torch.broadcast_tensors(command_grid[..., :-1], thrust_grid[..., :-1])
+    pieces = torch.stack((left, base, (thrust_grid[..., 1:] - base) / (command_grid[..., 1:] - left)), -1)
+    if pieces.dim() == 2:
+        own = pieces[piece]
+    else:
+        rank = max(piece.dim() + 2, pieces.dim())
+        index = piece[(None,) * (rank - piece.dim() - 2)][..., None, None]
+        own = torch.take_along_dim(pieces[(None,) * (rank - pieces.dim())], index, -2).squeeze(-2)
+    start, low, slope = own.unbind(-1)
+    return low + slope * (c - start)

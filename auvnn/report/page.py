@@ -1,0 +1,215 @@
+"""What a page of any kind does: draw what can be drawn, say what cannot, and write it down whole."""
+
+from __future__ import annotations
+
+import functools
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from matplotlib.figure import Figure
+
+from auvnn.answers import write_text
+from auvnn.report import style
+from auvnn.report.html import Part, Picture, Table, figure_markup, render
+from auvnn.report.panels import NoData
+from auvnn.report.view import View
+
+T = TypeVar("T")
+MOST_SENTENCES = 6
+
+
+@dataclass(frozen=True)
+class Plot:
+    """One figure of a page, not drawn yet.
+
+    Args:
+        name: of the files; letters, digits and underscores.
+        title: what it is.
+        draw: draws it, or raises NoData with what is missing in words.
+        caption: what to see in it; a function is called after drawing.
+        folded: closed until it is opened.
+    """
+
+    name: str
+    title: str
+    draw: Callable[[], Figure]
+    caption: str | Callable[[], str]
+    folded: bool = False
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What became of the planned figures: drawn, as SVG where that was made, or missing for a reason."""
+
+    figures: dict[str, Figure] = field(default_factory=dict)
+    vectors: dict[str, str] = field(default_factory=dict)
+    reasons: dict[str, str] = field(default_factory=dict)
+
+
+class Page:
+    """Base of the pages: a kind overrides what it has to say, and inherits how it is written.
+
+    Whatever an answer lacks costs its own place on the page and nothing else; the page says so there.
+    """
+
+    kind = ""
+
+    def __init__(self, without: tuple[str, ...] = ()) -> None:
+        """Make the page; `without` names figures that are shown elsewhere."""
+        self.without = without
+
+    def title(self, view: View) -> str:
+        """Return the heading."""
+        return self.kind
+
+    def about(self, view: View) -> str:
+        """Return the line under the heading: which model, which log."""
+        return ""
+
+    def brief(self, view: View) -> list[str]:
+        """Return the verdict in plain words, three to six sentences, the most important first."""
+        return []
+
+    def warnings(self, view: View) -> list[str]:
+        """Return what a reader must keep in mind."""
+        return view.texts("warnings")
+
+    def plots(self, view: View) -> list[Plot]:
+        """Return the figures, the most telling first."""
+        return []
+
+    def tables(self, view: View) -> list[Table]:
+        """Return the tables."""
+        return []
+
+    def assumed(self, view: View) -> list[tuple[str, str]]:
+        """Return what was read and assumed, as name and value."""
+        return []
+
+    def story(self, view: View) -> list[str]:
+        """Return how it came about, line by line."""
+        return view.texts("story")
+
+    def parts(self, view: View) -> list[tuple[Page, Any]]:
+        """Return further pages with their answers, shown below this one."""
+        return []
+
+    def figures(self, answer: Any) -> dict[str, Figure]:
+        """Return the figures of an answer by name, the most telling first; never empty."""
+        drawn = draw(self.planned(View(answer)))
+        return drawn.figures or {"nothing": _blank("There is nothing to draw.", drawn.reasons)}
+
+    def page(self, answer: Any) -> str:
+        """Return the answer as one complete, self-contained HTML page."""
+        view = View(answer)
+        plots = self.planned(view)
+        return render(self.part(view, plots, draw(plots)))
+
+    def write(self, answer: Any, folder: str | Path) -> Path:
+        """Write `report.html` and `figures/*.png` and `*.svg` into a folder; return the page's path."""
+        folder, view = Path(folder), View(answer)
+        plots = self.planned(view)
+        drawn = draw(plots)
+        for name, figure in drawn.figures.items():
+            drawn.vectors[name] = style.svg(style.settle(figure))
+            _write_bytes(folder / "figures" / f"{name}.png", style.png(figure, dpi=300))
+            write_text(folder / "figures" / f"{name}.svg", drawn.vectors[name])
+        return write_text(folder / "report.html", render(self.part(view, plots, drawn)))
+
+    def planned(self, view: View) -> list[Plot]:
+        """Return the figures, or where they cannot be planned one that says why."""
+        try:
+            return [plot for plot in self.plots(view) if plot.name not in self.without]
+        except Exception as problem:
+            reason = f"the figures could not be prepared ({type(problem).__name__}: {problem})"
+            return [Plot("nothing", "Figures", functools.partial(_missing, reason), str)]
+
+    def part(self, view: View, plots: list[Plot], drawn: Drawn, prefix: str = "") -> Part:
+        """Return everything that the page shows, as the templates take it."""
+        notes: list[str] = []
+        safely = functools.partial(_safely, notes)
+        parts = []
+        for other, answer in safely("the parts of this report", lambda: self.parts(view), []):
+            inner = answer if isinstance(answer, View) else View(answer)
+            plans = other.planned(inner)
+            parts.append(other.part(inner, plans, draw(plans), prefix=f"{other.kind}-"))
+        return Part(
+            kind=self.kind,
+            title=safely("the title", lambda: self.title(view), self.kind),
+            about=safely("the subject", lambda: self.about(view), ""),
+            brief=safely("the verdict", lambda: self.brief(view), [])
+            or ["There is no verdict in this answer."],
+            warnings=safely("the warnings", lambda: self.warnings(view), []),
+            pictures=[_picture(plot, drawn, prefix, notes) for plot in plots],
+            tables=[t for t in safely("the tables", lambda: self.tables(view), []) if t.rows],
+            assumed=[(k, v) for k, v in safely("what was assumed", lambda: self.assumed(view), []) if v],
+            notes=notes,
+            story=safely("the story", lambda: self.story(view), []),
+            parts=parts,
+        )
+
+
+def _missing(reason: str) -> Figure:
+    raise NoData(reason)
+
+
+def draw(plots: list[Plot]) -> Drawn:
+    """Return the figures that could be drawn by name, and for the others why not."""
+    drawn = Drawn()
+    for plot in plots:
+        try:
+            drawn.figures[plot.name] = plot.draw()
+        except NoData as reason:
+            drawn.reasons[plot.name] = str(reason)
+        except Exception as problem:
+            # A page with a hole that says why is worth more than no page after an hour of computing.
+            drawn.reasons[plot.name] = f"it could not be drawn ({type(problem).__name__}: {problem})"
+    return drawn
+
+
+def _picture(plot: Plot, drawn: Drawn, prefix: str, notes: list[str]) -> Picture:
+    name = prefix + plot.name
+    figure = drawn.figures.get(plot.name)
+    if figure is None:
+        return Picture(name, plot.title, "", "", missing=drawn.reasons.get(plot.name, "it was not drawn"))
+    caption = plot.caption
+    if callable(caption):
+        caption = _safely(notes, f"the caption of '{plot.title}'", caption, "")
+    try:
+        markup = figure_markup(style.settle(figure), name, plot.title, drawn.vectors.get(plot.name))
+        return Picture(name, plot.title, caption, markup, folded=plot.folded)
+    except Exception as problem:
+        return Picture(name, plot.title, "", "", missing=f"it could not be drawn ({problem})")
+
+
+def _safely(notes: list[str], what: str, make: Callable[[], T], fallback: T) -> T:
+    try:
+        return make()
+    except Exception as problem:
+        notes.append(f"{what}: {type(problem).__name__}: {problem}")
+        return fallback
+
+
+def _blank(words: str, reasons: dict[str, str]) -> Figure:
+    figure = style.new_figure(style.COLUMN, 1.2)
+    reason = "; ".join(dict.fromkeys(reasons.values()))
+    figure.text(0.5, 0.5, f"{words}\n{reason[:80]}".replace("$", r"\$"), ha="center", va="center")
+    return figure
+
+
+def _write_bytes(path: Path, data: bytes) -> None:
+    """Write a file beside its place and move it there."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise

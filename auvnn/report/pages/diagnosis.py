@@ -1,0 +1,265 @@
+"""The page of `diagnose`: what is missing, how sure that is, and what could be confused with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from auvnn.report.html import Table
+from auvnn.report.page import Page, Plot
+from auvnn.report.pages import common
+from auvnn.report.panels import NoData
+from auvnn.report.plots.parameters import parameters
+from auvnn.report.plots.ranking import improvement, ranking
+from auvnn.report.plots.similarity import similarity
+from auvnn.report.view import View
+from auvnn.report.words import finite, listing, number, p_value, percent, plural
+
+
+class DiagnosisPage(Page):
+    """What a diagnosis says."""
+
+    kind = "diagnosis"
+
+    def title(self, view: View) -> str:
+        """Return the verdict as heading."""
+        missing, verdict = view.texts("missing"), view.text("verdict")
+        if verdict == "named" and missing:
+            return f"What is missing: {listing(missing)}"
+        return {
+            "ambiguous": f"What is missing: {listing(missing, 'or')}",
+            "unknown": "Something is missing, and nothing in the catalogue explains it",
+            "adequate": "Nothing is missing that this log could show",
+        }.get(verdict, "What is missing")
+
+    def about(self, view: View) -> str:
+        """Return model and log."""
+        return f"{view.text('model', 'a model')} on {view.text('log', 'a log')}"
+
+    def brief(self, view: View) -> list[str]:
+        """Return the verdict in plain words."""
+        verdict, missing = view.text("verdict"), view.texts("missing")
+        candidates = _candidates(view)
+        by_name = {str(c.get("effect")): c for c in candidates}
+        leading = [by_name[m] for m in missing if m in by_name]
+        left = finite(view.get("unexplained"))
+        out = [_first_sentence(verdict, missing)]
+        if verdict in ("named", "ambiguous"):
+            out += [_candidate_words(c) for c in leading[:3]]
+            out += _rival_words(candidates, missing)
+        if left is not None and verdict != "adequate":
+            out.append(
+                f"{percent(left)} of the residual's energy above the noise is explained by nothing in the "
+                f"catalogue."
+            )
+        if verdict in ("unknown", "adequate"):
+            out += _best_of_the_rest(candidates)
+        if verdict == "unknown":
+            out += _dependence_words(view.mapping("depends_on"))
+        after = view.mapping("next_experiment")
+        if after.get("words"):
+            out.append(f"Next: {str(after['words']).rstrip('.')}.")
+        elif verdict == "named":
+            out.append(
+                f"Next: auvnn add with effect={','.join(missing)} fits it and compares before and after."
+            )
+        return out
+
+    def plots(self, view: View) -> list[Plot]:
+        """Return the figures."""
+        candidates, missing = _candidates(view), view.texts("missing")
+        chosen = {
+            str(c.get("effect")): c["parameters"]
+            for c in candidates
+            if str(c.get("effect")) in missing and c.get("parameters")
+        }
+        return [
+            Plot(
+                "ranking",
+                "The candidates, best first",
+                lambda: ranking(candidates, missing),
+                lambda: _ranking_caption(candidates, missing),
+            ),
+            Plot("parameters", "What it would be", lambda: _parameters(chosen), common.INTERVALS),
+            Plot(
+                "similarity",
+                "What could be confused",
+                lambda: _similarity(view),
+                "How alike the marks are that two effects leave on this log: 1 means that the log cannot "
+                "tell "
+                "them apart, whatever the method. Framed pairs need another experiment.",
+            ),
+        ]
+
+    def tables(self, view: View) -> list[Table]:
+        """Return the tables."""
+        rows = []
+        for rank, c in enumerate(_candidates(view), 1):
+            alike = [
+                f"{o.get('effect')} ({number(o.get('similarity'), 2)})"
+                for o in c.get("confusable_with") or []
+            ]
+            cells = [percent(c.get("explained")), number(c.get("cv_before")), number(c.get("cv_after"))]
+            remark = f"not judged: needs {listing(c['needs'])}" if c.get("needs") else ", ".join(alike)
+            rows.append([str(c.get("effect")), remark, str(rank), p_value(c.get("p_value")), *cells])
+        steps = [
+            [str(i), str(s.get("verdict", "")), listing(map(str, s.get("effects") or [])) or "–"]
+            for i, s in enumerate(view.items("steps"), 1)
+        ]
+        fitted = {str(c.get("effect")): c["parameters"] for c in _candidates(view) if c.get("parameters")}
+        depends = [
+            [axis, *(percent(shares.get(channel)) for channel in _channels(view))]
+            for axis, shares in view.mapping("depends_on").items()
+            if isinstance(shares, Mapping)
+        ]
+        head = [
+            "effect",
+            "alike, or why not judged",
+            "rank",
+            "p",
+            "explained",
+            "cv error before",
+            "cv error after",
+        ]
+        caption = (
+            "p: how likely so large a gain would be if the effect were absent. cv error: on runs "
+            "that were not fitted."
+        )
+        return [
+            Table("Steps of the search", ["step", "verdict", "effects"], steps, words=3),
+            Table("All candidates", head, rows, caption, words=2),
+            Table("Parameters of every candidate", *_parameter_columns(fitted), folded=True, words=2),
+            Table(
+                "What the remaining residual depends on",
+                ["axis", *_channels(view)],
+                depends,
+                "Share of each residual that a smooth function of one measured input explains.",
+            ),
+        ]
+
+    def assumed(self, view: View) -> list[tuple[str, str]]:
+        """Return what was read and assumed."""
+        derivative = view.mapping("derivative")
+        band = finite(derivative.get("bandwidth_hz"))
+        method = str(derivative.get("method", ""))
+        return [
+            ("Model", view.text("model")),
+            ("Log", view.text("log")),
+            ("Accelerations", method + (f", bandwidth {number(band)} Hz" if band is not None else "")),
+            ("Coefficients", "the model's nominal coefficients count as uncertain by their stated amounts"),
+            ("Judged by", "cross-validation over the runs of this log; a test log was not looked at"),
+            ("Catalogue", plural(len(_candidates(view)), "effect")),
+        ]
+
+
+def _candidates(view: View) -> list[Mapping[str, Any]]:
+    return [c for c in view.items("candidates") if isinstance(c, Mapping)]
+
+
+def _channels(view: View) -> list[str]:
+    rows = [s for s in view.mapping("depends_on").values() if isinstance(s, Mapping)]
+    return list(dict.fromkeys(str(name) for row in rows for name in row))
+
+
+def _first_sentence(verdict: str, missing: list[str]) -> str:
+    several = len(missing) > 1
+    return {
+        "named": f"The model lacks {listing(missing)}.",
+        "ambiguous": f"The model lacks something, and this log cannot tell which: {listing(missing, 'or')}.",
+        "unknown": "The model lacks something that nothing in the catalogue explains.",
+        "adequate": "Nothing is missing that this log could show: what the model does not explain looks "
+        "like noise.",
+    }.get(verdict, f"The verdict is '{verdict}'" + (f": {listing(missing)}" if several else "") + ".")
+
+
+def _candidate_words(candidate: Mapping[str, Any]) -> str:
+    words = f"{candidate.get('effect')}"
+    if candidate.get("parameters"):
+        words += f" ({common.parameter_words(candidate['parameters'])})"
+    words += f" explains {percent(candidate.get('explained'))} of the residual above the noise"
+    fall, _ = improvement(candidate)
+    if fall is not None:
+        direction = "lowers" if fall > 0 else "raises"
+        words += f" and {direction} the error on runs that it was not fitted on by {percent(abs(fall))}"
+    return f"{words}; p = {p_value(candidate.get('p_value'))}.".replace("p = <", "p <")
+
+
+def _rival_words(candidates: list[Mapping[str, Any]], missing: list[str]) -> list[str]:
+    lead = next((c for c in candidates if str(c.get("effect")) in missing), None)
+    if lead is None:
+        return []
+    alike = [
+        str(o.get("effect")) for o in lead.get("confusable_with") or [] if str(o.get("effect")) not in missing
+    ]
+    out = [f"On this log it is hard to tell from {listing(alike)}."] if alike else []
+    rest = [c for c in candidates if str(c.get("effect")) not in missing and not c.get("needs")]
+    if rest and not alike:
+        out.append(
+            f"The next candidate, {rest[0].get('effect')}, explains {percent(rest[0].get('explained'))}."
+        )
+    return out
+
+
+def _best_of_the_rest(candidates: list[Mapping[str, Any]]) -> list[str]:
+    tried = [c for c in candidates if not c.get("needs")]
+    if not tried:
+        return ["No effect of the catalogue could be judged on this log."]
+    best = tried[0]
+    share, p = percent(best.get("explained")), p_value(best.get("p_value"))
+    return [
+        f"{plural(len(tried), 'effect')} of the catalogue {'was' if len(tried) == 1 else 'were'} tried; "
+        f"the best, "
+        f"{best.get('effect')}, would explain {share} of the residual above the noise (p = {p})."
+    ]
+
+
+def _dependence_words(depends: Mapping[str, Any]) -> list[str]:
+    shares = [
+        (share, axis, channel)
+        for axis, row in depends.items()
+        if isinstance(row, Mapping)
+        for channel, value in row.items()
+        if (share := finite(value)) is not None
+    ]
+    if not shares:
+        return []
+    share, axis, channel = max(shares)
+    return [
+        f"What remains depends most on {channel}, which explains {percent(share)} of the residual in {axis}."
+    ]
+
+
+def _ranking_caption(candidates: list[Mapping[str, Any]], missing: list[str]) -> str:
+    words = (
+        "Left: share of the residual's energy above the noise that each effect explains. Right: how far "
+        "the error falls "
+        "on runs that were not fitted; left of zero the effect harms."
+    )
+    if missing:
+        words += " Hatched and bold: what the verdict names."
+    if any(c.get("confusable_with") for c in candidates):
+        words += " Brackets join what this log can hardly tell apart."
+    return words
+
+
+def _parameters(chosen: Mapping[str, Any]) -> Figure:
+    if not chosen:
+        raise NoData("the verdict names no effect")
+    return parameters(chosen)
+
+
+def _similarity(view: View) -> Figure:
+    found = view.get("similarity")
+    if not isinstance(found, (list, tuple)) or len(found) != 2:
+        raise NoData("the answer holds no similarities")
+    return similarity([str(n) for n in found[0]], found[1])
+
+
+def _parameter_columns(fitted: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
+    table = common.parameter_table(fitted)
+    return table.head, table.rows
+
+
+PAGE = DiagnosisPage()

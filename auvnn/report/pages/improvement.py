@@ -1,0 +1,280 @@
+"""The page of `add`: the error before and after on data that nothing was fitted on."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from auvnn.report import style
+from auvnn.report.html import Table
+from auvnn.report.page import Page, Plot
+from auvnn.report.pages import common
+from auvnn.report.panels import NoData
+from auvnn.report.plots.before_after import before_after
+from auvnn.report.plots.error_against_horizon import error_against_horizon
+from auvnn.report.plots.error_over_time import error_over_time
+from auvnn.report.plots.parameters import parameters
+from auvnn.report.plots.waterfall import FLOOR, waterfall
+from auvnn.report.view import View
+from auvnn.report.words import finite, interval, listing, number, percent
+
+STAGES = {"before": "as given", "refitted": "refitted", "after": "after"}
+WHOLE_RUNS = 3
+
+
+class ImprovementPage(Page):
+    """What adding effects gained."""
+
+    kind = "improvement"
+
+    def title(self, view: View) -> str:
+        """Return the heading."""
+        return f"{listing(view.texts('effects')) or 'Effects'} added: before and after"
+
+    def about(self, view: View) -> str:
+        """Return model, log and what was held out."""
+        held = f", judged on {view.text('test')}" if view.text("test") else ""
+        return f"{view.text('model', 'a model')}, fitted on {view.text('log', 'a log')}{held}"
+
+    def brief(self, view: View) -> list[str]:
+        """Return the verdict in plain words."""
+        effects = listing(view.texts("effects")) or "the effects"
+        gain, steps = view.mapping("gain"), _steps(view)
+        fall, std = finite(gain.get("value")), finite(gain.get("std"))
+        words = f" by {interval(fall, std)}" if fall is not None else ""
+        accepted = view.get("accepted")
+        if accepted:
+            out = [
+                f"Adding {effects} lowers the 5 s error on held-out data{words}, more than its own "
+                f"uncertainty: accepted."
+            ]
+        elif fall is not None and fall <= 0:
+            out = [
+                f"Adding {effects} does not lower the 5 s error on held-out data (gain "
+                f"{interval(fall, std)}): not accepted."
+            ]
+        else:
+            out = [
+                f"Adding {effects} lowers the 5 s error on held-out data{words}, no more than chance "
+                f"could: not accepted."
+            ]
+        errors = {stage: _main_error(view, stage) for stage in STAGES}
+        if errors["before"] is not None and errors["after"] is not None:
+            refitted = errors["refitted"]
+            middle = (
+                f", {number(refitted, 2)} with its coefficients fitted again" if refitted is not None else ""
+            )
+            out.append(
+                f"The model as given errs by {number(errors['before'], 2)} of the spread of the "
+                f"motion{middle}, and "
+                f"{number(errors['after'], 2)} with {effects}."
+            )
+        out += _floor_words(steps, errors)
+        fitted = view.mapping("parameters")
+        if fitted:
+            values = [f"{e}: {common.parameter_words(m)}" for e, m in fitted.items() if m]
+            if values:
+                out.append(f"Fitted: {'; '.join(values)}.")
+        return out + _channel_words(view)
+
+    def plots(self, view: View) -> list[Plot]:
+        """Return the figures."""
+        series = common.arrays(view.items("series"))
+
+        @functools.cache
+        def part() -> dict[str, Any]:
+            return common.excerpt(series[common.worst_run(series, "before")], "before")
+
+        plots = [
+            Plot(
+                "before_after",
+                "Before and after, on a held-out run",
+                lambda: _runs(part(), whole=False),
+                lambda: _series_caption(part()),
+            ),
+            Plot(
+                "waterfall",
+                "From the model as given to the noise floor",
+                lambda: waterfall(_steps(view)),
+                lambda: _waterfall_caption(_steps(view)),
+            ),
+            Plot(
+                "error_against_horizon",
+                "Error against horizon",
+                lambda: _horizons(view),
+                "Error of free running on held-out data, averaged over the channels that move. The added "
+                "effect "
+                "is worth what lies between the refitted and the last line: refitting alone is not to its "
+                "credit.",
+            ),
+            Plot(
+                "parameters",
+                "What was fitted",
+                lambda: parameters(view.mapping("parameters"), view.get("truth")),
+                common.INTERVALS,
+            ),
+            Plot(
+                "error_over_time",
+                "What is left of the error",
+                lambda: _errors(part()),
+                "Model minus measurement over the same stretch. What still grows between two restarts is "
+                "not noise.",
+                folded=True,
+            ),
+        ]
+        for entry in series[:WHOLE_RUNS]:
+            title = f"The whole of held-out {common.run_words(entry, whole=True)}"
+            draw = functools.partial(_runs, entry, whole=True)
+            plots.append(Plot(common.run_file(entry), title, draw, common.THINNED, folded=True))
+        return plots
+
+    def tables(self, view: View) -> list[Table]:
+        """Return the tables."""
+        steps = [[str(s.get("step")), number(s.get("error"))] for s in _steps(view)]
+        return [
+            common.parameter_table(view.mapping("parameters")),
+            _stage_table(view, "rollout", "Free-running error over {} by channel", "nrmse"),
+            _stage_table(view, "one_step", "R² of the acceleration, one step ahead", "r2"),
+            Table("Error step by step", ["step", "error"], steps),
+        ]
+
+    def assumed(self, view: View) -> list[tuple[str, str]]:
+        """Return what was read and assumed."""
+        return [
+            ("Model", view.text("model")),
+            ("Fitted on", view.text("log")),
+            ("Held out", view.text("test")),
+            ("Effects", listing(view.texts("effects"))),
+            (
+                "Error",
+                "root mean square over free-running windows of 5 s, divided by the spread of each channel",
+            ),
+            (
+                "Gain",
+                "from the refitted model to the extended one; one standard deviation over windows and runs",
+            ),
+        ]
+
+
+def _steps(view: View) -> list[Mapping[str, Any]]:
+    return [s for s in view.items("waterfall") if isinstance(s, Mapping)]
+
+
+def _stage(view: View, stage: str, part: str) -> Mapping[str, Any]:
+    found = view.mapping(stage).get(part)
+    return found if isinstance(found, Mapping) else {}
+
+
+def _main_error(view: View, stage: str) -> float | None:
+    rollout = _stage(view, stage, "rollout")
+    return common.total(rollout, common.main_horizon(rollout))
+
+
+def _floor_words(steps: list[Mapping[str, Any]], errors: Mapping[str, float | None]) -> list[str]:
+    floor = next((finite(s.get("error")) for s in steps if s.get("step") == FLOOR), None)
+    start, end = errors["before"], errors["after"]
+    if floor is None or start is None or end is None or start <= floor:
+        return []
+    share = (start - end) / (start - floor)
+    return [
+        f"Sensor noise alone gives {number(floor, 2)}: {percent(share)} of what could be gained has been "
+        f"gained."
+    ]
+
+
+def _channel_words(view: View) -> list[str]:
+    falls = {}
+    for channel in common.CHANNELS:
+        pair = []
+        for stage in ("before", "after"):
+            rollout = _stage(view, stage, "rollout")
+            entry = (rollout.get(common.main_horizon(rollout) or "") or {}).get(channel) or {}
+            pair.append(finite(entry.get("nrmse")))
+        if pair[0] is not None and pair[1] is not None:
+            falls[channel] = pair
+    if not falls:
+        return []
+    best = max(falls, key=lambda c: falls[c][0] - falls[c][1])
+    worse = [common.channel_words(c) for c, (a, b) in falls.items() if b > 1.05 * a]
+    out = [
+        f"Most is gained in {common.channel_words(best)}, from {number(falls[best][0], 2)} to "
+        f"{number(falls[best][1], 2)}."
+    ]
+    if worse:
+        out.append(f"It has become worse in {listing(worse)}.")
+    return out
+
+
+def _runs(entry: Mapping[str, Any], whole: bool) -> Figure:
+    for name in ("measured", "before", "after"):
+        if entry.get(name) is None:
+            raise NoData(f"the answer holds no '{name}' over time")
+    title = f"held-out {common.run_words(entry, whole)}"
+    series = entry["t"], entry["measured"], entry["before"], entry["after"], entry.get("refitted")
+    return before_after(*series, title=title)
+
+
+def _errors(entry: Mapping[str, Any]) -> Figure:
+    models = {name: entry[stage] for stage, name in STAGES.items() if entry.get(stage) is not None}
+    title = f"held-out {common.run_words(entry, whole=False)}"
+    return error_over_time(entry["t"], entry["measured"], models, title=title, limit=1000)
+
+
+def _series_caption(entry: Mapping[str, Any]) -> str:
+    before = common.relative_errors(entry["measured"], entry["before"])
+    after = common.relative_errors(entry["measured"], entry["after"])
+    words = (
+        f"Held-out {common.run_words(entry, whole=False)}, the stretch in which the model as given errs "
+        f"most; free-running "
+        "windows of 5 s, restarted from the measured state. Each panel gives its rms error before and after."
+    )
+    fall = before - after
+    if np.isfinite(fall).any():
+        i = int(np.nanargmax(fall))
+        words += (
+            f" Look at {style.MOTIONS[i]}: {percent(before[i])} of its spread before, "
+            f"{percent(after[i])} after."
+        )
+    return words
+
+
+def _waterfall_caption(steps: list[Mapping[str, Any]]) -> str:
+    known = [(str(s.get("step")), e) for s in steps if (e := finite(s.get("error"))) is not None]
+    falls = [(a[1] - b[1], b[0]) for a, b in itertools.pairwise(known) if b[0] != FLOOR]
+    words = (
+        "Error on held-out data after each step (5 s free running, 1 is the spread of the motion); "
+        "hatched: what the step took off."
+    )
+    if falls and max(falls)[0] > 0:
+        words += f" The largest step is {max(falls)[1]}. Below the dashed line there is only sensor noise."
+    return words
+
+
+def _horizons(view: View) -> Figure:
+    rollouts = {name: _stage(view, stage, "rollout") for stage, name in STAGES.items()}
+    models = {name: common.over_horizons(rollout) for name, rollout in rollouts.items() if rollout}
+    return error_against_horizon(models, common.over_horizons(rollouts["as given"], "persistence"))
+
+
+def _stage_table(view: View, part: str, title: str, key: str) -> Table:
+    rows, horizon = [], None
+    for stage, name in STAGES.items():
+        found = _stage(view, stage, part)
+        if part == "rollout":
+            horizon = common.main_horizon(found) or horizon
+            found = found.get(horizon or "") or {}
+            cells = [(found.get(c) or {}).get(key) for c in common.CHANNELS] + [found.get("total")]
+        else:
+            cells = [(found.get(f"d{c}") or {}).get(key) for c in common.CHANNELS]
+        if any(finite(c) is not None for c in cells):
+            rows.append([name, *(number(c) for c in cells)])
+    title = title.format(common.horizon_words(horizon)) if horizon else title.replace(" over {}", "")
+    return Table(title, ["model", *common.CHANNELS, *(["total"] if part == "rollout" else [])], rows)
+
+
+PAGE = ImprovementPage()

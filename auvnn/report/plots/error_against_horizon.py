@@ -1,0 +1,88 @@
+"""Free-running error against the horizon, with persistence beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
+
+from auvnn.report import style
+from auvnn.report.panels import NoData
+from auvnn.report.words import finite, label
+
+
+@style.styled
+def error_against_horizon(
+    models: Mapping[str, Mapping[str, float | None]],
+    persistence: Mapping[str, float | None] | None = None,
+) -> Figure:
+    """Draw the error over the free-running horizon: one line per model, and that of holding the velocity.
+
+    Args:
+        models: name of the model to {horizon: total nrmse}; a horizon is seconds as text ("0.5", "5") or
+            "full" for whole runs, which stands apart on the right.
+        persistence: {horizon: total nrmse} of holding the initial velocity.
+
+    Raises:
+        NoData: no horizon has an error.
+    """
+    known = {h for m in models.values() for h, error in m.items() if finite(error) is not None}
+    horizons = sorted({s for h in known if (s := _seconds(h)) is not None})
+    full = "full" in known
+    if not known:
+        raise NoData("no horizon has an error")
+    end = (horizons[-1] if horizons else 1.0) * 2.2
+    figure = style.new_figure(style.COLUMN * 1.25, 2.7)
+    ax = figure.subplots()
+    looks = [style.BEFORE, style.AFTER, style.REFITTED]
+    names = {"as given": style.BEFORE, "refitted": style.REFITTED, "after": style.AFTER}
+    for i, (name, errors) in enumerate(models.items()):
+        _line(ax, errors, end, names.get(name) or looks[i % 3], name)
+    if persistence:
+        _line(ax, persistence, end, style.PERSISTENCE, "initial velocity held")
+    ax.axhline(1.0, color=style.FAINT, lw=0.6)
+    ax.annotate(
+        "as large as the motion itself",
+        (0.01, 1.0),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, 2),
+        textcoords="offset points",
+        fontsize=7,
+        color="#505050",
+    )
+    ax.set_xscale("log")
+    ticks = horizons + ([end] if full else [])
+    ax.xaxis.set_major_locator(FixedLocator(ticks))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.xaxis.set_minor_formatter(NullFormatter())
+    ax.set_xticks(ticks, [f"{h:g}" for h in horizons] + (["whole\nrun"] if full else []), linespacing=0.85)
+    ax.set_xlabel("free-running horizon (s)")
+    ax.set_ylabel("error / spread of the motion (nrmse)")
+    top = ax.get_ylim()[1]
+    ax.set_ylim(0, max(top, 1.15))
+    style.show_grid(ax, "y")
+    figure.legend(loc="outside upper center", ncols=2)
+    return figure
+
+
+def _seconds(horizon: str) -> float | None:
+    try:
+        value = float(horizon)
+    except (TypeError, ValueError):
+        return None
+    return value if value > 0 and np.isfinite(value) else None
+
+
+def _line(ax: Axes, errors: Mapping[str, float | None], end: float, look: style.Look, name: str) -> None:
+    known = {
+        s: v for h, e in errors.items() if (s := _seconds(h)) is not None and (v := finite(e)) is not None
+    }
+    seconds = sorted(known)
+    marks = {"color": look.color, "marker": look.marker, "mfc": "white", "mec": look.color, "mew": 0.9}
+    ax.plot(seconds, [known[s] for s in seconds], ls=look.dashes, lw=1.2, label=label(name), **marks)
+    whole = finite(errors.get("full"))
+    if whole is not None:
+        ax.plot([end], [whole], ls="none", **marks)

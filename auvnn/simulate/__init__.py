@@ -1,0 +1,7 @@
+"""Making logs: a model with effects hidden in it, an excitation, and what sensors make of the motion."""
+
+from auvnn.simulate.excitations import EXCITATIONS, Excitation, make_excitation
+from auvnn.simulate.noise import Noise, make_noise
+from auvnn.simulate.simulation import Simulation, simulate
+
+__all__ = ["EXCITATIONS", "Excitation", "Noise", "Simulation", "make_excitation", "make_noise", "simulate"]

@@ -1,0 +1,187 @@
+"""The plant in motion: free-running under given commands, or step by step under a controller."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from auvnn.effects import Sensed
+from auvnn.errors import AuvnnError
+from auvnn.models import GreyBox, Inputs, Trajectory
+from auvnn.models.rollout import LIMIT, steps_per_interval
+from auvnn.physics.attitude import quat_derivative, quat_to_matrix
+from auvnn.simulate.cruise import over_ground
+from auvnn.simulate.excitations import Controller, Plan
+
+Array = NDArray[np.float64]
+
+# What the sensors make of row k: position, quaternion and nu, reported and noisy.
+Look = Callable[[int, Sensed], tuple[Array, Array, Array]]
+
+
+def open_loop(plant: GreyBox, plan: Plan, voltage: Tensor | None, t: Tensor, max_step: float
+              ) -> tuple[Trajectory, Inputs]:  # fmt: skip
+    """Run the plant under the plan's commands.
+
+    Raises:
+        AuvnnError: it diverges.
+    """
+    assert plan.command is not None
+    fins = None if plan.fins is None else torch.tensor(plan.fins)
+    inputs = Inputs(torch.tensor(plan.command), fins, voltage)
+    run = plant.rollout(torch.tensor(plan.eta0), _first_velocity(plant, plan), inputs, t, max_step=max_step)
+    if run.divergences:
+        first = run.divergences[0]
+        raise diverged(plant, first.index, first.time, first.term)
+    return run, inputs
+
+
+def closed_loop(
+    plant: GreyBox, plan: Plan, controller: Controller, look: Look, voltage: Tensor | None, t: Tensor,
+    max_step: float,
+) -> tuple[Trajectory, Inputs]:  # fmt: skip
+    """Run the plant under a controller that sees only what the sensors report, all runs at once.
+
+    Each row: look, decide, hold the commands until the next row, as a sampled controller does.
+
+    Raises:
+        AuvnnError: it diverges.
+    """
+    stepper = Stepper(plant, torch.tensor(plan.eta0), _first_velocity(plant, plan), t, voltage, max_step)
+    for k in range(len(t)):
+        state = plant.sense(Sensed(stepper.position, stepper.quaternion, stepper.nu))
+        command, fins = controller(k, *look(k, state))
+        stepper.hold(torch.tensor(command), None if fins is None else torch.tensor(fins))
+    return stepper.trajectory(), stepper.inputs()
+
+
+class Stepper:
+    """Integrates a model row by row where the commands are not known beforehand; RK4 as in `rollout`.
+
+    Args:
+        model: the plant.
+        eta0: (R, 7).
+        nu0: (R, 6).
+        t: (T,), s.
+        voltage: (R, T), V, or None.
+        max_step: longest step of the integrator, s.
+    """
+
+    def __init__(
+        self, model: GreyBox, eta0: Tensor, nu0: Tensor, t: Tensor, voltage: Tensor | None, max_step: float
+    ) -> None:
+        """Begin at the first row."""
+        self.model, self.t, self.voltage = model, t, voltage
+        self.position, self.quaternion, self.nu = eta0[:, :3], eta0[:, 3:], nu0
+        self.prepared = None if model.time_varying else model.prepare()
+        self.substeps = steps_per_interval(t, max_step)
+        self.commands: list[Tensor] = []
+        self.fins: list[Tensor] = []
+        self.thrusts: list[Tensor] = []
+        self.etas: list[Tensor] = []
+        self.nus: list[Tensor] = []
+        self.lag = next(iter(model.using("respond")), None)
+        self.actual: Tensor | None = None
+
+    def hold(self, command: Tensor, fins: Tensor | None) -> None:
+        """Hold commands (R, n) and fin angles (R, m) from this row to the next, and move there."""
+        k = len(self.commands)
+        self.commands.append(command)
+        if fins is not None:
+            self.fins.append(fins)
+        self.etas.append(torch.cat([self.position, self.quaternion], dim=-1))
+        self.nus.append(self.nu)
+        demand = self._demand(k)
+        if self.actual is None:
+            self.actual = demand
+        row = Inputs(command, fins, None if self.voltage is None else self.voltage[:, k])
+        last = k == len(self.t) - 1
+        h = float(self.t[min(k + 1, len(self.t) - 1)] - self.t[min(k, len(self.t) - 2)]) / self.substeps
+        for part in range(self.substeps):
+            mean, slope = demand, None
+            if self.lag is not None:
+                answer = self.lag.respond(self.actual, demand, torch.full((1,), h, dtype=demand.dtype))
+                mean, slope, start = answer.mean, answer.slope, answer.start
+            else:
+                start = demand
+            if part == 0:
+                self.thrusts.append(start)
+            if last:
+                return
+            if self.lag is not None:
+                self.actual = answer.end
+            self._step(mean, slope, row, float(self.t[k]) + part * h, h)
+        self._check(k)
+
+    def _demand(self, k: int) -> Tensor:
+        command = self.commands[k]
+        if self.model.using("command"):
+            history = torch.stack(self.commands, dim=-2)
+            times = self.t[: k + 1].expand(history.shape[:-1])
+            for effect in self.model.using("command"):
+                history = effect.command(history, times)
+            command = history[..., k, :]
+        return self.model.actuators.static(command)
+
+    def _step(self, mean: Tensor, slope: Tensor | None, row: Inputs, begin: float, h: float) -> None:
+        start = (self.position, self.quaternion, self.nu)
+        rate: tuple[Tensor, ...] = ()
+        total: tuple[Tensor, ...] = ()
+        for c, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
+            p, q, v = start if not rate else [y + (c * h) * r for y, r in zip(start, rate, strict=True)]
+            rotation = quat_to_matrix(q)
+            thrust = mean if slope is None else mean + (c - 0.5) * slope
+            time = torch.full(v.shape[:-1], begin + c * h, dtype=v.dtype)
+            rate = (
+                (rotation @ v[:, :3].unsqueeze(-1)).squeeze(-1),
+                quat_derivative(q, v[:, 3:]),
+                self.model.nu_dot(p, rotation, v, thrust, row, time, self.prepared),
+            )
+            total = rate if not total else tuple(a + weight * b for a, b in zip(total, rate, strict=True))
+        self.position, q, self.nu = (y + (h / 6.0) * r for y, r in zip(start, total, strict=True))
+        self.quaternion = q / torch.linalg.vector_norm(q, dim=-1, keepdim=True)
+
+    def _check(self, k: int) -> None:
+        sound = (self.nu.abs().amax(dim=-1) < LIMIT) & torch.isfinite(self.quaternion).all(dim=-1)
+        if bool(sound.all()):
+            return
+        run = int(torch.nonzero(~sound)[0])
+        one = slice(run, run + 1)
+        eta = self.etas[k][one]
+        row = Inputs(
+            self.commands[k][one], self.fins[k][one] if self.fins else None,
+            None if self.voltage is None else self.voltage[one, k],
+        )  # fmt: skip
+        time = self.t[k].expand(1)
+        terms = self.model.wrenches(
+            eta[:, :3], quat_to_matrix(eta[:, 3:]), self.nus[k][one], self.thrusts[k][one], row, time
+        )
+        worst = max(terms, key=lambda n: float(terms[n].abs().max()))
+        raise diverged(self.model, run, float(self.t[k]), worst)
+
+    def inputs(self) -> Inputs:
+        """Return what was held, (R, T, ...)."""
+        fins = torch.stack(self.fins, dim=-2) if self.fins else None
+        return Inputs(torch.stack(self.commands, dim=-2), fins, self.voltage)
+
+    def trajectory(self) -> Trajectory:
+        """Return the motion so far."""
+        eta, nu, thrust = (torch.stack(x, dim=-2) for x in (self.etas, self.nus, self.thrusts))
+        return Trajectory(self.t, eta, nu, thrust)
+
+
+def _first_velocity(plant: GreyBox, plan: Plan) -> Tensor:
+    nu = torch.tensor(plan.nu0)
+    return over_ground(plant, torch.tensor(plan.eta0), nu) if plan.under_way else nu
+
+
+def diverged(plant: GreyBox, run: int, time: float, term: str) -> AuvnnError:
+    """Return the error that says where a run left what is physical."""
+    return AuvnnError(
+        f"simulating {plant.vehicle.name}: run {run} diverged after {time:g} s; the largest term was {term}. "
+        "Check its numbers"
+    )

@@ -1,0 +1,219 @@
+"""`simulate`: a log of a model with hidden effects, driven by an excitation, through noisy sensors."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from auvnn.effects import EFFECTS, Sensed
+from auvnn.errors import ConfigError
+from auvnn.logs import Log, Run
+from auvnn.models import GreyBox, Inputs, Trajectory
+from auvnn.physics.attitude import quat_to_matrix
+from auvnn.simulate.excitations import EXCITATIONS, Plan, make_excitation
+from auvnn.simulate.motion import closed_loop, open_loop
+from auvnn.simulate.noise import Draws, make_noise
+from auvnn.simulate.plant import as_hidden, drawn_factors, make_plant, typical_values
+
+Array = NDArray[np.float64]
+
+COEFFICIENTS = ("exact", "drawn")
+# Every kind of random number has a stream of its own: another noise must not change the manoeuvre.
+STREAMS = ("excitation", "noise", "hidden", "voltage", "added_mass", "linear_damping", "quadratic_damping",
+           "inertia")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A made log and the truth behind it.
+
+    Attributes:
+        log: what the sensors recorded.
+        truth: the content of `truth.json`.
+        plant: the model with everything hidden in it.
+        set_points: what a controller was told to follow, by name, (runs, samples) each; empty in open loop.
+    """
+
+    log: Log
+    truth: dict[str, Any]
+    plant: GreyBox
+    set_points: dict[str, Array] = field(default_factory=dict)
+
+
+def simulate(
+    model: GreyBox,
+    excitation: str | Mapping[str, Any] = "multisine",
+    noise: str | Mapping[str, Any] = "none",
+    hidden: Mapping[str, Mapping[str, float] | None] | Sequence[str] | str | None = None,
+    seed: int = 0,
+    *,
+    runs: int = 4,
+    duration: float = 60.0,
+    rate: float = 20.0,
+    coefficients: str = "exact",
+    accelerations: bool | None = None,
+    actuation: str | None = None,
+    max_step: float = 0.01,
+) -> Simulation:
+    """Make a log: the model with effects hidden in it, driven and measured.
+
+    Commands are held: row k acts from t_k until t_{k+1}. A logged acceleration is that just after row k's
+    command has begun to act.
+
+    Args:
+        model: what the user knows; excitation and controllers are designed with it.
+        excitation: `paper`, `multisine` or `survey`, or a mapping of its options with `name`.
+        noise: `none`, `paper` or `realistic`, or a mapping of its options.
+        hidden: effects that the log has and the model has not: parameters by name, or None for typical ones.
+        seed: of all random numbers; the same seed gives the same log.
+        runs: how many, numbered from 0; run i does not change when more are asked for.
+        duration: of each run, s.
+        rate: samples per second.
+        coefficients: `exact`, or `drawn`: the plant's added mass, damping and inertia differ from the model's
+            by factors 1 + N(0, stated uncertainty). A group that is itself hidden stays exact.
+        accelerations: whether to log them; by default as the noise condition says.
+        actuation: `thrusters` or `wrench`; by default the model's.
+        max_step: longest step of the integrator (RK4), s.
+
+    Returns:
+        Log, truth and plant.
+
+    Raises:
+        ConfigError: an option is unknown or out of range.
+        AuvnnError: the plant diverges; the message says when and by which term.
+    """
+    _check(seed, runs, duration, rate, coefficients, max_step)
+    manner = make_excitation(excitation, EXCITATIONS)
+    condition = make_noise(noise)
+    model = _actuated(model, actuation)
+    truth_hidden: dict[str, dict[str, float]] = {}
+    for name, values in as_hidden(hidden).items():
+        if values is None:
+            # Its own stream by its name: the order of the effects must not matter.
+            generator = _generator(seed, "hidden", zlib.crc32(name.encode()))
+            values = typical_values(EFFECTS.get(name).describe(model.vehicle, model.actuation), generator)
+        truth_hidden[name] = values
+    factors = {}
+    if coefficients == "drawn":
+        streams = {s: _generator(seed, s, 0) for s in STREAMS[4:]}
+        factors = drawn_factors(model.vehicle, list(truth_hidden), streams)
+    plant = make_plant(model, truth_hidden, factors)
+
+    t = np.arange(round(duration * rate) + 1) / rate
+    with torch.inference_mode():
+        plan = manner.plan(model, t, [_generator(seed, "excitation", i) for i in range(runs)])
+        draws = Draws(condition, len(t), [_generator(seed, "noise", i) for i in range(runs)])
+        voltage = _battery(model, t, [_generator(seed, "voltage", i) for i in range(runs)])
+        trajectory, inputs = _moved(plant, plan, draws, voltage, torch.tensor(t), max_step)
+        logged = condition.accelerations if accelerations is None else accelerations
+        sensed = _sensed(plant, trajectory, inputs, logged)
+        made = _runs(t, sensed, inputs, draws, model.actuation)
+    log = Log.from_runs(made, name=f"{model.vehicle.name}-{manner.name}-{seed}")
+    truth = {
+        "schema": "auvnn/truth/1",
+        "hidden": {e.name: e.values() for e in plant.copied_effects() if e.name in truth_hidden},
+        "noise": condition.name,
+        "seed": int(seed),
+        "model": model.vehicle.name,
+        "coefficients": factors,
+        "conditions": {
+            "excitation": {"name": manner.name, **vars(manner)},
+            "noise": condition.to_dict(),
+            "actuation": model.actuation,
+            "accelerations": logged,
+            "runs": runs,
+            "duration": float(duration),
+            "rate": float(rate),
+            "max_step": float(max_step),
+        },
+        "notes": list(plan.notes),
+    }
+    return Simulation(log, truth, plant, plan.set_points)
+
+
+def _check(seed: int, runs: int, duration: float, rate: float, coefficients: str, max_step: float) -> None:
+    for name, value, good in (
+        ("seed", seed, isinstance(seed, (int, np.integer)) and seed >= 0),
+        ("runs", runs, isinstance(runs, (int, np.integer)) and 1 <= runs <= 10_000),
+        ("rate", rate, 0 < rate <= 10_000),
+        ("max_step", max_step, 0 < max_step <= 1.0),
+    ):
+        if not good or isinstance(value, bool):
+            raise ConfigError(f"{name} = {value!r} is out of range: a positive number is needed")
+    if not 2.0 / rate <= duration <= 1e6 / rate:
+        raise ConfigError(f"duration = {duration}: choose {2 / rate:g} to {1e6 / rate:g} s at {rate:g} Hz")
+    if coefficients not in COEFFICIENTS:
+        raise ConfigError(f"coefficients = {coefficients!r}: choose from {', '.join(COEFFICIENTS)}")
+
+
+def _generator(seed: int, stream: str, index: int) -> np.random.Generator:
+    key = (STREAMS.index(stream), index)
+    return np.random.default_rng(np.random.SeedSequence(int(seed), spawn_key=key))
+
+
+def _actuated(model: GreyBox, actuation: str | None) -> GreyBox:
+    if actuation is None or actuation == model.actuation:
+        return model
+    effects = [type(e).build(model.vehicle, actuation, e.values()) for e in model.copied_effects()]
+    return GreyBox(model.vehicle, effects, model.damping, actuation)
+
+
+def _battery(model: GreyBox, t: Array, generators: Sequence[np.random.Generator]) -> Tensor | None:
+    """Return the voltage of a battery that falls by a tenth in ten minutes, (R, T), or None."""
+    reference = model.vehicle.reference_voltage
+    if reference is None:
+        return None
+    first = np.array([g.uniform(0.94, 1.04) for g in generators])
+    return torch.tensor(reference * (first[:, None] - 0.1 * t / 600.0))
+
+
+def _moved(
+    plant: GreyBox, plan: Plan, draws: Draws, voltage: Tensor | None, t: Tensor, max_step: float
+) -> tuple[Trajectory, Inputs]:
+    if plan.controller is None:
+        return open_loop(plant, plan, voltage, t, max_step)
+
+    def look(k: int, sensed: Sensed) -> tuple[Array, Array, Array]:
+        return (
+            draws.added("x", sensed.position.numpy(), k),
+            draws.turned(sensed.quaternion.numpy(), k),
+            draws.added("u", sensed.nu.numpy(), k),
+        )
+
+    return closed_loop(plant, plan, plan.controller, look, voltage, t, max_step)
+
+
+def _sensed(plant: GreyBox, run: Trajectory, inputs: Inputs, accelerations: bool) -> Sensed:
+    position, quaternion = run.eta[..., :3], run.eta[..., 3:]
+    rate = None
+    if accelerations:
+        times = run.times.expand(run.nu.shape[:-1])
+        rate = plant.nu_dot(position, quat_to_matrix(quaternion), run.nu, run.thrust, inputs, times)
+    return plant.sense(Sensed(position, quaternion, run.nu, rate))
+
+
+def _runs(t: Array, sensed: Sensed, inputs: Inputs, draws: Draws, actuation: str) -> list[Run]:
+    position, nu = draws.added("x", sensed.position.numpy()), draws.added("u", sensed.nu.numpy())
+    quaternion = draws.turned(sensed.quaternion.numpy())
+    rate = None if sensed.nu_dot is None else draws.added("du", sensed.nu_dot.numpy())
+    voltage = None
+    if inputs.voltage is not None:
+        voltage = draws.added("voltage", inputs.voltage.numpy()[..., None])[..., 0]
+    command = inputs.command.numpy()
+    return [
+        Run(
+            number=i, t=t, quaternion=quaternion[i], nu=nu[i], nu_dot=None if rate is None else rate[i],
+            position=position[i], fins=None if inputs.fins is None else inputs.fins[i].numpy(),
+            wrench=command[i] if actuation == "wrench" else None,
+            thrusters=command[i] if actuation == "thrusters" else None,
+            voltage=None if voltage is None else voltage[i],
+        )
+        for i in range(len(nu))
+    ]  # fmt: skip

@@ -1,0 +1,328 @@
+"""Folders that are whole and intact or refused: files and a manifest of their SHA-256, moved into place."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from auvnn.errors import InputError, ModelError
+
+MANIFEST = "manifest.json"
+SCHEMA = "auvnn/folder/1"
+MOST_BYTES = 2 * 1024**3
+# Only formats that cannot run code when they are read.
+SUFFIXES = (
+    ".safetensors",
+    ".json",
+    ".yaml",
+    ".yml",
+    ".md",
+    ".txt",
+    ".csv",
+    ".parquet",
+    ".html",
+    ".png",
+    ".svg",
+)
+CODE_SUFFIXES = (".pt", ".pth", ".pkl", ".pickle", ".ckpt", ".joblib", ".npy", ".npz", ".bin")
+
+
+def write_folder(
+    path: str | Path,
+    files: Mapping[str, bytes | str],
+    overwrite: bool = False,
+    *,
+    schema: str = SCHEMA,
+) -> Path:
+    """Write files and their manifest into a new folder that appears whole or not at all.
+
+    The files are written into a hidden folder beside `path`, flushed to the disk, and moved into place. A
+    folder that is replaced is kept beside it under a hidden name until the new one stands, and is what
+    `read_folder` reads if the program was killed between the two.
+
+    Args:
+        path: the folder to make; its parents are made too.
+        files: plain file names and their content; text is written as UTF-8.
+        overwrite: replace an existing folder of this kind. One that holds anything else is never replaced.
+        schema: kind and version that the manifest states, "kind/number".
+
+    Returns:
+        The folder's path.
+
+    Raises:
+        InputError: the folder exists and is not empty, or a name is not a plain file name.
+    """
+    path = Path(path)
+    for name in files:
+        _check_name(name, path)
+    if MANIFEST in files:
+        raise InputError(f"{path}: '{MANIFEST}' is written by itself: leave it out")
+    content = {name: data.encode() if isinstance(data, str) else bytes(data) for name, data in files.items()}
+    listing = {n: {"sha256": hashlib.sha256(d).hexdigest(), "bytes": len(d)} for n, d in content.items()}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    _restore_previous(path)
+    _check_target(path, overwrite)
+    staged = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}.", suffix=".partial"))
+    try:
+        for name, data in content.items():
+            _write_flushed(staged / name, data)
+        manifest = json.dumps({"schema": schema, "files": listing}, indent=1, sort_keys=True)
+        _write_flushed(staged / MANIFEST, manifest.encode())
+        staged.chmod(0o755)
+        _flush_folder(staged)
+        previous = _previous(path)
+        if path.is_dir():
+            if any(path.iterdir()):
+                os.replace(path, previous)
+            else:
+                path.rmdir()
+        os.replace(staged, path)
+        _flush_folder(path.parent)
+    except BaseException:
+        shutil.rmtree(staged, ignore_errors=True)
+        _restore_previous(path)
+        raise
+    shutil.rmtree(_previous(path), ignore_errors=True)
+    return path
+
+
+def folder_exists(path: str | Path) -> bool:
+    """Return whether `read_folder` has something to read, a replacement that was cut short included."""
+    path = Path(path)
+    return path.is_dir() or (not path.exists() and _previous(path).is_dir())
+
+
+def read_folder(path: str | Path, *, schema: str = SCHEMA) -> dict[str, bytes]:
+    """Read a folder that `write_folder` wrote, after checking every file against the manifest.
+
+    Args:
+        path: the folder.
+        schema: kind and newest version that the caller understands.
+
+    Returns:
+        File names and contents, the manifest left out. Files that the manifest does not name are not read.
+
+    Raises:
+        InputError: there is no such folder.
+        ModelError: it is of another kind, newer, incomplete or damaged, or names a file that could run code.
+    """
+    path = Path(path)
+    if not path.exists() and _previous(path).is_dir():
+        path = _previous(path)
+    if not path.exists():
+        raise InputError(f"{path}: there is no such folder")
+    if not path.is_dir():
+        _refuse_file(path)
+    manifest = _read_manifest(path, schema)
+    content: dict[str, bytes] = {}
+    wrong: list[str] = []
+    for name, entry in manifest.items():
+        file = path / name
+        if not file.is_file():
+            wrong.append(f"{name} is missing")
+            continue
+        size = file.stat().st_size
+        if size != entry["bytes"]:
+            wrong.append(f"{name} has {size} bytes instead of {entry['bytes']}")
+            continue
+        data = file.read_bytes()
+        if hashlib.sha256(data).hexdigest() != entry["sha256"]:
+            wrong.append(f"{name} was changed or damaged after it was saved (its SHA-256 differs)")
+            continue
+        content[name] = data
+    if wrong:
+        raise ModelError(f"{path}: {'; '.join(wrong)}: restore the folder from a copy, or make it again")
+    return content
+
+
+def tensors_to_bytes(tensors: Mapping[str, Tensor], *, finite: bool = True) -> bytes:
+    """Return named tensors as safetensors bytes.
+
+    Args:
+        tensors: names and tensors.
+        finite: refuse NaN and infinity.
+
+    Raises:
+        ModelError: a tensor is not finite.
+    """
+    from safetensors.torch import save
+
+    bad = [name for name, tensor in tensors.items() if finite and not _is_finite(tensor)]
+    if bad:
+        raise ModelError(
+            f"weights are NaN or infinite in {', '.join(bad)}: not saved; train again from the last good"
+        )
+    return save({name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()})
+
+
+def tensors_from_bytes(
+    data: bytes,
+    expected: Mapping[str, tuple[tuple[int, ...], torch.dtype]] | None = None,
+    *,
+    where: str = "weights",
+    finite: bool = True,
+) -> dict[str, Tensor]:
+    """Return the named tensors in safetensors bytes, after checking them.
+
+    Args:
+        data: the bytes of a safetensors file.
+        expected: name to (shape, dtype) of exactly the tensors that must be there; None takes any.
+        where: what is read, for messages.
+        finite: refuse NaN and infinity.
+
+    Raises:
+        ModelError: not safetensors, or tensors missing, extra, of another shape or dtype, or not finite; the
+            message lists every difference.
+    """
+    from safetensors import SafetensorError
+    from safetensors.torch import load
+
+    if data[:1] == b"\x80" or data[:2] == b"PK":
+        raise ModelError(
+            f"{where}: this is a pickle or a zip archive, not safetensors: auvnn does not open those"
+        )
+    try:
+        tensors = load(data)
+    except (SafetensorError, KeyError, ValueError, RuntimeError) as error:
+        raise ModelError(f"{where}: not a readable safetensors file ({error}): make it again") from error
+    wrong = [] if expected is None else _differences(tensors, expected)
+    if finite:
+        wrong += [
+            f"{name} holds NaN or infinity" for name, tensor in tensors.items() if not _is_finite(tensor)
+        ]
+    if wrong:
+        raise ModelError(f"{where}: {'; '.join(wrong)}")
+    return tensors
+
+
+def _differences(
+    tensors: Mapping[str, Tensor], expected: Mapping[str, tuple[tuple[int, ...], torch.dtype]]
+) -> list[str]:
+    wrong = [f"{name} is missing" for name in expected if name not in tensors]
+    wrong += [f"{name} is not known here" for name in tensors if name not in expected]
+    for name, (shape, dtype) in expected.items():
+        if name in tensors and tuple(tensors[name].shape) != tuple(shape):
+            wrong.append(f"{name} has shape {tuple(tensors[name].shape)} instead of {tuple(shape)}")
+        if name in tensors and tensors[name].dtype != dtype:
+            wrong.append(f"{name} is {tensors[name].dtype} instead of {dtype}")
+    return wrong
+
+
+def _is_finite(tensor: Tensor) -> bool:
+    return not tensor.is_floating_point() or bool(torch.isfinite(tensor).all())
+
+
+def _check_name(name: str, path: Path) -> None:
+    plain = name not in ("", ".", "..") and not any(c in name for c in "/\\:\0") and not name.startswith(".")
+    if not plain:
+        raise InputError(f"{path}: '{name}' is not a plain file name")
+    if Path(name).suffix.lower() not in SUFFIXES:
+        raise InputError(f"{path}: '{name}': files in this folder end in {' '.join(SUFFIXES)}")
+
+
+def _check_target(path: Path, overwrite: bool) -> None:
+    if not path.exists():
+        return
+    if not path.is_dir():
+        raise InputError(f"{path}: a file of this name is in the way: choose another name")
+    present = {file.name for file in path.iterdir()}
+    if not present:
+        return
+    if not overwrite:
+        raise InputError(f"{path}: the folder is not empty: choose another, or say overwrite=true")
+    try:
+        known = {MANIFEST, *json.loads((path / MANIFEST).read_bytes())["files"]}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"{path}: not replaced, because it was not written by auvnn: choose another"
+        ) from error
+    foreign = sorted(present - known)
+    if foreign:
+        raise InputError(
+            f"{path}: not replaced, because it also holds {', '.join(foreign[:5])}: move them away"
+        )
+
+
+def _read_manifest(path: Path, schema: str) -> dict[str, Any]:
+    file = path / MANIFEST
+    if not file.is_file():
+        raise ModelError(
+            f"{path}: there is no {MANIFEST}: this is not a folder that auvnn saved, or not all of it"
+        )
+    if file.stat().st_size > 1_000_000:
+        raise ModelError(f"{file}: larger than a manifest can be: restore the folder from a copy")
+    try:
+        manifest = json.loads(file.read_bytes())
+        found, files = manifest["schema"], dict(manifest["files"])
+        kind, version = found.rsplit("/", 1)
+        number = int(version)
+        entries = {n: {"sha256": str(e["sha256"]), "bytes": int(e["bytes"])} for n, e in files.items()}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise ModelError(f"{file}: damaged, it cannot be read: restore the folder from a copy") from error
+    own_kind, own_version = schema.rsplit("/", 1)
+    if kind != own_kind:
+        raise ModelError(f"{path}: holds '{found}', but '{own_kind}' is wanted here")
+    if not 1 <= number <= int(own_version):
+        raise ModelError(f"{path}: written as '{found}', this auvnn reads up to '{schema}': upgrade auvnn")
+    for name, entry in entries.items():
+        if Path(name).suffix.lower() in CODE_SUFFIXES:
+            raise ModelError(f"{path}: names '{name}', a format that can run code when it is read: refused")
+        try:
+            _check_name(name, path)
+        except InputError as error:
+            raise ModelError(str(error)) from error
+        if not 0 <= entry["bytes"] <= MOST_BYTES:
+            raise ModelError(
+                f"{path}: '{name}' claims {entry['bytes']} bytes, more than is sensible: refused"
+            )
+    return entries
+
+
+def _refuse_file(path: Path) -> None:
+    if path.suffix.lower() in (*CODE_SUFFIXES, ".zip", ".tar", ".gz"):
+        raise ModelError(
+            f"{path}: auvnn opens no pickles and no archives, which can run code: "
+            "give a folder that auvnn saved"
+        )
+    raise ModelError(f"{path}: this is a file: give a folder that auvnn saved")
+
+
+def _previous(path: Path) -> Path:
+    return path.parent / f".{path.name}.previous"
+
+
+def _restore_previous(path: Path) -> None:
+    """Put back what a killed replacement had moved aside."""
+    previous = _previous(path)
+    if not previous.is_dir():
+        return
+    if path.exists():
+        shutil.rmtree(previous, ignore_errors=True)
+    else:
+        os.replace(previous, path)
+
+
+def _write_flushed(path: Path, data: bytes) -> None:
+    with open(path, "wb") as stream:
+        stream.write(data)
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
+def _flush_folder(path: Path) -> None:
+    if os.name == "nt":  # folders cannot be opened for flushing there
+        return
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,0 +1,1 @@
+"""Studies: the hidden-effect demo and benchmark."""

@@ -1,0 +1,98 @@
+"""Hidden effects of a stated size: so many standard errors of a fit that knows everything else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from auvnn.catalogue import unknown_name
+from auvnn.diagnosis.diagnose import windows_for
+from auvnn.diagnosis.nuisance import lay_out, stated
+from auvnn.errors import ConfigError
+from auvnn.logs import Log
+from auvnn.metrics.free_run import initial_states, moved
+from auvnn.models import GreyBox
+from auvnn.simulate import simulate
+from auvnn.training.prediction_error import answers, reduce
+
+Array = NDArray[np.float64]
+
+SIZES = {"small": 5.0, "medium": 10.0, "large": 30.0}
+# A coefficient is missing only where it is off by more than was stated of it, so its size counts those amounts
+# too: the factor's logarithm is so many times the stated relative uncertainty. Ours, not the literature's.
+BEYOND = {"small": 2.5, "medium": 4.0, "large": 6.0}
+
+
+def oracle_information(model: GreyBox, log: Log, name: str, sigma: Array) -> Array:
+    """Return the information (p, p) that a log holds on one effect when everything else is known.
+
+    The initial state of each window is not known; noise has the given standard deviations (18,).
+    """
+    layout = lay_out(model, [name])
+    windows = windows_for(model, log)
+    states = initial_states(layout.model, windows)
+    for _ in range(2):
+        sums, change, _ = reduce(windows, answers(layout.model, windows, states, [name]), sigma)
+        states = moved(states, torch.as_tensor(change))
+    return sums.hessian.sum(0)
+
+
+def sized(
+    model: GreyBox,
+    effect: str,
+    size: str,
+    *,
+    excitation: str | Mapping[str, Any] = "multisine",
+    noise: str | Mapping[str, Any] = "realistic",
+    seed: int = 0,
+    runs: int = 4,
+    duration: float = 60.0,
+    rate: float = 20.0,
+) -> dict[str, float]:
+    """Return parameters of an effect in a random direction and of a stated size.
+
+    Directions are drawn in units of the parameters' plausible scales. The size is the Mahalanobis distance
+    from the null under the oracle's information, always for realistic noise, so that a noise-free log hides
+    the same effects as a noisy one.
+
+    Args:
+        model: what the user knows.
+        effect: name.
+        size: small, medium or large: 5, 10 or 30 standard errors.
+        excitation: as in `simulate`.
+        noise: not used for the size; taken so that the same options serve both.
+        seed: of direction and manoeuvre.
+        runs: of the log.
+        duration: of each run, s.
+        rate: samples per second.
+
+    Raises:
+        ConfigError: an unknown size or effect, or one that the manoeuvre says nothing about.
+    """
+    del noise
+    if size not in SIZES:
+        raise ConfigError(unknown_name("size", size, SIZES))
+    layout = lay_out(model, [effect])
+    described = layout.model.effect(effect).parameters_of
+    scale = np.array([p.scale for p in described])
+    generator = np.random.default_rng(np.random.SeedSequence(int(seed), spawn_key=(101,)))
+    direction = generator.normal(size=len(described))
+    direction = np.where([p.low == p.null for p in described], np.abs(direction), direction)
+    uncertain = stated(model)
+    if effect in uncertain:
+        direction = np.clip(direction / np.sqrt(np.mean(direction**2)), -1.5, 1.5)
+        factors = np.exp(BEYOND[size] * uncertain[effect] * direction)
+        return {p.name: float(f) for p, f in zip(described, factors, strict=True)}
+    made = simulate(model, excitation, "realistic", None, seed, runs=runs, duration=duration, rate=rate)
+    sigma = np.array([0.05, 0.05, 0.01, 0.003, 0.003, 0.008] + [0.006] * 3 + [0.003] * 3 + [np.inf] * 6)
+    information = oracle_information(model, made.log, effect, sigma)
+    step = direction * scale
+    distance = float(np.sqrt(step @ information @ step))
+    if not distance > 1e-9:
+        raise ConfigError(f"{effect} leaves no trace on {model.vehicle.name} under this excitation: choose another")
+    values = np.array([p.null for p in described]) + step * (SIZES[size] / distance)
+    return {p.name: float(np.clip(v, p.low, p.high)) for p, v in zip(described, values, strict=True)}

@@ -1,0 +1,308 @@
+"""What every physical effect promises, as functions of its class; by default on a vehicle with everything."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.func import functional_call, jacfwd, jacrev, vmap
+
+from auvnn.effects import Effect
+from auvnn.effects.base import HOOKS
+from auvnn.errors import ConfigError
+from auvnn.models import GreyBox
+from auvnn.testing.scene import (
+    EXAMPLE,
+    Predictor,
+    Scene,
+    make_scene,
+    require,
+    require_close,
+    together,
+    typical_values,
+)
+from auvnn.testing.units import Units, powers
+from auvnn.vehicle import Vehicle
+
+THETA = "model.effects.0.theta"
+Kind = type[Effect]
+
+
+def _built(kind: Kind, vehicle: Vehicle, actuation: str, share: float = 0.4) -> Predictor:
+    values = typical_values(kind, vehicle, actuation, share)
+    return Predictor(GreyBox(vehicle, [kind.build(vehicle, actuation, values)], actuation=actuation))
+
+
+def _function(model: Predictor, scene: Scene) -> tuple[Callable[[Tensor], Tensor], Tensor]:
+    """Return all outputs as a function of the effect's parameters, and the parameters."""
+
+    def outputs(theta: Tensor) -> Tensor:
+        return together(functional_call(model, {THETA: theta}, (scene,))).flatten()
+
+    return outputs, model.get_parameter(THETA).detach().clone()
+
+
+def describes_itself(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
+    """Check that cause, symbol, reference, units, scales and bounds are stated and make sense."""
+    name = getattr(kind, "name", "")
+    require(
+        bool(name) and name.isidentifier() and name == name.lower(),
+        f"name {name!r} is no lower-case identifier",
+    )
+    for what in ("cause", "symbol", "reference"):
+        text = getattr(kind, what, "")
+        require(bool(text.strip()) and "\n" not in text, f"{name}: {what} is not stated in one line")
+    for what in ("channels", "excludes"):
+        value = getattr(kind, what)
+        require(
+            isinstance(value, tuple) and all(isinstance(v, str) for v in value), f"{name}: {what} is no tuple"
+        )
+    require(bool(kind.hooks()), f"{name} overrides none of the hooks {', '.join(HOOKS)}")
+    described = kind.describe(vehicle, actuation)
+    require(bool(described), f"{name} has no parameters")
+    names = [p.name for p in described]
+    require(
+        len(set(names)) == len(names) and all(n.isidentifier() for n in names), f"{name}: parameters {names}"
+    )
+    for p in described:
+        powers(p.unit)
+        where = f"{name}.{p.name}"
+        require(math.isfinite(p.scale) and p.scale > 0, f"{where}: scale {p.scale} is not positive")
+        require(p.low <= p.null <= p.high and p.low < p.high, f"{where}: not {p.low} <= {p.null} <= {p.high}")
+        require(all(p.low <= x <= p.high for x in p.probes), f"{where}: a probe is out of bounds")
+    built = kind.build(vehicle, actuation)
+    require(built.values() == {p.name: p.null for p in described}, f"{name} does not start at its null")
+    values = typical_values(kind, vehicle, actuation)
+    require(kind.build(vehicle, actuation, values).values() == values, f"{name} does not keep its values")
+
+
+def refuses(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
+    """Check that unknown parameters and values that are out of bounds or no numbers are refused."""
+    for p in kind.describe(vehicle, actuation):
+        beyond = 1e-3 * (p.high - p.low)
+        wrong: list[Any] = [p.low - beyond, p.high + beyond, math.nan, math.inf, "1", True]
+        for value in wrong:
+            try:
+                kind.build(vehicle, actuation, {p.name: value})
+            except ConfigError as error:
+                require(p.name in str(error) and "\n" not in str(error), f"{kind.name}: unclear: {error}")
+            else:
+                raise AssertionError(f"{kind.name}.{p.name} = {value!r} was accepted")
+    try:
+        kind.build(vehicle, actuation, {"no_such_parameter": 1.0})
+    except ConfigError as error:
+        require("no_such_parameter" in str(error), f"{kind.name}: unclear: {error}")
+    else:
+        raise AssertionError(f"{kind.name} accepted an unknown parameter")
+
+
+def vanishes(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
+    """Check that at the null nothing changes, to rounding: acceleration, free run and sensors."""
+    scene = make_scene(vehicle, actuation)
+    plain = Predictor(GreyBox(vehicle, actuation=actuation))
+    null = Predictor(GreyBox(vehicle, [kind.build(vehicle, actuation)], actuation=actuation))
+    with torch.no_grad():
+        expected, found = plain(scene), null(scene)
+    for output, value in expected.items():
+        for a, b in zip(found[output].flatten(0, -2), value.flatten(0, -2), strict=True):
+            require_close(a, b, 1e-15, f"{kind.name} at its null changes {output}")
+
+
+def batches(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
+    """Check that a batch gives what its members give one by one."""
+    model, scene = _built(kind, vehicle, actuation), make_scene(vehicle, actuation, runs=3)
+    with torch.no_grad():
+        whole = together(model(scene))
+        for index in range(3):
+            require_close(
+                together(model(scene.part(index))), whole[index], 1e-12, f"{kind.name}: run {index} alone"
+            )
+
+
+def follows_precision(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
+    """Check that single precision stays single, is close to double, and that gradients have it too."""
+    model, scene = _built(kind, vehicle, actuation), make_scene(vehicle, actuation)
+    exact = together(model(scene))
+    require(exact.dtype == torch.float64, f"{kind.name}: double precision became {exact.dtype}")
+    single = _built(kind, vehicle, actuation).to(torch.float32)
+    for times in (scene.times, scene.times.float()):
+        rounded = scene.change(lambda x: x.float())
+        outputs = single(Scene(rounded.eta, rounded.nu, rounded.inputs, times, scene.warmup))
+        for name, value in outputs.items():
+            require(value.dtype == torch.float32, f"{kind.name}: {name} became {value.dtype}")
+        require_close(together(outputs), exact, 1e-3, f"{kind.name} in single precision")
+    together(outputs).square().sum().backward()
+    slope = single.get_parameter(THETA).grad
+    require(slope is not None and slope.dtype == torch.float32, f"{kind.name}: gradient in single precision")
+
+
+def follows_device(
+    kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters", device: str = "meta"
+) -> None:
+    """Check that no tensor is left on another device; "meta" needs no hardware."""
+    model = _built(kind, vehicle, actuation).to(device)
+    scene = make_scene(vehicle, actuation).change(lambda x: x.to(device))
+    effect, row = model.model.effect(kind.name), scene.inputs.each()[0]
+    rate = model.model(
+        scene.eta,
+        scene.nu,
+        row.command,
+        time=scene.times[0],
+        fins=row.fins,
+        voltage=row.voltage,
+        altitude=row.altitude,
+    )
+    answer = effect.respond(row.command, row.command, scene.times[:1])
+    command = effect.command(scene.inputs.command, scene.times.expand(scene.inputs.command.shape[:-1]))
+    for tensor in (rate, answer.end, answer.mean, answer.slope, answer.start, command):
+        require(
+            tensor.device.type == device, f"{kind.name} gives a result on {tensor.device} instead of {device}"
+        )
+
+
+def has_right_gradient(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
+    """Check the derivatives in the parameters: `gradcheck` in reverse, central differences in forward mode."""
+    model, scene = _built(kind, vehicle, actuation), make_scene(vehicle, actuation, runs=2, rows=2, warmup=1)
+    outputs, theta = _function(model, scene)
+    mix = torch.randn(
+        4, outputs(theta).numel(), generator=torch.Generator().manual_seed(1), dtype=torch.float64
+    )
+    torch.autograd.gradcheck(
+        lambda x: mix @ outputs(x), (theta.requires_grad_(),), eps=1e-6, rtol=1e-5, atol=1e-7
+    )
+    theta = theta.detach()
+    slope = jacfwd(outputs)(theta)
+    for i, p in enumerate(model.model.effect(kind.name).parameters_of):
+        step = torch.zeros_like(theta)
+        step[i] = 1e-4 * p.scale
+        with torch.no_grad():
+            difference = (outputs(theta + step) - outputs(theta - step)) / (2 * step[i])
+        require_close(slope[:, i], difference, 1e-5, f"{kind.name}.{p.name}: derivative")
+        moved = float((slope[:, i] * p.scale).abs().max())
+        require(moved > 1e-9, f"{kind.name}.{p.name} moves nothing that the model predicts")
+
+
+def transforms(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
+    """Check that `torch.func` sees through it, as the diagnosis needs: jacrev = jacfwd, vmap = loop."""
+    model, scene = _built(kind, vehicle, actuation), make_scene(vehicle, actuation, runs=2, rows=2, warmup=1)
+    outputs, theta = _function(model, scene)
+    require_close(
+        jacrev(outputs)(theta), jacfwd(outputs)(theta), 1e-10, f"{kind.name}: jacrev against jacfwd"
+    )
+    null = torch.tensor([p.null for p in model.model.effect(kind.name).parameters_of], dtype=theta.dtype)
+    require(
+        bool(torch.isfinite(jacfwd(outputs)(null)).all()),
+        f"{kind.name}: derivative at the null is not finite",
+    )
+    several = torch.stack([null, theta, 0.5 * (null + theta)])
+    with torch.no_grad():
+        looped = torch.stack([outputs(t) for t in several])
+    require_close(vmap(outputs)(several), looped, 1e-12, f"{kind.name}: vmap against a loop")
+
+
+def keeps_units(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
+    """Check the declared units: in other units of mass, length and time the same things must happen."""
+    units, model, scene = Units(), _built(kind, vehicle, actuation), make_scene(vehicle, actuation)
+    described = model.model.effect(kind.name).parameters_of
+    other = units.vehicle(vehicle)
+    twin = Predictor(GreyBox(other, [kind.build(other, actuation)], actuation=actuation))
+    factors = torch.tensor([units.factor(p.unit) for p in described], dtype=torch.float64)
+    with torch.no_grad():
+        twin.get_parameter(THETA).copy_(model.get_parameter(THETA) * factors)
+        expected, found = units.outputs(model(scene)), twin(units.scene(scene, actuation))
+    for name, value in expected.items():
+        require_close(
+            found[name], value, 1e-9, f"{kind.name}: {name} does not scale as the declared units say"
+        )
+
+
+def restores(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
+    """Check that a state dict brings back the predictions to the last bit, and that copies share nothing."""
+    model, scene = _built(kind, vehicle, actuation), make_scene(vehicle, actuation)
+    fresh = Predictor(GreyBox(vehicle, [kind.build(vehicle, actuation)], actuation=actuation))
+    with torch.no_grad():
+        expected = together(model(scene))
+        fresh.load_state_dict(model.state_dict())
+        require(
+            torch.equal(together(fresh(scene)), expected), f"{kind.name}: a restored state predicts otherwise"
+        )
+        copied = model.model.rebuilt(model.model.copied_effects())
+        copied.get_parameter("effects.0.theta").zero_()
+        require(torch.equal(together(model(scene)), expected), f"{kind.name}: a copy shares its parameters")
+
+
+def recovers(
+    kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters", tolerance: float = 1e-6
+) -> None:
+    """Check that noise-free data made with the effect give its parameters back, by least squares.
+
+    The tolerance is relative to the parameters' distance from the null.
+    """
+    from scipy.optimize import least_squares
+
+    model, scene = _built(kind, vehicle, actuation), make_scene(vehicle, actuation, runs=8, rows=3, warmup=2)
+    outputs, truth = _function(model, scene)
+    described = model.model.effect(kind.name).parameters_of
+    null = torch.tensor([p.null for p in described], dtype=truth.dtype)
+    low, high, scale = (np.array([getattr(p, k) for p in described]) for k in ("low", "high", "scale"))
+    jacobian = jacfwd(outputs)
+    with torch.no_grad():
+        data = outputs(truth)
+    # Where the null says nothing the fit starts at a probe's distance, as the diagnosis does.
+    start = null + (0.8 if any(p.probes for p in described) else 0.3) * (truth - null)
+    with torch.no_grad():
+        fit = least_squares(
+            lambda x: (outputs(torch.tensor(x)) - data).numpy(),
+            start.numpy(),
+            jac=lambda x: jacobian(torch.tensor(x)).numpy(),
+            bounds=(low, high),
+            x_scale=scale,
+            xtol=1e-14,
+            ftol=1e-15,
+            gtol=1e-15,
+            max_nfev=40,
+        )
+    error = np.abs(fit.x - truth.numpy()) / np.maximum(np.abs((truth - null).numpy()), 1e-12)
+    worst = int(error.argmax())
+    require(
+        error[worst] <= tolerance,
+        f"{kind.name}.{described[worst].name}: recovered as {fit.x[worst]:.9g} "
+        f"instead of {float(truth[worst]):.9g}",
+    )
+
+
+EFFECT_CHECKS: dict[str, Callable[..., None]] = {
+    check.__name__: check
+    for check in (
+        describes_itself,
+        refuses,
+        vanishes,
+        batches,
+        follows_precision,
+        follows_device,
+        has_right_gradient,
+        transforms,
+        keeps_units,
+        restores,
+        recovers,
+    )
+}
+
+
+def check_effect(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
+    """Run all checks on an effect's class.
+
+    Args:
+        kind: the class.
+        vehicle: on which vehicle; by default one that has everything.
+        actuation: "thrusters" or "wrench".
+
+    Raises:
+        AssertionError: a promise is broken; the message says which.
+    """
+    for check in EFFECT_CHECKS.values():
+        check(kind, vehicle, actuation)

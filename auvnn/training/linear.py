@@ -1,0 +1,75 @@
+"""Forms that are linear in their coefficients: one least-squares solution, and what it cannot tell apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from auvnn.damping.base import AXES
+from auvnn.damping.polynomial import Polynomial
+
+RANK_TOLERANCE = 1e-10
+VELOCITIES = ("u", "v", "w", "p", "q", "r")
+
+
+def solve_polynomial(
+    form: Polynomial, nu: Tensor, targets: Tensor, weights: Tensor | None
+) -> tuple[Tensor, list[str]]:
+    """Return the least-squares coefficients and a sentence for each thing the data cannot decide.
+
+    Where coefficients cannot be told apart, the answer is the one of least norm.
+
+    Args:
+        form: the form whose coefficients are wanted.
+        nu: scaled velocities (N, 6).
+        targets: scaled damping (m, N), one row per axis of the form.
+        weights: (m, N) of the squared residuals, or None for ones.
+
+    Returns:
+        Rows (m, p) in the order of the form's parameters (linear ones first), and the warnings.
+    """
+    from scipy.linalg import lstsq
+
+    rows, warnings = [], []
+    for member, axis in enumerate(form.axes):
+        columns, y = form.regressors(nu, member).numpy(), targets[member].numpy()
+        if weights is not None:
+            root = weights[member].sqrt().numpy()
+            columns, y = columns * root[:, None], y * root
+        size = np.sqrt(np.mean(columns**2, axis=0))
+        scaled = columns / np.where(size > 0, size, 1.0)
+        solution = np.asarray(lstsq(scaled, y, cond=RANK_TOLERANCE)[0])
+        rows.append(torch.from_numpy(solution / np.where(size > 0, size, 1.0)))
+        warnings += _doubts(AXES[axis], _names(form, axis), scaled)
+    return torch.stack(rows), warnings
+
+
+def _names(form: Polynomial, axis: int) -> list[str]:
+    own = VELOCITIES if form.coupled else (VELOCITIES[axis],)
+    return [*own, *(f"|{name}|{name}" for name in own)]
+
+
+def _doubts(axis: str, names: list[str], columns: np.ndarray) -> list[str]:
+    """Say which coefficients cannot be known, or only in combination (correlation beyond 0.99)."""
+    absent = [name for name, column in zip(names, columns.T, strict=True) if not np.any(column)]
+    if absent:
+        return [f"{axis}: no motion in {', '.join(absent)}: their coefficients are set to zero, not measured"]
+    _, singular, directions = np.linalg.svd(np.linalg.qr(columns, mode="r"))
+    singular = np.concatenate([singular, np.zeros(len(names) - len(singular))])
+    rank = int(np.sum(singular > RANK_TOLERANCE * singular[0]))
+    if rank < len(names):
+        loose = [n for n, part in zip(names, np.abs(directions[rank:]).max(0), strict=True) if part > 0.1]
+        return [
+            f"{axis}: the coefficients of {', '.join(loose)} cannot be told apart on this data "
+            f"(rank {rank} of {len(names)}): only their combination is known"
+        ]
+    covariance = (directions.T / singular**2) @ directions
+    deviation = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(deviation, deviation)
+    pairs = [(i, j) for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > 0.99]
+    return [
+        f"{axis}: the coefficients of {names[j]} and {names[i]} are correlated by {correlation[i, j]:.3f}: "
+        "only their combination is well known"
+        for i, j in pairs
+    ]

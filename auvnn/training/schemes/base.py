@@ -1,0 +1,133 @@
+"""What every training scheme promises: steps that can be saved after any of them and taken up again."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import torch
+from torch import Tensor
+
+from auvnn.damping.bank import DampingBank
+from auvnn.errors import ConfigError
+from auvnn.training.problem import DampingProblem
+
+
+@dataclass(frozen=True)
+class Samples:
+    """A problem in the bank's scaled numbers, (N, 6) each."""
+
+    nu: Tensor
+    target: Tensor
+    weight: Tensor
+
+    @classmethod
+    def scaled(cls, problem: DampingProblem, bank: DampingBank) -> Samples:
+        """Divide a problem by the bank's scales."""
+        inputs, outputs = bank.input_scale.cpu().double(), bank.output_scale.cpu().double()
+        return cls(problem.nu / inputs, problem.target / outputs, problem.weights)
+
+    def rows(self, axes: tuple[int, ...]) -> tuple[Tensor, Tensor | None]:
+        """Return targets and weights (m, N) of some axes; weights None where all samples count the same."""
+        weight = self.weight.T[list(axes)].contiguous()
+        same = bool((weight == weight[:, :1]).all()) and bool((weight > 0).all())
+        return self.target.T[list(axes)].contiguous(), None if same else weight
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a scheme works on.
+
+    Args:
+        bank: a copy of the bank with its scales set; the scheme leaves its answer in it.
+        train: samples to fit.
+        held_out: samples to judge by, or None.
+        spread: (6,) scaled standard deviation of the training targets, ones where that is zero.
+        seed: of everything that is drawn.
+        warm: start from the bank's weights rather than from drawn ones.
+    """
+
+    bank: DampingBank
+    train: Samples
+    held_out: Samples | None
+    spread: Tensor
+    seed: int
+    warm: bool
+
+
+State = tuple[dict[str, Tensor], dict[str, Any]]
+
+
+class Scheme:
+    """A way to find the parameters of a bank, one iteration at a time."""
+
+    name: ClassVar[str]
+    warnings: list[str]
+
+    def options(self) -> dict[str, Any]:
+        """Return the options that rebuild this scheme, as plain data."""
+        raise TypeError(f"training scheme '{type(self).__name__}' does not state its options")
+
+    def begin(self, task: Task) -> None:
+        """Get ready: draw what is to be drawn."""
+        raise TypeError(f"training scheme '{type(self).__name__}' cannot begin")
+
+    def step(self) -> None:
+        """Do one iteration."""
+        raise TypeError(f"training scheme '{type(self).__name__}' cannot step")
+
+    def finished(self) -> str | None:
+        """Return why the scheme has come to its end, in words, or None."""
+        raise TypeError(f"training scheme '{type(self).__name__}' never ends")
+
+    def errors(self) -> tuple[Tensor, Tensor | None]:
+        """Return the best relative errors so far, (6,) on the training samples and on the held-out ones."""
+        raise TypeError(f"training scheme '{type(self).__name__}' does not state its errors")
+
+    def save(self) -> State:
+        """Return named tensors and plain data from which `load` goes on as if nothing had happened."""
+        raise TypeError(f"training scheme '{type(self).__name__}' cannot be saved")
+
+    def load(self, tensors: dict[str, Tensor], plain: dict[str, Any]) -> None:
+        """Take up what `save` returned; `begin` has been called before with the same task."""
+        raise TypeError(f"training scheme '{type(self).__name__}' cannot be taken up again")
+
+    def finish(self) -> DampingBank:
+        """Return the task's bank with the best parameters found."""
+        raise TypeError(f"training scheme '{type(self).__name__}' gives no answer")
+
+
+def relative_errors(bank: DampingBank, samples: Samples, spread: Tensor) -> Tensor:
+    """Return the weighted root-mean-square error of the bank divided by the spread, (6,) float64."""
+    like = bank.input_scale
+    with torch.no_grad():
+        scaled = bank(samples.nu.to(like) * bank.input_scale) / bank.output_scale
+    residual = scaled.cpu().double() - samples.target
+    mean = (samples.weight * residual.square()).sum(0) / samples.weight.sum(0).clamp_min(1e-300)
+    return mean.sqrt() / spread
+
+
+def whole(value: Any, what: str, *, least: int = 1) -> int:
+    """Return `value` if it is a whole number of at least `least`.
+
+    Raises:
+        ConfigError: it is not.
+    """
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise ConfigError(f"scheme option '{what}' is {value!r}: give a whole number of at least {least}")
+    return value
+
+
+def positive(value: Any, what: str, *, zero: bool = False) -> float:
+    """Return `value` if it is a positive finite number, or with `zero` also zero.
+
+    Raises:
+        ConfigError: it is not.
+    """
+    good = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    if not good or value < 0 or (value == 0 and not zero):
+        raise ConfigError(
+            f"scheme option '{what}' is {value!r}: give a positive number{' or zero' if zero else ''}"
+        )
+    return float(value)

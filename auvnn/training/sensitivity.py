@@ -1,0 +1,256 @@
+"""How the outputs of free-running windows change with initial states and effect parameters.
+
+The model runs free over each window. Its error dynamics, linearised about that run, are
+
+    d/dt [dp, da, dnu] = A(t) [dp, da, dnu] + G(t) dtheta,
+
+with dp the error of the position (NED), da the small rotation of the attitude (body axes) and dnu that of the
+velocity. A and G are taken at mid-interval for all samples of all windows at once by reverse-mode automatic
+differentiation (six outputs, however many parameters), and the recursion over time is a product of small
+matrices. The sensitivities are exact up to the square of the time step; the predictions themselves are the
+integrator's, so that a perfect model still leaves no residual at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+from torch.func import functional_call, jacfwd, jacrev, vmap
+
+from auvnn.effects import Sensed
+from auvnn.metrics.free_run import MAX_STEP, predict
+from auvnn.metrics.windows import Windows
+from auvnn.models import GreyBox, Inputs
+from auvnn.models.rollout import steps_per_interval
+from auvnn.physics.attitude import (
+    quat_conjugate,
+    quat_multiply,
+    quat_to_matrix,
+    quat_to_rotvec,
+    rotvec_to_quat,
+    skew,
+)
+
+
+@dataclass(frozen=True)
+class Response:
+    """What the windows answer.
+
+    Attributes:
+        error: measured minus predicted, in the channels of `metrics.windows.CHANNELS`, (B, L, 18).
+        state: change of the prediction with the initial state, (B, L, 18, 12).
+        parameters: change of the prediction with the parameters, (B, L, 18, P).
+    """
+
+    error: Tensor
+    state: Tensor
+    parameters: Tensor
+
+
+class _Point(nn.Module):
+    """The acceleration and the sensors' report at one moment, as functions of small changes."""
+
+    def __init__(self, model: GreyBox) -> None:
+        super().__init__()
+        self.model = model
+
+    def forward(self, what: str, position: Tensor, quaternion: Tensor, turn: Tensor, nu: Tensor, thrust: Tensor,
+                time: Tensor, inputs: Inputs) -> Tensor:
+        rotation = quat_to_matrix(quaternion)
+        # First order in `turn` is all that a derivative at zero needs.
+        rotation = rotation + rotation @ skew(turn)
+        if what == "rate":
+            return self.model.nu_dot(position, rotation, nu, thrust, inputs, time)
+        rate = None
+        if what == "sense and rate":
+            rate = self.model.nu_dot(position, rotation, nu, thrust, inputs, time)
+        turned = quat_multiply(quaternion, rotvec_to_quat(turn))
+        seen = self.model.sense(Sensed(position, turned, nu, rate))
+        angle = quat_to_rotvec(quat_multiply(quat_conjugate(quaternion), seen.quaternion))
+        parts = [seen.position, angle, seen.nu]
+        return torch.cat(parts if seen.nu_dot is None else [*parts, seen.nu_dot], dim=-1)
+
+
+class _Thrust(nn.Module):
+    """Mean thrust of every interval, and the thrust as it begins, as functions of the effects' parameters."""
+
+    def __init__(self, model: GreyBox) -> None:
+        super().__init__()
+        self.model = model
+
+    def forward(self, windows: Windows, substeps: int) -> tuple[Tensor, Tensor]:
+        model = self.model
+        drive = model.actuators.drive(windows.inputs.command, windows.times,
+                                      model.using("command") + model.using("respond"), substeps, windows.warmup)
+        mean = torch.stack([sum(parts[1:], parts[0]) / len(parts) for parts in drive.mean], dim=-2)
+        return mean, torch.stack(drive.start, dim=-2)
+
+
+def _flat(inputs: Inputs) -> tuple[Inputs, Inputs]:
+    """Return inputs with (B, L) joined, and the axes over which `vmap` runs."""
+    fields = (inputs.command, inputs.fins, inputs.voltage, inputs.altitude)
+    joined = Inputs(*(None if x is None else x.flatten(0, 1) for x in fields))
+    return joined, Inputs(*(None if x is None else 0 for x in fields))  # type: ignore[arg-type]
+
+
+def output_error(model: GreyBox, windows: Windows, initial: Tensor) -> Tensor:
+    """Return measured minus predicted outputs, (B, L, 18); zero where nothing was measured."""
+    with torch.no_grad():
+        eta, nu = predict(model, windows, initial)
+        return _error(model, windows, eta, nu)
+
+
+def _error(model: GreyBox, windows: Windows, eta: Tensor, nu: Tensor) -> Tensor:
+    rate = None
+    if windows.nu_dot is not None:
+        _, thrust = _Thrust(model)(windows, _substeps(windows))
+        rate = model.nu_dot(eta[..., :3], quat_to_matrix(eta[..., 3:]), nu, thrust, windows.inputs.rows(windows.warmup),
+                            windows.times[:, windows.warmup:])
+    seen = model.sense(Sensed(eta[..., :3], eta[..., 3:], nu, rate))
+    angle = quat_to_rotvec(quat_multiply(quat_conjugate(seen.quaternion), windows.eta[..., 3:]))
+    parts = [windows.eta[..., :3] - seen.position, angle, windows.nu - seen.nu]
+    parts.append(torch.zeros_like(nu) if seen.nu_dot is None or windows.nu_dot is None
+                 else windows.nu_dot - seen.nu_dot)
+    error = torch.cat(parts, dim=-1)
+    return torch.where(windows.mask > 0, error, torch.zeros_like(error))
+
+
+def _substeps(windows: Windows) -> int:
+    return steps_per_interval(windows.times, MAX_STEP)
+
+
+def respond(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str], chunk: int = 2048) -> Response:
+    """Return prediction error and sensitivities of windows.
+
+    Args:
+        model: holds the effects named.
+        windows: B windows.
+        initial: (B, 13).
+        names: effects whose parameters, in this order, make up the P columns.
+        chunk: points differentiated at a time, which bounds the memory.
+    """
+    with torch.no_grad():
+        eta, nu = predict(model, windows, initial)
+        error = _error(model, windows, eta, nu)
+    count, length = nu.shape[:2]
+    order = [next(k for k, e in enumerate(model.effects) if e.name == name) for name in names]
+    thetas = {f"model.effects.{k}.theta": model.effects[k].theta.detach() for k in order}
+    sizes = [thetas[f"model.effects.{k}.theta"].shape[0] for k in order]
+    total = sum(sizes)
+    times = windows.times[:, windows.warmup:]
+    inputs = windows.inputs.rows(windows.warmup)
+    steps = times[:, 1:] - times[:, :-1]
+
+    mean, start, mean_slope, start_slope = _thrusts(model, windows, thetas, sizes)
+    middle = torch.nn.functional.normalize(eta[:, :-1, 3:] + eta[:, 1:, 3:], dim=-1)
+    points = (0.5 * (eta[:, :-1, :3] + eta[:, 1:, :3]), middle, 0.5 * (nu[:, :-1] + nu[:, 1:]),
+              mean[:, :-1], times[:, :-1] + 0.5 * steps, inputs.rows(0, length - 1))
+    rate = _differentiate(_Point(model), "rate", points, thetas, chunk)
+    jac_state = torch.cat(rate[:3], dim=-1)
+    jac_theta = torch.cat(rate[4:], dim=-1) if total else jac_state.new_zeros(*jac_state.shape[:-1], 0)
+    if mean_slope is not None:
+        jac_theta = jac_theta + rate[3] @ mean_slope[:, :-1].flatten(0, 1)
+
+    sensitivity = _propagate(jac_state, jac_theta, points[1].flatten(0, 1), points[2].flatten(0, 1),
+                             steps.flatten(), count, length)
+    state, parameters = _outputs(model, windows, eta, nu, start, start_slope, times, inputs, thetas, sensitivity, chunk)
+    seen = windows.mask.unsqueeze(-1)
+    return Response(error, state * seen, parameters * seen)
+
+
+def _thrusts(model: GreyBox, windows: Windows, thetas: dict[str, Tensor], sizes: list[int]
+             ) -> tuple[Tensor, Tensor, Tensor | None, Tensor | None]:
+    """Return mean and starting thrust (B, L, n) and how they change with the parameters, (B, L, n, P)."""
+    module, substeps = _Thrust(model), _substeps(windows)
+    with torch.no_grad():
+        mean, start = module(windows, substeps)
+    acting = {id(e) for hook in ("command", "respond") for e in model.using(hook)}
+    keys = [k for k in thetas if id(model.effects[int(k.split(".")[2])]) in acting]
+    if not keys:
+        return mean, start, None, None
+    slopes = jacfwd(lambda some: functional_call(module, some, (windows, substeps)))({k: thetas[k] for k in keys})
+    filled = []
+    for which in slopes:
+        parts = [which[k] if k in which else mean.new_zeros(*mean.shape, size)
+                 for k, size in zip(thetas, sizes, strict=True)]
+        filled.append(torch.cat(parts, dim=-1).detach())
+    return mean, start, filled[0], filled[1]
+
+
+def _differentiate(module: nn.Module, what: str, points: tuple, thetas: dict[str, Tensor], chunk: int) -> list[Tensor]:
+    """Return derivatives of a function of a point by position, turn, velocity, thrust and each theta, (N, out, in)."""
+    position, quaternion, nu, thrust, time, inputs = points
+    inputs, axes = _flat(inputs)
+
+    def one(p: Tensor, turn: Tensor, v: Tensor, f: Tensor, theta: dict[str, Tensor], q: Tensor, t: Tensor,
+            extra: Inputs) -> Tensor:
+        return functional_call(module, theta, (what, p, q, turn, v, f, t, extra))
+
+    slope = jacrev(one, argnums=(0, 1, 2, 3, 4))
+    many = vmap(slope, in_dims=(0, None, 0, 0, None, 0, 0, axes), chunk_size=chunk)
+    turn = torch.zeros(3, dtype=nu.dtype, device=nu.device)
+    by = many(position.flatten(0, 1), turn, nu.flatten(0, 1), thrust.flatten(0, 1), thetas,
+              quaternion.flatten(0, 1), time.flatten(), inputs)
+    return [*(x.detach() for x in by[:4]), *(by[4][k].detach() for k in thetas)]
+
+
+def _flatten_inputs(i: Inputs) -> tuple[list, None]:
+    return [i.command, i.fins, i.voltage, i.altitude], None
+
+
+# `vmap` must see the tensors inside.
+torch.utils._pytree.register_pytree_node(Inputs, _flatten_inputs, lambda children, _: Inputs(*children))
+
+
+def _propagate(jac_state: Tensor, jac_theta: Tensor, quaternion: Tensor, nu: Tensor, steps: Tensor, count: int,
+               length: int) -> Tensor:
+    """Return the change of the state with initial state and parameters, (B, L, 12, 12 + P)."""
+    points, size = jac_state.shape[0], jac_theta.shape[-1]
+    rotation = quat_to_matrix(quaternion)
+    a = jac_state.new_zeros(points, 12, 12)
+    a[:, 0:3, 3:6] = -rotation @ skew(nu[:, :3])
+    a[:, 0:3, 6:9] = rotation
+    a[:, 3:6, 3:6] = -skew(nu[:, 3:])
+    a[:, 3:6, 9:12] = torch.eye(3, dtype=a.dtype, device=a.device)
+    a[:, 6:12] = jac_state
+    ha = a * steps[:, None, None]
+    eye = torch.eye(12, dtype=a.dtype, device=a.device)
+    # Horner's form of (exp(hA) - 1)/(hA); eight terms reach rounding for any step the integrator may take.
+    phi = eye + ha / 8
+    for k in range(7, 1, -1):
+        phi = eye + (ha / k) @ phi
+    forward = (eye + ha @ phi).reshape(count, length - 1, 12, 12)
+    forcing = ((phi * steps[:, None, None])[..., 6:] @ jac_theta).reshape(count, length - 1, 12, size)
+    now = torch.cat([eye.expand(count, 12, 12), a.new_zeros(count, 12, size)], dim=-1)
+    rows = [now]
+    for k in range(length - 1):
+        now = forward[:, k] @ now
+        now[..., 12:] += forcing[:, k]
+        rows.append(now)
+    return torch.stack(rows, dim=1)
+
+
+def _outputs(model: GreyBox, windows: Windows, eta: Tensor, nu: Tensor, start: Tensor, start_slope: Tensor | None,
+             times: Tensor, inputs: Inputs, thetas: dict[str, Tensor], sensitivity: Tensor, chunk: int
+             ) -> tuple[Tensor, Tensor]:
+    """Return the change of the 18 outputs with initial state, (B, L, 18, 12), and parameters, (B, L, 18, P)."""
+    measured_rate = windows.nu_dot is not None
+    if not measured_rate and not model.using("sense"):
+        full = torch.nn.functional.pad(sensitivity, (0, 0, 0, 6))
+        return full[..., :12], full[..., 12:]
+    what = "sense and rate" if measured_rate else "sense"
+    points = (eta[..., :3], eta[..., 3:], nu, start, times, inputs)
+    by = _differentiate(_Point(model), what, points, thetas, chunk)
+    shape = sensitivity.shape[:2]
+    by_state = torch.cat(by[:3], dim=-1).reshape(*shape, -1, 12)
+    full = by_state @ sensitivity
+    if thetas:
+        direct = torch.cat(by[4:], dim=-1).reshape(*shape, -1, sensitivity.shape[-1] - 12)
+        if start_slope is not None:
+            direct = direct + by[3].reshape(*shape, -1, start.shape[-1]) @ start_slope
+        full = torch.cat([full[..., :12], full[..., 12:] + direct], dim=-1)
+    full = torch.nn.functional.pad(full, (0, 0, 0, 18 - full.shape[-2]))
+    return full[..., :12], full[..., 12:]

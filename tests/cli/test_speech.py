@@ -1,0 +1,77 @@
+"""Colour and progress are for a person at a terminal; files and pipes get plain lines."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from stand_ins import ENVIRONMENT
+
+from auvnn.cli.speech import one_line
+
+pty = pytest.importorskip("pty", reason="a terminal is needed")
+
+SCRIPT = """
+from auvnn.cli.speech import Speaker
+say = Speaker()
+say("name [with] brackets: " + "long " * 40, style="red")
+say.progress("working")
+say("done")
+"""
+
+
+def at_a_terminal(**environment: str) -> str:
+    """Run the script with both streams on a terminal of 80 columns and return what appeared there."""
+    ours, theirs = pty.openpty()
+    keep = {k: v for k, v in ENVIRONMENT.items() if k not in ("NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE")}
+    process = subprocess.Popen(
+        [sys.executable, "-c", SCRIPT],
+        stdout=theirs,
+        stderr=theirs,
+        env={**keep, "TERM": "xterm", **environment},
+    )
+    os.close(theirs)
+    shown = b""
+    while True:
+        try:
+            piece = os.read(ours, 4096)
+        except OSError:  # the other side has closed
+            break
+        if not piece:
+            break
+        shown += piece
+    os.close(ours)
+    assert process.wait() == 0, shown
+    return shown.decode().replace("\r\n", "\n")
+
+
+def test_colour_at_a_terminal():
+    assert "\x1b[31m" in at_a_terminal()
+
+
+def test_no_colour_when_that_is_asked_for():
+    assert "\x1b[31m" not in at_a_terminal(NO_COLOR="1")
+
+
+def test_lines_are_said_as_they_are_even_at_a_terminal():
+    line = at_a_terminal(NO_COLOR="1").split("\n")[0]
+    assert line.startswith("name [with] brackets:") and line.count("long") == 40
+
+
+def test_progress_gives_way_to_the_next_line():
+    shown = at_a_terminal(NO_COLOR="1")
+    assert "working\r\x1b[Kdone" in shown
+
+
+def test_a_pipe_gets_plain_lines_and_no_progress(tmp_path: Path):
+    done = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True, env=ENVIRONMENT)
+    assert done.stderr == "" and "\x1b" not in done.stdout
+    assert done.stdout.splitlines()[1] == "done"
+
+
+def test_a_complaint_is_one_line_of_bounded_length():
+    assert one_line("first\n  second\tthird") == "first second third"
+    assert len(one_line("x" * 10_000)) == 600

@@ -1,0 +1,163 @@
+"""Each verb once, on a small log, from the command line to the files that it leaves."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from auvnn.cli.main import VERBS, main
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A log with a hidden current, 3 runs of 15 s."""
+    out = tmp_path_factory.mktemp("made") / "simulate"
+    words = ["hidden={ocean_current: {v_north: 0.3, v_east: -0.2}}", "runs=3", "duration=15", "noise=none"]
+    assert main(["simulate", "model=rov95", *words, f"out={out}"]) == 0
+    return out
+
+
+@pytest.fixture
+def report(auvnn: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., dict]:
+    """Run a verb and return its JSON, after looking at all that it left."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(verb: str, *words: str) -> dict:
+        status, out, err = auvnn(verb, *words, "out=out")
+        assert (status, err) == (0, "")
+        writes = VERBS.get(verb).writes
+        left = {p.name + "/" * p.is_dir() for p in Path("out").iterdir()} - {".hydra/"}
+        assert left == set(writes)
+        assert f"written   {', '.join(writes)} in out" in out
+        if "report.html" in writes:
+            assert "<html" in Path("out/report.html").read_text(encoding="utf-8")
+            assert out.splitlines()[-1] == f"report    {Path('out/report.html')}"
+        answers = [json.loads(p.read_text()) for p in Path("out").glob("*.json")]
+        return answers[0] if answers else {}
+
+    return run
+
+
+def test_simulate(made):
+    truth = json.loads((made / "truth.json").read_text())
+    assert truth["schema"] == "auvnn/truth/1" and truth["seed"] == 0 and truth["noise"] == "none"
+    assert truth["hidden"]["ocean_current"] == {"v_north": 0.3, "v_east": -0.2, "v_down": 0.0}
+
+
+def test_the_same_seed_makes_the_same_log(auvnn, tmp_path):
+    words = ["simulate", "model=rov90", "hidden=[net_buoyancy]", "runs=1", "duration=5"]
+    for name, seed in (("a", 1), ("b", 1), ("c", 2)):
+        assert auvnn(*words, f"seed={seed}", f"out={tmp_path / name}")[0] == 0
+    a, b, c = ((tmp_path / name / "log.parquet").read_bytes() for name in "abc")
+    assert a == b != c
+
+
+def test_hidden_effects_of_a_size(auvnn, tmp_path):
+    words = ["model=rov95", "hidden=[net_buoyancy]", "size=small,large", "runs=1", "duration=10"]
+    assert auvnn("simulate", *words, f"out={tmp_path / 'sizes'}", "--multirun")[0] == 0
+    truths = [json.loads((tmp_path / "sizes" / n / "truth.json").read_text()) for n in "01"]
+    small, large = (abs(t["hidden"]["net_buoyancy"]["force"]) for t in truths)
+    assert large == pytest.approx(6 * small, rel=1e-6)
+
+
+def test_check(report, made):
+    assert report("check", f"log={made / 'log.parquet'}")["schema"] == "auvnn/quality/1"
+
+
+def test_compare(report, made):
+    answer = report("compare", "model=rov95", f"log={made / 'log.parquet'}", "horizons=[1,5]")
+    assert answer["schema"] == "auvnn/comparison/1"
+    assert set(answer["rollout"]) == {"1", "5"}
+
+
+def test_diagnose(report, made):
+    words = ["model=rov95", "effects=[ocean_current,net_buoyancy]", "max_effects=1"]
+    answer = report("diagnose", f"log={made / 'log.parquet'}", *words)
+    assert answer["schema"] == "auvnn/diagnosis/1"
+    assert answer["missing"] == ["ocean_current"]
+    assert {c["effect"] for c in answer["candidates"]} == {"ocean_current", "net_buoyancy"}
+
+
+def test_add_then_remove(report, auvnn, made):
+    answer = report("add", "model=rov95", f"log={made / 'log.parquet'}", "effect=ocean_current")
+    assert answer["schema"] == "auvnn/improvement/1" and answer["accepted"]
+    assert answer["after"]["rollout"]["5"]["total"] < 0.1 * answer["before"]["rollout"]["5"]["total"]
+    status, out, err = auvnn("remove", "model=out/model", "effect=ocean_current", "out=without", "json=true")
+    assert (status, err) == (0, "") and json.loads(out)["removed"] == ["ocean_current"]
+    status, _, err = auvnn("remove", "model=without/model", "effect=ocean_current", "out=again")
+    assert status == 2 and "ocean_current" in err
+    status, out, _ = auvnn("compare", "model=out/model", f"log={made / 'log.parquet'}", "out=c", "json=true")
+    assert status == 0 and json.loads(out)["rollout"]["5"]["total"] < 0.1
+
+
+def test_train(report, made):
+    answer = report("train", "model=rov95", f"log={made / 'log.parquet'}", "damping=polynomial")
+    assert answer["schema"] == "auvnn/training/1" and answer["metrics"]
+
+
+@pytest.mark.long
+def test_demo_reduced(report, monkeypatch):
+    from auvnn.studies import demo
+
+    monkeypatch.setattr(demo, "DURATION", 15.0)
+    monkeypatch.setattr(demo, "RUNS", 3)
+    report("demo")
+    for verb in ("check", "compare", "diagnose", "add"):
+        assert (Path("out") / verb / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (["model=rov59"], ["'rov59'", "'rov95'"]),
+        (["model=nowhere/model.yaml"], ["nowhere"]),
+        (["model=rov95", "horizons=[0]"], ["0"]),
+        (["model=rov95", "horizons=[soon]"], ["soon"]),
+        (["model=rov95", "derivative.metod=measured"], ["'derivative.method'"]),
+        (["model=rov95", "derivative.method=spline"], ["spline", "local_polynomial"]),
+    ],
+)
+def test_what_the_floors_below_refuse_is_one_line(refused_after, made, words, parts):
+    line = refused_after("compare", f"log={made / 'log.parquet'}", *words)
+    for part in parts:
+        assert part in line
+
+
+@pytest.mark.parametrize("verb", ["diagnose", "add"])
+def test_unknown_effects_are_named_with_their_neighbours(refused_after, made, verb):
+    key = "effects" if verb == "diagnose" else "effect"
+    line = refused_after(verb, "model=rov95", f"log={made / 'log.parquet'}", f"{key}=[ocean_curent]")
+    assert "'ocean_curent'" in line and "'ocean_current'" in line
+
+
+def test_the_log_itself_is_no_test(refused_after, made):
+    log = made / "log.parquet"
+    refused_after("add", "model=rov95", f"log={log}", f"test={log}", "effect=ocean_current")
+
+
+def test_hidden_parameters_are_checked(refused_after):
+    line = refused_after("simulate", "model=rov95", "hidden={ocean_current: {v_nort: 1}}")
+    assert "'v_north'" in line
+    assert "out of bounds" in refused_after(
+        "simulate", "model=rov95", "hidden={ocean_current: {v_north: 99}}"
+    )
+
+
+@pytest.fixture
+def refused_after(
+    refused: Callable[..., str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Callable[..., str]:
+    """Run what is refused after something was read: nothing is left behind."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: str) -> str:
+        line = refused(*words, "out=out")
+        assert not Path("out").exists()
+        return line
+
+    return run

@@ -1,0 +1,14 @@
+"""What all tests share: one thread (the tensors are small), and shape checking on demand."""
+
+import os
+
+# AUVNN_CHECK_SHAPES=1 checks every shape in every call of the physics, at five times the cost of a call.
+# tests/physics/test_properties.py checks the shapes of each function once, always.
+if os.environ.get("AUVNN_CHECK_SHAPES") == "1":
+    from jaxtyping import install_import_hook
+
+    install_import_hook("auvnn.physics", "beartype.beartype")
+
+import torch
+
+torch.set_num_threads(1)

@@ -1,0 +1,72 @@
+"""Every effect of the catalogue keeps the contract; a new one is tested by being there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from auvnn.effects import EFFECTS
+from auvnn.effects.inertia_factors import InertiaFactors
+from auvnn.errors import ConfigError
+from auvnn.testing import EFFECT_CHECKS
+from auvnn.vehicle import builtin_vehicles, load_vehicle
+
+# The moments of inertia are a nuisance of the fits, not a cause to be named, but an effect in all else.
+KINDS = [*(EFFECTS.get(name) for name in EFFECTS.names()), InertiaFactors]
+HEAVY = ("recovers", "has_right_gradient", "transforms")
+
+
+@pytest.fixture(params=KINDS, ids=lambda kind: kind.name)
+def kind(request):
+    return request.param
+
+
+@pytest.mark.parametrize("check", [name for name in EFFECT_CHECKS if name != "recovers"])
+def test_the_contract_on_a_vehicle_with_everything(kind, check):
+    EFFECT_CHECKS[check](kind)
+
+
+@pytest.mark.parametrize("check", [name for name in EFFECT_CHECKS if name not in HEAVY])
+def test_the_contract_under_a_commanded_wrench(kind, check):
+    EFFECT_CHECKS[check](kind, actuation="wrench")
+
+
+def test_parameters_come_back_from_data_of_the_surrogate(kind):
+    EFFECT_CHECKS["recovers"](kind, load_vehicle("rov95"))
+
+
+@pytest.mark.parametrize("name", builtin_vehicles())
+def test_each_vanishes_at_its_null_in_every_vehicle_under_both_actuations(name):
+    vehicle = load_vehicle(name)
+    for actuation in ["wrench", *(["thrusters"] if vehicle.thrusters else [])]:
+        for kind in KINDS:
+            EFFECT_CHECKS["vanishes"](kind, vehicle, actuation)
+
+
+def test_the_catalogue_knows_each_by_its_own_name():
+    assert [EFFECTS.get(name).name for name in EFFECTS.names()] == EFFECTS.names()
+
+
+def test_a_misspelt_effect_is_answered_with_the_right_one():
+    with pytest.raises(
+        ConfigError, match=r"no effect called 'ocean_curent'\. Did you mean 'ocean_current'\?"
+    ):
+        EFFECTS.get("ocean_curent")
+
+
+def readme_rows() -> dict[str, str]:
+    text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    section = text.split("\n## Effects\n", 1)[1].split("\n## ", 1)[0]
+    return {row[1]: row[0] for row in re.finditer(r"^\| `(\w+)` \|.*\|$", section, re.MULTILINE)}
+
+
+def test_the_readme_names_each_with_its_parameters_and_units():
+    rows = readme_rows()
+    assert list(rows) == EFFECTS.names()
+    vehicle = load_vehicle("rov95")
+    for name, row in rows.items():
+        for p in EFFECTS.get(name).describe(vehicle, "wrench"):
+            assert f"`{p.name}`" in row, f"{name}: {p.name}"
+            assert ("factor" if p.unit == "1" else p.unit) in row, f"{name}: {p.unit}"
