@@ -23,6 +23,7 @@ DRAWERS = Catalogue(
         "improvement": "auvnn.report.pages.improvement:PAGE",
         "training": "auvnn.report.pages.training:PAGE",
         "demo": "auvnn.report.pages.demo:PAGE",
+        "benchmark": "auvnn.report.pages.benchmark:PAGE",
     },
     "auvnn.report_pages",
 )

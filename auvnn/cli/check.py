@@ -8,14 +8,14 @@ _STYLE = {"error": "red", "warning": "yellow"}
 
 
 def _run(job: Job) -> Answering:
-    log = job.log()
+    log = job.log(repairs=False)  # they are findings too
     quality = log.quality()
     quality.write(job.folder)
     findings = quality.to_dict()["findings"]
     for finding in findings:
         level = finding["level"]
-        words = f"{finding['where']}: {finding['what']}. {finding['cure']}"
-        job.say(f"{level:<9} {words}", style=_STYLE.get(level))
+        cure = f"; {finding['cure']}" if finding["cure"] else ""
+        job.say(f"{level:<9} {finding['where']}: {finding['what']}{cure}", style=_STYLE.get(level))
     if not findings:
         job.say("result    nothing to complain of")
     return quality

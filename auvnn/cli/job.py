@@ -77,8 +77,8 @@ class Job:
             self.say(f"assumed   {warning}", style="yellow")
         return model
 
-    def log(self, key: str = "log") -> Log:
-        """Read the log of `log=`, or of another option."""
+    def log(self, key: str = "log", *, repairs: bool = True) -> Log:
+        """Read the log of `log=`, or of another option, and say what was mended in it."""
         from auvnn.logs import Log
 
         paths = files(self.options, key)
@@ -88,8 +88,8 @@ class Job:
         names = ", ".join(map(str, paths))
         extent = f"{runs}, {log.samples} samples over {log.duration:.4g} s, driven by {log.kind}"
         self.say(f"{key:<9} {names}: {extent}")
-        for repair in log.repairs:
-            self.say(f"repaired  {repair}", style="yellow")
+        for repair in log.repairs if repairs else ():
+            self.say(f"{repair.level:<9} {repair}", style="yellow")
         return log
 
     def held_out(self) -> Log | None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -22,6 +24,7 @@ VERBS = Catalogue(
         "add": "auvnn.cli.add:VERB",
         "remove": "auvnn.cli.remove:VERB",
         "demo": "auvnn.cli.demo:VERB",
+        "benchmark": "auvnn.cli.benchmark:VERB",
     },
     "auvnn.verbs",
 )
@@ -57,12 +60,15 @@ def _dispatch(verb: str, rest: list[str]) -> int:
 
 
 def _prepare() -> None:
-    """Let SIGTERM end a run as Ctrl-C does, and let no character be unprintable."""
+    """Let SIGTERM end a run as Ctrl-C does, let no character be unprintable, and keep libraries quiet."""
 
     def end(_signal: int, _frame: Any) -> None:
         raise Terminated
 
     signal.signal(signal.SIGTERM, end)
+    if not sys.warnoptions and os.environ.get("AUVNN_DEBUG") != "1":
+        # What a user should know stands in the answer; a library's notes to programmers are not for users.
+        warnings.simplefilter("ignore")
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:

@@ -1,7 +1,13 @@
 """The catalogue of physical effects: one line per cause. A new effect is one file and one line here."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 from auvnn.catalogue import Catalogue
-from auvnn.effects.base import Body, Effect, Moment, Parameter, Sensed
+
+if TYPE_CHECKING:
+    from auvnn.effects.base import Body, Effect, Moment, Parameter, Response, Sensed
 
 EFFECTS = Catalogue(
     "effect",
@@ -20,4 +26,13 @@ EFFECTS = Catalogue(
     "auvnn.effects",
 )
 
-__all__ = ["EFFECTS", "Body", "Effect", "Moment", "Parameter", "Sensed"]
+__all__ = ["EFFECTS", "Body", "Effect", "Moment", "Parameter", "Response", "Sensed"]
+
+
+def __getattr__(name: str) -> Any:
+    # The list of names must not cost the import of torch.
+    if name in __all__:
+        from auvnn.effects import base
+
+        return getattr(base, name)
+    raise AttributeError(f"module 'auvnn.effects' has no attribute {name!r}")

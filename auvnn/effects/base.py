@@ -211,7 +211,11 @@ class Effect(nn.Module):
         return command
 
     def respond(self, state: Tensor, demand: Tensor, step: Tensor) -> Response:
-        """Return how the thrust goes from `state` under a constant demand over `step` seconds, (..., n)."""
+        """Return how the thrust goes from `state` under a constant demand over `step` seconds, (..., n).
+
+        The answer must be linear in the gap: demand + (state - demand) f(step) for `end`, `mean` and `start`,
+        (state - demand) f(step) for `slope`; long stretches are worked out from f alone.
+        """
         return Response(demand, demand, torch.zeros_like(demand), demand)
 
     def thrust(self, thrust: Tensor, moment: Moment) -> Tensor:

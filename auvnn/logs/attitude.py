@@ -33,7 +33,7 @@ def from_quaternions(raw: Array, where: str) -> tuple[Array, list[Repair]]:
     """
     repairs: list[Repair] = []
     norm = np.linalg.norm(raw, axis=1)
-    present = np.isfinite(norm)
+    present = np.isfinite(norm)  # an absurd number overflows here and counts as missing
     if not present.any():
         return np.full_like(raw, np.nan), repairs
     typical = float(np.median(norm[present]))
@@ -61,7 +61,7 @@ def from_quaternions(raw: Array, where: str) -> tuple[Array, list[Repair]]:
         cure = "interpolate attitudes as rotations, not number by number"
         repairs.append(Repair(words, where, n_wrong, cure=cure))
     quaternion = raw.copy()
-    quaternion[wrong] = np.nan
+    quaternion[wrong | ~present] = np.nan
     uneven = present & ~wrong & (np.abs(norm - 1.0) > _EXACT)
     quaternion[uneven] /= norm[uneven, None]
     visible = int((np.abs(norm[present & ~wrong] / typical - 1.0) > 1e-6).sum())

@@ -70,7 +70,9 @@ def read(path: str | Path | Sequence[str | Path], mapping: Any = None) -> Readin
         before = _stamp(file)
         reader, notes = choose(file)
         collector.repairs.extend(notes)
-        table = plan.apply(reader.read(file), str(file))
+        table = reader.read(file)
+        with np.errstate(all="ignore"):
+            table = plan.apply(table, str(file))
         hashes.append(_file_hash(file))
         if _stamp(file) != before:
             raise InputError(
@@ -78,7 +80,9 @@ def read(path: str | Path | Sequence[str | Path], mapping: Any = None) -> Readin
             )
         collector.repairs.extend(table.repairs)
         first = len(collector.runs)
-        _collect(table, plan, file, collector)
+        # Damaged numbers may overflow on their way; what comes of it is masked and counted.
+        with np.errstate(all="ignore"):
+            _collect(table, plan, file, collector)
         _number_apart(collector, first, file, len(paths) > 1)
     same = {h for h in hashes if hashes.count(h) > 1}
     if same:

@@ -123,24 +123,25 @@ class Actuators(nn.Module):
 def _lagged(demand: Tensor, times: Tensor, effect: Effect, substeps: int, warmup: int) -> Drive:
     # The last row has no interval of its own; its thrust is needed only at its very start.
     steps = torch.cat([times[..., 1:] - times[..., :-1], torch.zeros_like(times[..., :1])], dim=-1)
-    steps = steps.to(demand).unsqueeze(-1)
+    h = steps.to(demand).unsqueeze(-1) / substeps
+    # The answer is linear in the gap between state and demand: one call for all steps tells how the gap closes,
+    # and the recursion in time is left with two operations a row.
+    unit = torch.ones_like(h)
+    answer = effect.respond(unit, torch.zeros_like(h), h)
     rows = demand.unbind(-2)
-    state = rows[0]
-    for k in range(warmup):
-        state = effect.respond(state, rows[k], steps[..., k, :]).end
-    mean: list[list[Tensor]] = []
-    slope: list[list[Tensor]] = []
-    start: list[Tensor] = []
-    for k in range(warmup, len(rows)):
-        h = steps[..., k, :] / substeps
-        means, slopes = [], []
-        for part in range(substeps):
-            answer = effect.respond(state, rows[k], h)
-            if part == 0:
-                start.append(answer.start)
-            means.append(answer.mean)
-            slopes.append(answer.slope)
-            state = answer.end
-        mean.append(means)
-        slope.append(slopes)
-    return Drive(mean, slope, start)
+    over = (answer.end**substeps).unbind(-2)
+    state, states = rows[0], []
+    for row, left in zip(rows, over, strict=True):
+        states.append(state)
+        state = row + (state - row) * left
+    gap = (torch.stack(states, dim=-2) - demand)[..., warmup:, :]
+    demand, answer = demand[..., warmup:, :], [x[..., warmup:, :] for x in
+                                               (answer.end, answer.mean, answer.slope, answer.start)]
+    end, mean, slope, start = answer
+    means, slopes = [], []
+    for part in range(substeps):
+        now = gap * end**part
+        means.append((demand + now * mean).unbind(-2))
+        slopes.append((now * slope).unbind(-2))
+    return Drive([list(x) for x in zip(*means, strict=True)], [list(x) for x in zip(*slopes, strict=True)],
+                 list((demand + gap * start).unbind(-2)))

@@ -180,7 +180,7 @@ class GreyBox(nn.Module):
             nu: velocity (..., 6), m/s and rad/s, over ground, of the body origin.
             command: thruster commands (..., n) in [-1, 1], or the wrench (..., 6), N and N m.
             time: s since the start of the run, (...).
-            fins: fin angles (..., m), rad.
+            fins: fin angles (..., m), rad; zero where they are not given.
             voltage: V, (...).
             altitude: m, (...).
 
@@ -196,6 +196,8 @@ class GreyBox(nn.Module):
                 f"eta {tuple(eta.shape)}, nu {tuple(nu.shape)}, command {tuple(command.shape)}: the last sizes "
                 f"are 6 or 7, 6, and {self.actuators.size} ({self.actuation})"
             )
+        if fins is not None and self.vehicle.fins and fins.shape[-1:] != (len(self.vehicle.fins),):
+            raise ConfigError(f"fins {tuple(fins.shape)}: the vehicle has {len(self.vehicle.fins)} fins")
         if eta.shape[-1] == 6:
             eta = eta6_to_eta7(eta)
         inputs = Inputs(command, fins, voltage, altitude)
@@ -280,8 +282,10 @@ class GreyBox(nn.Module):
         if self.damping is not None:
             terms["damping subnetworks"] = -self.damping(nu_r)
         terms["restoring"] = -restoring_force(rotation, body.weight, body.buoyancy, body.cg, body.cb)
-        if self._known("fin_area") is not None and inputs.fins is not None:
-            terms["fins"] = fin_force(nu_r, inputs.fins, *(self._known(f"fin_{n}") for n in
+        if self._known("fin_area") is not None:
+            # Fins whose angles are not known are still there: they are taken as held at zero.
+            angles = nu_r.new_zeros(len(self.vehicle.fins)) if inputs.fins is None else inputs.fins
+            terms["fins"] = fin_force(nu_r, angles, *(self._known(f"fin_{n}") for n in
                                       ("position", "axis", "area", "lift_slope", "stall")),
                                       float(self.vehicle.water_density))
         for effect in self.using("wrench"):

@@ -13,7 +13,7 @@ class Inputs:
 
     Attributes:
         command: thruster commands in [-1, 1], or the commanded wrench, N and N m, (..., T, n).
-        fins: fin angles, rad, (..., T, m), or None.
+        fins: fin angles, rad, (..., T, m), or None for fins held at zero.
         voltage: V, (..., T), or None.
         altitude: height above the bottom, m, (..., T), or None.
     """

@@ -166,6 +166,9 @@ def _leading_shape(
         )
     if not 0 <= warmup < times.shape[-1]:
         raise ConfigError(f"warmup={warmup} of {times.shape[-1]} rows: leave at least one to run from")
+    fins = len(model.vehicle.fins)
+    if fins and inputs.fins is not None and inputs.fins.shape[-1:] != (fins,):
+        raise ConfigError(f"fins of shape {tuple(inputs.fins.shape)}: the vehicle has {fins} fins")
     leading = {"eta0": eta0.shape[:-1], "nu0": nu0.shape[:-1], "commands": command.shape[:-2],
                "times": times.shape[:-1]}
     for name, tensor, sizes in (("fins", inputs.fins, 2), ("voltage", inputs.voltage, 1),
@@ -193,42 +196,46 @@ TABLEAUS = {
 
 def _fixed(model: GreyBox, state: tuple, inputs: Inputs, times: Tensor, drive: Any, substeps: int, tableau: tuple
            ) -> tuple[Tensor, Tensor]:
-    eta, nu = state
-    position, quaternion = eta[..., :3], eta[..., 3:]
+    # One tensor for the whole state: what costs here is the number of operations, not their size.
+    y = torch.cat(state, dim=-1)
     prepared = None if model.time_varying else model.prepare()
     stages, weights = tableau
     # Differences first: single precision would spoil the steps of a long log.
-    steps = ((times[..., 1:] - times[..., :-1]) / substeps).to(nu).unsqueeze(-1).unbind(-2)
-    starts = times.to(nu).unbind(-1)
+    steps = ((times[..., 1:] - times[..., :-1]) / substeps).to(y).unsqueeze(-1).unbind(-2)
+    starts = times.to(y).unbind(-1)
     rows = inputs.each()
-    etas, nus = [eta], [nu]
+
+    def rate(y: Tensor, thrust: Tensor, row: Inputs, time: Tensor) -> Tensor:
+        position, quaternion, nu = y.split((3, 4, 6), dim=-1)
+        rotation = quat_to_matrix(quaternion)
+        return torch.cat([
+            (rotation @ nu[..., :3].unsqueeze(-1)).squeeze(-1),
+            quat_derivative(quaternion, nu[..., 3:]),
+            model.nu_dot(position, rotation, nu, thrust, row, time, prepared),
+        ], dim=-1)
+
+    out = [y]
     for k, h in enumerate(steps):
+        flat = h.squeeze(-1)
         for part in range(substeps):
-            begin = starts[k] + part * h.squeeze(-1)
+            begin = starts[k] + part * flat if part else starts[k]
             mean = drive.mean[k][part]
             slope = None if drive.slope is None else drive.slope[k][part]
-            total = None
-            rate: tuple[Tensor, Tensor, Tensor] | None = None
+            total, last = None, None
             for c, weight in zip(stages, weights, strict=True):
-                p, q, v = position, quaternion, nu
-                if rate is not None:
-                    p, q, v = (y + (c * h) * r for y, r in zip((p, q, v), rate, strict=True))
+                at = y if last is None else y + (c * h) * last
                 thrust = mean if slope is None else mean + (c - 0.5) * slope
-                rotation = quat_to_matrix(q)
-                rate = (
-                    (rotation @ v[..., :3].unsqueeze(-1)).squeeze(-1),
-                    quat_derivative(q, v[..., 3:]),
-                    model.nu_dot(p, rotation, v, thrust, rows[k], begin + c * h.squeeze(-1), prepared),
-                )
+                last = rate(at, thrust, rows[k], begin + c * flat if c else begin)
                 if weight:
-                    part_sum = tuple((weight * h) * r for r in rate)
-                    total = part_sum if total is None else tuple(a + b for a, b in zip(total, part_sum, strict=True))
+                    total = weight * last if total is None else total + weight * last
             assert total is not None
-            position, quaternion, nu = position + total[0], quaternion + total[1], nu + total[2]
-            quaternion = quaternion / torch.linalg.norm(quaternion, dim=-1, keepdim=True)
-        etas.append(torch.cat([position, quaternion], dim=-1))
-        nus.append(nu)
-    return torch.stack(etas, dim=-2), torch.stack(nus, dim=-2)
+            y = y + h * total
+            quaternion = y[..., 3:7]
+            unit = quaternion / torch.linalg.vector_norm(quaternion, dim=-1, keepdim=True)
+            y = torch.cat([y[..., :3], unit, y[..., 7:]], dim=-1)
+        out.append(y)
+    run = torch.stack(out, dim=-2)
+    return run[..., :7], run[..., 7:]
 
 
 def _checked(model: GreyBox, run: Trajectory, inputs: Inputs) -> Trajectory:

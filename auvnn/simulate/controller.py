@@ -56,13 +56,15 @@ class Autopilot:
         """Choose the gains."""
         vehicle = model.vehicle
         self.limits, self.points, self.step = limits, points, step
-        self.gain = INNER * np.diagonal(vehicle.inertia_matrix)
+        # A sampled loop must stay slower than its samples.
+        fastest = 0.5 / step
+        self.gain = min(INNER, fastest) * np.diagonal(vehicle.inertia_matrix)
         self.turn = TURN
         self.range = limits.range.copy()
         self.integral = np.zeros((points.heading.shape[0], 6))
         self.steering: Array | None = None
         if limits.steady is not None:
-            self.gain[3:] *= FIN_INNER / INNER
+            self.gain[3:] = min(FIN_INNER, fastest) * np.diagonal(vehicle.inertia_matrix)[3:]
             self.turn = FIN_TURN
             slopes = fin_slopes(vehicle)[3:]
             self.steering = np.linalg.pinv(slopes, rcond=1e-3).astype(np.float64)

@@ -9,7 +9,7 @@ Each check is a function of a class that raises an `AssertionError` which says w
 
 from auvnn.testing.damping_checks import DAMPING_CHECKS, check_damping_form
 from auvnn.testing.effect_checks import EFFECT_CHECKS, check_effect
-from auvnn.testing.scene import Scene, example_vehicle, make_scene
+from auvnn.testing.scene import Scene, example_vehicle, make_scene, plain_vehicle
 
 __all__ = [
     "DAMPING_CHECKS",
@@ -19,4 +19,5 @@ __all__ = [
     "check_effect",
     "example_vehicle",
     "make_scene",
+    "plain_vehicle",
 ]

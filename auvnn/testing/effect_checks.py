@@ -8,17 +8,18 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
-from torch.func import functional_call, jacfwd, jacrev, vmap
 
 from auvnn.effects import Effect
 from auvnn.effects.base import HOOKS
 from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
+from auvnn.testing.effect_derivatives import has_right_gradient, recovers, transforms
 from auvnn.testing.scene import (
     EXAMPLE,
+    THETA,
     Predictor,
     Scene,
+    built,
     make_scene,
     require,
     require_close,
@@ -28,22 +29,7 @@ from auvnn.testing.scene import (
 from auvnn.testing.units import Units, powers
 from auvnn.vehicle import Vehicle
 
-THETA = "model.effects.0.theta"
 Kind = type[Effect]
-
-
-def _built(kind: Kind, vehicle: Vehicle, actuation: str, share: float = 0.4) -> Predictor:
-    values = typical_values(kind, vehicle, actuation, share)
-    return Predictor(GreyBox(vehicle, [kind.build(vehicle, actuation, values)], actuation=actuation))
-
-
-def _function(model: Predictor, scene: Scene) -> tuple[Callable[[Tensor], Tensor], Tensor]:
-    """Return all outputs as a function of the effect's parameters, and the parameters."""
-
-    def outputs(theta: Tensor) -> Tensor:
-        return together(functional_call(model, {THETA: theta}, (scene,))).flatten()
-
-    return outputs, model.get_parameter(THETA).detach().clone()
 
 
 def describes_itself(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
@@ -114,7 +100,7 @@ def vanishes(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters
 
 def batches(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
     """Check that a batch gives what its members give one by one."""
-    model, scene = _built(kind, vehicle, actuation), make_scene(vehicle, actuation, runs=3)
+    model, scene = built(kind, vehicle, actuation), make_scene(vehicle, actuation, runs=3)
     with torch.no_grad():
         whole = together(model(scene))
         for index in range(3):
@@ -125,10 +111,10 @@ def batches(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters"
 
 def follows_precision(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
     """Check that single precision stays single, is close to double, and that gradients have it too."""
-    model, scene = _built(kind, vehicle, actuation), make_scene(vehicle, actuation)
+    model, scene = built(kind, vehicle, actuation), make_scene(vehicle, actuation)
     exact = together(model(scene))
     require(exact.dtype == torch.float64, f"{kind.name}: double precision became {exact.dtype}")
-    single = _built(kind, vehicle, actuation).to(torch.float32)
+    single = built(kind, vehicle, actuation).to(torch.float32)
     for times in (scene.times, scene.times.float()):
         rounded = scene.change(lambda x: x.float())
         outputs = single(Scene(rounded.eta, rounded.nu, rounded.inputs, times, scene.warmup))
@@ -144,7 +130,7 @@ def follows_device(
     kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters", device: str = "meta"
 ) -> None:
     """Check that no tensor is left on another device; "meta" needs no hardware."""
-    model = _built(kind, vehicle, actuation).to(device)
+    model = built(kind, vehicle, actuation).to(device)
     scene = make_scene(vehicle, actuation).change(lambda x: x.to(device))
     effect, row = model.model.effect(kind.name), scene.inputs.each()[0]
     rate = model.model(
@@ -164,49 +150,9 @@ def follows_device(
         )
 
 
-def has_right_gradient(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
-    """Check the derivatives in the parameters: `gradcheck` in reverse, central differences in forward mode."""
-    model, scene = _built(kind, vehicle, actuation), make_scene(vehicle, actuation, runs=2, rows=2, warmup=1)
-    outputs, theta = _function(model, scene)
-    mix = torch.randn(
-        4, outputs(theta).numel(), generator=torch.Generator().manual_seed(1), dtype=torch.float64
-    )
-    torch.autograd.gradcheck(
-        lambda x: mix @ outputs(x), (theta.requires_grad_(),), eps=1e-6, rtol=1e-5, atol=1e-7
-    )
-    theta = theta.detach()
-    slope = jacfwd(outputs)(theta)
-    for i, p in enumerate(model.model.effect(kind.name).parameters_of):
-        step = torch.zeros_like(theta)
-        step[i] = 1e-4 * p.scale
-        with torch.no_grad():
-            difference = (outputs(theta + step) - outputs(theta - step)) / (2 * step[i])
-        require_close(slope[:, i], difference, 1e-5, f"{kind.name}.{p.name}: derivative")
-        moved = float((slope[:, i] * p.scale).abs().max())
-        require(moved > 1e-9, f"{kind.name}.{p.name} moves nothing that the model predicts")
-
-
-def transforms(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
-    """Check that `torch.func` sees through it, as the diagnosis needs: jacrev = jacfwd, vmap = loop."""
-    model, scene = _built(kind, vehicle, actuation), make_scene(vehicle, actuation, runs=2, rows=2, warmup=1)
-    outputs, theta = _function(model, scene)
-    require_close(
-        jacrev(outputs)(theta), jacfwd(outputs)(theta), 1e-10, f"{kind.name}: jacrev against jacfwd"
-    )
-    null = torch.tensor([p.null for p in model.model.effect(kind.name).parameters_of], dtype=theta.dtype)
-    require(
-        bool(torch.isfinite(jacfwd(outputs)(null)).all()),
-        f"{kind.name}: derivative at the null is not finite",
-    )
-    several = torch.stack([null, theta, 0.5 * (null + theta)])
-    with torch.no_grad():
-        looped = torch.stack([outputs(t) for t in several])
-    require_close(vmap(outputs)(several), looped, 1e-12, f"{kind.name}: vmap against a loop")
-
-
 def keeps_units(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
     """Check the declared units: in other units of mass, length and time the same things must happen."""
-    units, model, scene = Units(), _built(kind, vehicle, actuation), make_scene(vehicle, actuation)
+    units, model, scene = Units(), built(kind, vehicle, actuation), make_scene(vehicle, actuation)
     described = model.model.effect(kind.name).parameters_of
     other = units.vehicle(vehicle)
     twin = Predictor(GreyBox(other, [kind.build(other, actuation)], actuation=actuation))
@@ -222,7 +168,7 @@ def keeps_units(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrust
 
 def restores(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
     """Check that a state dict brings back the predictions to the last bit, and that copies share nothing."""
-    model, scene = _built(kind, vehicle, actuation), make_scene(vehicle, actuation)
+    model, scene = built(kind, vehicle, actuation), make_scene(vehicle, actuation)
     fresh = Predictor(GreyBox(vehicle, [kind.build(vehicle, actuation)], actuation=actuation))
     with torch.no_grad():
         expected = together(model(scene))
@@ -235,44 +181,32 @@ def restores(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters
         require(torch.equal(together(model(scene)), expected), f"{kind.name}: a copy shares its parameters")
 
 
-def recovers(
-    kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters", tolerance: float = 1e-6
-) -> None:
-    """Check that noise-free data made with the effect give its parameters back, by least squares.
+def answers_like_a_lag(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
+    """Check actuator dynamics: linear in the gap, the same in one step as in two, right moments.
 
-    The tolerance is relative to the parameters' distance from the null.
+    An effect without dynamics passes.
     """
-    from scipy.optimize import least_squares
-
-    model, scene = _built(kind, vehicle, actuation), make_scene(vehicle, actuation, runs=8, rows=3, warmup=2)
-    outputs, truth = _function(model, scene)
-    described = model.model.effect(kind.name).parameters_of
-    null = torch.tensor([p.null for p in described], dtype=truth.dtype)
-    low, high, scale = (np.array([getattr(p, k) for p in described]) for k in ("low", "high", "scale"))
-    jacobian = jacfwd(outputs)
+    if "respond" not in kind.hooks():
+        return
+    effect = kind.build(vehicle, actuation, typical_values(kind, vehicle, actuation))
+    state, demand = torch.tensor([3.0, -7.0, 20.0]).double(), torch.tensor([5.0, 11.0, -4.0]).double()
+    length, one, none = torch.full((3,), 0.3).double(), torch.ones(3).double(), torch.zeros(3).double()
     with torch.no_grad():
-        data = outputs(truth)
-    # Where the null says nothing the fit starts at a probe's distance, as the diagnosis does.
-    start = null + (0.8 if any(p.probes for p in described) else 0.3) * (truth - null)
-    with torch.no_grad():
-        fit = least_squares(
-            lambda x: (outputs(torch.tensor(x)) - data).numpy(),
-            start.numpy(),
-            jac=lambda x: jacobian(torch.tensor(x)).numpy(),
-            bounds=(low, high),
-            x_scale=scale,
-            xtol=1e-14,
-            ftol=1e-15,
-            gtol=1e-15,
-            max_nfev=40,
-        )
-    error = np.abs(fit.x - truth.numpy()) / np.maximum(np.abs((truth - null).numpy()), 1e-12)
-    worst = int(error.argmax())
-    require(
-        error[worst] <= tolerance,
-        f"{kind.name}.{described[worst].name}: recovered as {fit.x[worst]:.9g} "
-        f"instead of {float(truth[worst]):.9g}",
-    )
+        whole, unit = effect.respond(state, demand, length), effect.respond(one, none, length)
+        for name in ("end", "mean", "start", "slope"):
+            scaled = (state - demand) * getattr(unit, name) + (none if name == "slope" else demand)
+            require_close(
+                getattr(whole, name), scaled, 1e-12, f"{kind.name}: {name} is not linear in the gap"
+            )
+        half = effect.respond(state, demand, 0.5 * length).end
+        twice = effect.respond(half, demand, 0.5 * length).end
+        require_close(twice, whole.end, 1e-12, f"{kind.name}: two half steps against one")
+        nodes, weights = np.polynomial.legendre.leggauss(60)
+        parts = (torch.tensor(nodes) + 1)[:, None] / 2
+        curve, weight = effect.respond(state, demand, parts * length).end, torch.tensor(weights)[:, None] / 2
+        require_close(whole.mean, (weight * curve).sum(0), 1e-6, f"{kind.name}: mean over the step")
+        rise = 12 * (weight * curve * (parts - 0.5)).sum(0)
+        require_close(whole.slope, rise, 1e-6, f"{kind.name}: slope against the first moment")
 
 
 EFFECT_CHECKS: dict[str, Callable[..., None]] = {
@@ -288,6 +222,7 @@ EFFECT_CHECKS: dict[str, Callable[..., None]] = {
         transforms,
         keeps_units,
         restores,
+        answers_like_a_lag,
         recovers,
     )
 }

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 from torch import Tensor, nn
+from torch.func import functional_call
 
 from auvnn.effects import Effect, Sensed
 from auvnn.models import GreyBox, Inputs
@@ -99,6 +100,28 @@ def example_vehicle() -> Vehicle:
     )
 
 
+def plain_vehicle(**changes: Any) -> Vehicle:
+    """Return a vehicle simple enough to write its answers down by hand.
+
+    Neutrally buoyant, both centres at the origin, diagonal matrices, no damping and no thrusters, unless
+    `changes` says otherwise by keys of a model file.
+    """
+    plain = {
+        "name": "plain",
+        "frame": "FRD",
+        "gravity": 9.81,
+        "water_density": 1000.0,
+        "mass": 50.0,
+        "buoyancy": 490.5,
+        "length": 1.0,
+        "center_of_gravity": [0.0, 0.0, 0.0],
+        "center_of_buoyancy": [0.0, 0.0, 0.0],
+        "inertia": [[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 4.0]],
+        "added_mass": [20.0, 30.0, 40.0, 1.0, 1.5, 2.5],
+    }
+    return Vehicle.from_dict({**plain, **changes})
+
+
 @dataclass(frozen=True)
 class Scene:
     """States and inputs of B short runs; SI, float64 unless converted.
@@ -162,6 +185,10 @@ def make_scene(
     return Scene(eta, nu, inputs, torch.cumsum(steps, 0), warmup)
 
 
+THETA = "model.effects.0.theta"
+"""Name of the parameters of the only effect in a `Predictor`."""
+
+
 class Predictor(nn.Module):
     """Everything that a model predicts of a scene, as one function of its parameters."""
 
@@ -213,6 +240,21 @@ def typical_values(
             value = p.null - step
         values[p.name] = min(max(value, p.low), p.high)
     return values
+
+
+def built(kind: type[Effect], vehicle: Vehicle, actuation: str, share: float = 0.4) -> Predictor:
+    """Return a predictor of the vehicle with the effect away from its null, and nothing else."""
+    values = typical_values(kind, vehicle, actuation, share)
+    return Predictor(GreyBox(vehicle, [kind.build(vehicle, actuation, values)], actuation=actuation))
+
+
+def as_function(model: Predictor, scene: Scene) -> tuple[Callable[[Tensor], Tensor], Tensor]:
+    """Return all outputs as a function of the effect's parameters, and the parameters."""
+
+    def outputs(theta: Tensor) -> Tensor:
+        return together(functional_call(model, {THETA: theta}, (scene,))).flatten()
+
+    return outputs, model.get_parameter(THETA).detach().clone()
 
 
 EXAMPLE = example_vehicle()

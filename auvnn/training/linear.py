@@ -29,8 +29,6 @@ def solve_polynomial(
     Returns:
         Rows (m, p) in the order of the form's parameters (linear ones first), and the warnings.
     """
-    from scipy.linalg import lstsq
-
     rows, warnings = [], []
     for member, axis in enumerate(form.axes):
         columns, y = form.regressors(nu, member).numpy(), targets[member].numpy()
@@ -39,7 +37,7 @@ def solve_polynomial(
             columns, y = columns * root[:, None], y * root
         size = np.sqrt(np.mean(columns**2, axis=0))
         scaled = columns / np.where(size > 0, size, 1.0)
-        solution = np.asarray(lstsq(scaled, y, cond=RANK_TOLERANCE)[0])
+        solution = np.linalg.lstsq(scaled, y, rcond=RANK_TOLERANCE)[0]
         rows.append(torch.from_numpy(solution / np.where(size > 0, size, 1.0)))
         warnings += _doubts(AXES[axis], _names(form, axis), scaled)
     return torch.stack(rows), warnings

@@ -238,3 +238,16 @@ def test_a_mapping_of_the_users_own_keys_takes_them(auvnn):
 
 def test_colour_is_for_a_person_at_a_terminal(auvnn):
     assert "\x1b" not in auvnn("check", "log=dive.csv", "out=checked")[1]
+
+
+def test_a_folder_of_configs_adds_its_own(auvnn, refused):
+    Path("mine/dive").mkdir(parents=True)
+    Path("mine/dive/first.yaml").write_text("# @package _global_\nlog: dive.csv\nmapping: theirs.yaml\n")
+    Path("mine/noise").mkdir()
+    Path("mine/noise/harbour.yaml").write_text("name: harbour\naccelerations: false\n")
+    assert auvnn("check", "--config-dir", "mine", "+dive=first", "out=checked")[0] == 0
+    assert Path("checked/quality.json").read_text() == "theirs.yaml"
+    status, out, _ = auvnn("simulate", "--config-dir", "mine", "noise=harbour", "--cfg", "job")
+    assert status == 0 and yaml.safe_load(out)["noise"] == {"name": "harbour", "accelerations": False}
+    assert "'harbour'" in refused("simulate", "--config-dir", "mine", "noise=habour")
+    assert "no such folder" in refused("simulate", "--config-dir", "nine", "noise=harbour")

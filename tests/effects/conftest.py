@@ -6,21 +6,9 @@ import pytest
 import torch
 
 from auvnn.models import GreyBox
-from auvnn.vehicle import Vehicle
+from auvnn.testing import plain_vehicle
 
 DOUBLE = torch.float64
-
-PLAIN = {
-    "name": "plain", "frame": "FRD", "gravity": 9.81, "water_density": 1000.0, "mass": 50.0, "buoyancy": 490.5,
-    "length": 1.0, "center_of_gravity": [0.0, 0.0, 0.0], "center_of_buoyancy": [0.0, 0.0, 0.0],
-    "inertia": [[2.0, 0, 0], [0, 3.0, 0], [0, 0, 4.0]], "added_mass": [20.0, 30.0, 40.0, 1.0, 1.5, 2.5],
-    "uncertainty": {"added_mass": 0.1, "linear_damping": 0.2, "quadratic_damping": 0.2, "inertia": 0.05},
-}  # fmt: skip
-
-
-def plain_vehicle(**changes) -> Vehicle:
-    """Return a neutrally buoyant vehicle with diagonal matrices, without damping unless it is given."""
-    return Vehicle.from_dict({**PLAIN, **changes})
 
 
 @pytest.fixture

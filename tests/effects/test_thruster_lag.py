@@ -29,7 +29,7 @@ def test_the_thrust_after_a_step_is_one_minus_exponential(plain, tau):
 
 @pytest.mark.parametrize("tau", [1e-4, 0.02, 0.3, 4.0])
 def test_a_free_mass_gets_speed_and_place_of_the_exact_solution_at_any_step(plain, tau):
-    """From m u' = F (1 - exp(-t/tau)): u = F/m (t - tau e), x = F/m (t2/2 - tau t + tau2 e), e = 1 - exp(-t/tau)."""
+    """With e = 1 - exp(-t/tau): m u' = F e, u = F/m (t - tau e), x = F/m (t2/2 - tau t + tau2 e)."""
     run = step(plain({"thruster_lag": {"time_constant": tau}}), TIMES)
     for t, eta, nu in zip(TIMES.tolist(), run.eta, run.nu, strict=True):
         e = 1 - math.exp(-t / tau)
@@ -48,7 +48,7 @@ def test_the_settled_model_does_not_know_the_lag(plain, level, still, vector):
 
 
 def test_the_slope_at_the_null_is_that_of_a_short_lag(plain):
-    """Of speed: -F/m (1 - exp(...)) -> -F/m per second of time constant, right after every step of command."""
+    """The speed after a step of command, F/m (t - tau e), loses F/m per second of time constant."""
     model = plain({"thruster_lag": None})
     speed = step(model, TIMES).nu[-1, 0]
     (slope,) = torch.autograd.grad(speed, model.effects[0].theta)

@@ -119,7 +119,7 @@ def test_no_rows_and_no_numbers(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no rows"):
         Log.read(path)
     frame(make_run(60)).with_columns(pl.Series("u", [[1.0]] * 60)).write_parquet(path)
-    with pytest.raises(InputError, match="'u' is no column of numbers: it holds List"):
+    with pytest.raises(InputError, match="'u' is no column of numbers: it holds lists or records"):
         Log.read(path)
 
 

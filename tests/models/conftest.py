@@ -27,7 +27,7 @@ def example():
 
 @pytest.fixture
 def bank():
-    """Return damping subnetworks of several forms, away from their start, small beside the drag of a vehicle."""
+    """Return subnetworks of several forms, away from their start, small beside the drag of a vehicle."""
     made = DampingBank.from_description(
         {"form": "mlp", "each": {"K": "zero", "M": "polynomial", "N": "dissipative"}}
     )

@@ -54,7 +54,7 @@ def test_unknown_actuation_and_missing_thrusters_are_refused():
 @pytest.mark.parametrize("tau", [1e-9, 1e-5, 1e-3, 0.03, 0.2, 5.0])
 @pytest.mark.parametrize("substeps", [1, 3])
 def test_mean_and_first_moment_equal_those_of_the_exact_lag(tau, substeps):
-    """Against the exponential on a fine grid (denser where it is steep), step by step through several commands."""
+    """Against the exponential integrated numerically, step by step through several commands."""
     vehicle = load_vehicle("rov95")
     actuators = Actuators(vehicle, "wrench")
     random = np.random.default_rng(1)
@@ -64,7 +64,7 @@ def test_mean_and_first_moment_equal_those_of_the_exact_lag(tau, substeps):
     for k, length in enumerate(np.diff(times)):
         h = length / substeps
         for part in range(substeps):
-            # Integrals of the exact solution over the step, by Gauss-Legendre in pieces that follow its scale.
+            # Gauss-Legendre over the step, in pieces that follow the scale of the exponential.
             edges = np.unique(np.concatenate([[0.0], np.minimum(tau * np.geomspace(1e-3, 60, 60), h), [h]]))
             nodes, weights = np.polynomial.legendre.leggauss(8)
             s = (edges[:-1, None] + edges[1:, None]) / 2 + np.diff(edges)[:, None] / 2 * nodes

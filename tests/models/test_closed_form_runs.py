@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
 
 from auvnn.models import GreyBox, Inputs
 from auvnn.physics.energy import kinetic_energy
-from auvnn.vehicle import Vehicle, load_vehicle
+from auvnn.testing import example_vehicle, plain_vehicle
+from auvnn.vehicle import load_vehicle
 
 DOUBLE = torch.float64
-PLAIN = {
-    "name": "plain", "frame": "FRD", "gravity": 9.81, "water_density": 1000.0, "mass": 50.0, "buoyancy": 490.5,
-    "length": 1.0, "center_of_gravity": [0.0, 0.0, 0.0], "center_of_buoyancy": [0.0, 0.0, 0.0],
-    "inertia": [[2.0, 0, 0], [0, 3.0, 0], [0, 0, 4.0]], "added_mass": [20.0, 30.0, 40.0, 1.0, 1.5, 2.5],
-    "uncertainty": {"added_mass": 0.1, "inertia": 0.05, "linear_damping": 0.2, "quadratic_damping": 0.2},
-}  # fmt: skip
 
 
 def model_of(**changes):
-    return GreyBox(Vehicle.from_dict({**PLAIN, **changes}), actuation="wrench")
+    return GreyBox(plain_vehicle(**changes), actuation="wrench")
 
 
 def run(model, nu, wrench, times, eta=(0.0,) * 6, **options):
@@ -75,12 +71,16 @@ def test_small_rolling_has_the_period_of_a_pendulum():
 
 def test_without_forces_kinetic_energy_stays(bank):
     """RK4 loses it slowly, by a fifth-order amount: half the step, a thirty-second of the loss."""
-    from dataclasses import replace
 
-    from auvnn.testing import example_vehicle
-
-    vehicle = replace(example_vehicle(), linear_damping=None, quadratic_damping=None, damping_elements=(), fins=(),
-                      gravity=1e-300, buoyancy=1e-300)  # fmt: skip
+    vehicle = replace(
+        example_vehicle(),
+        linear_damping=None,
+        quadratic_damping=None,
+        damping_elements=(),
+        fins=(),
+        gravity=1e-300,
+        buoyancy=1e-300,
+    )
     model = GreyBox(vehicle, actuation="wrench")
     losses = []
     for step in (0.1, 0.05, 0.025):
@@ -121,8 +121,9 @@ def test_a_thruster_pushes_forwards_and_remus_reaches_a_plausible_speed():
     """Full thrust 3.86 N against 1.62 u2: 1.54 m/s."""
     vehicle = load_vehicle("remus100")
     model = GreyBox(vehicle, actuation="wrench")
-    fins = torch.zeros(1, 4, dtype=DOUBLE)
-    rate = model(torch.zeros(1, 6, dtype=DOUBLE), torch.tensor([[math.sqrt(3.86 / 1.62), 0, 0, 0, 0, 0]], dtype=DOUBLE),
-                 torch.tensor([[3.86, 0, 0, 0, 0, 0]], dtype=DOUBLE), fins=fins)  # fmt: skip
-    assert abs((model.prepare().total @ rate[0])[0].item()) < 1e-12
-    assert math.sqrt(3.86 / 1.62) == pytest.approx(1.54, abs=0.01)
+    speed = math.sqrt(3.86 / 1.62)
+    nu = torch.tensor([speed, 0, 0, 0, 0, 0], dtype=DOUBLE)
+    push = torch.tensor([3.86, 0, 0, 0, 0, 0], dtype=DOUBLE)
+    rate = model(torch.zeros(6, dtype=DOUBLE), nu, push, fins=torch.zeros(4, dtype=DOUBLE))
+    assert abs((model.prepare().total @ rate)[0].item()) < 1e-12
+    assert speed == pytest.approx(1.54, abs=0.01)

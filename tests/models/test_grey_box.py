@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -30,10 +31,9 @@ def written_out(vehicle, euler, nu, wrench):
     m_rb, m_a = vehicle.rigid_body, vehicle.added_mass
     m, i_o = vehicle.mass, vehicle.rigid_body[3:, 3:]
     # Fossen (2011), eq. 3.56: C_RB from the first of his forms, and eq. 6.43: C_A
-    c_rb = np.block([
-        [np.zeros((3, 3)), -m * skew(v) - m * skew(skew(w) @ vehicle.center_of_gravity)],
-        [-m * skew(v) - m * skew(skew(w) @ vehicle.center_of_gravity), m * skew(skew(v) @ vehicle.center_of_gravity) - skew(i_o @ w)],
-    ])  # fmt: skip
+    cross = -m * skew(v) - m * skew(skew(w) @ vehicle.center_of_gravity)
+    turning = m * skew(skew(v) @ vehicle.center_of_gravity) - skew(i_o @ w)
+    c_rb = np.block([[np.zeros((3, 3)), cross], [cross, turning]])
     a = m_a @ nu
     c_a = np.block([[np.zeros((3, 3)), -skew(a[:3])], [-skew(a[:3]), -skew(a[3:])]])
     weight, buoyancy = vehicle.mass * vehicle.gravity, vehicle.buoyancy
@@ -62,7 +62,7 @@ def written_out(vehicle, euler, nu, wrench):
 
 @pytest.mark.parametrize("name", ["example", *builtin_vehicles()])
 def test_it_is_fossens_equation(name):
-    vehicle = example_vehicle() if name == "example" else load_vehicle(name)
+    vehicle = replace(example_vehicle() if name == "example" else load_vehicle(name), fins=())
     model = GreyBox(vehicle, actuation="wrench")
     random = np.random.default_rng(0)
     for _ in range(10):
@@ -84,7 +84,7 @@ def test_thrusters_push_as_geometry_and_curves_say(example):
         else:
             thrust = np.interp(c, unit.curve.command, unit.curve.thrust)
         wrench += thrust * np.concatenate([unit.direction, np.cross(unit.position, unit.direction)])
-    commanded = GreyBox(example.vehicle, actuation="wrench")
+    commanded = GreyBox(example.vehicle, actuation="wrench")  # its fins are the same in both
     eta, nu = torch.tensor([0, 0, 5, 0.2, 0.1, 1], dtype=DOUBLE), torch.full((6,), 0.3, dtype=DOUBLE)
     torch.testing.assert_close(
         example(eta, nu, torch.tensor(command)),
@@ -288,15 +288,28 @@ def test_parameters_and_state_are_seen_by_function_transforms(rov, bank):
     summed = sum((rows[k].flatten(2) @ direction[k].flatten()) for k in start)
     torch.testing.assert_close(summed, along, rtol=1e-9, atol=1e-10)
     step = 1e-6
-    ends = [acceleration({k: v + s * step * direction[k] for k, v in start.items()}, scene.eta, scene.nu, command)
-            for s in (1, -1)]  # fmt: skip
+    ends = []
+    for sign in (1, -1):
+        moved = {k: v + sign * step * direction[k] for k, v in start.items()}
+        ends.append(acceleration(moved, scene.eta, scene.nu, command))
     torch.testing.assert_close(along, (ends[0] - ends[1]) / (2 * step), rtol=1e-6, atol=1e-7)
+
+
+def test_fins_without_stated_angles_are_held_at_zero():
+    """A passive fin at the stern steers against a sideslip; leaving it out would lose half of it."""
+    model = GreyBox(load_vehicle("remus100"))
+    eta, nu = torch.zeros(6, dtype=DOUBLE), torch.tensor([1.5, 0.2, 0, 0, 0, 0], dtype=DOUBLE)
+    command = torch.zeros(1, dtype=DOUBLE)
+    silent = model(eta, nu, command)
+    assert torch.equal(silent, model(eta, nu, command, fins=torch.zeros(4, dtype=DOUBLE)))
+    bare = GreyBox(replace(model.vehicle, fins=()))
+    assert silent[5] > bare(eta, nu, command)[5]
+    with pytest.raises(ConfigError, match=r"fins \(3,\): the vehicle has 4 fins"):
+        model(eta, nu, command, fins=torch.zeros(3, dtype=DOUBLE))
 
 
 def test_a_model_knows_by_itself_how_it_is_driven(rov):
     assert GreyBox(load_vehicle("rov95")).actuation == "thrusters"
-    from dataclasses import replace
-
     assert GreyBox(replace(load_vehicle("rov95"), thrusters=())).actuation == "wrench"
 
 

@@ -58,7 +58,7 @@ def test_the_lag_does_not_spoil_the_order_over_resolved_steps(rov, forced):
 
 
 def test_commands_are_held_from_their_row_to_the_next(rov, forced):
-    """Splitting an interval under the same command changes nothing beyond rounding; the last row does not act."""
+    """Splitting an interval under the same command changes nothing; the last row does not act."""
     eta, nu, wrench = forced
     coarse, fine = (
         torch.tensor([0.0, 0.1, 0.2], dtype=DOUBLE),
@@ -328,3 +328,10 @@ def test_what_does_not_fit_is_answered_in_one_line(rov, forced):
         with pytest.raises(ConfigError, match=words) as caught:
             rov.rollout(*arguments, **options)
         assert "\n" not in str(caught.value)
+
+
+def test_fin_angles_that_do_not_fit_the_vehicle_are_refused(example):
+    scene = make_scene(example.vehicle, "thrusters", runs=2)
+    scene.inputs.fins.resize_(2, 6, 1)
+    with pytest.raises(ConfigError, match=r"fins of shape \(2, 6, 1\): the vehicle has 2 fins"):
+        free_run(example, scene)

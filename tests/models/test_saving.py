@@ -165,9 +165,13 @@ def test_effects_that_a_file_states_are_in_the_model(tmp_path):
 
 @pytest.mark.parametrize(
     ("effects", "words"),
-    [({"ocean_curent": {}}, "Did you mean 'ocean_current'"), ({"ocean_current": {"north": 1.0}}, "v_north"),
-     ({"ocean_current": {"v_north": 50.0}}, "out of bounds"), ({"ocean_current": {"v_north": "fast"}}, "number")],
-)  # fmt: skip
+    [
+        ({"ocean_curent": {}}, "Did you mean 'ocean_current'"),
+        ({"ocean_current": {"north": 1.0}}, "v_north"),
+        ({"ocean_current": {"v_north": 50.0}}, "out of bounds"),
+        ({"ocean_current": {"v_north": "fast"}}, "number"),
+    ],
+)
 def test_effects_that_a_file_states_wrongly_are_refused(tmp_path, effects, words):
     path = tmp_path / "mine.yaml"
     path.write_text(yaml.safe_dump({**load_vehicle("rov95").to_dict(), "effects": effects}))

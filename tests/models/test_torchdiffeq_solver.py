@@ -102,7 +102,7 @@ def test_the_budget_of_evaluations_ends_a_hopeless_run(rov, forced, monkeypatch)
 
 
 def test_a_command_that_is_no_number_costs_no_more_than_any_other(rov, forced, monkeypatch):
-    """Adaptive methods would shrink their step for ever; their own guard is an assertion, gone under `python -O`."""
+    """Adaptive methods would shrink their step for ever; their guard is an assertion, gone under `-O`."""
     eta, nu, wrench = forced
     calls = []
     original = GreyBox.nu_dot

@@ -6,8 +6,10 @@ import re
 from html.parser import HTMLParser
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}
-FORBIDDEN = {"script", "iframe", "object", "embed", "base", "form", "link", "foreignobject", "animate", "set", "audio",
-             "video", "source", "template"}  # fmt: skip
+FORBIDDEN = {
+    *("script", "iframe", "object", "embed", "base", "form", "link", "foreignobject", "animate", "set"),
+    *("audio", "video", "source", "template"),
+}
 
 
 class PageText(HTMLParser):

@@ -283,33 +283,64 @@ def quality(n: int = 4000, runs: int = 3, **other) -> Fake:
         schema="auvnn/quality/1",
         log=SimpleNamespace(name="dive-1", runs=[FakeRun(i + 1, n) for i in range(runs)]),
         read={
-            "files": ["dive-1.csv"], "sha256": "ab" * 32, "columns": ["run", "t", *CHANNELS, "voltage"],
-            "unknown_columns": ["gps_fix"], "actuation": "thrusters",
+            "files": ["dive-1.csv"],
+            "sha256": "ab" * 32,
+            "columns": ["run", "t", *CHANNELS, "voltage"],
+            "unknown_columns": ["gps_fix"],
+            "actuation": "thrusters",
         },
         metrics={
-            "samples": n * runs, "runs": runs, "duration_s": 0.05 * n * runs, "rate_hz": 20.0, "valid_share": 0.87,
+            "samples": n * runs,
+            "runs": runs,
+            "duration_s": 0.05 * n * runs,
+            "rate_hz": 20.0,
+            "valid_share": 0.87,
             "gaps": 1,
         },
         runs=[
-            {"run": i + 1, "samples": n, "duration_s": 0.05 * n, "rate_hz": 20.0, "gaps": int(i == 1),
-             "longest_step_s": 40.0 if i == 1 else 0.05, "valid_share": 0.87}
+            {
+                "run": i + 1,
+                "samples": n,
+                "duration_s": 0.05 * n,
+                "rate_hz": 20.0,
+                "gaps": int(i == 1),
+                "longest_step_s": 40.0 if i == 1 else 0.05,
+                "valid_share": 0.87,
+            }
             for i in range(runs)
         ],
         channels={
-            c: {"unit": "m/s" if i < 3 else "rad/s", "missing_share": 0.13 if c == "u" else 0.0, "std": 0.3, "min": -0.9,
-                "max": 0.8, "noise_std": 0.004, "frozen_share": 0.0, "repeated_share": 0.01, "spikes": 3}
+            c: {
+                "unit": "m/s" if i < 3 else "rad/s",
+                "missing_share": 0.13 if c == "u" else 0.0,
+                "std": 0.3,
+                "min": -0.9,
+                "max": 0.8,
+                "noise_std": 0.004,
+                "frozen_share": 0.0,
+                "repeated_share": 0.01,
+                "spikes": 3,
+            }
             for i, c in enumerate(CHANNELS)
         },
         findings=[
-            {"level": "warning", "where": "p", "what": "p has the opposite sign of the attitude's derivative",
-             "cure": "scale: -1 in the mapping"},
-            {"level": "repair", "where": "dive-1.csv", "what": "duplicate stamps were dropped "
-                                                               "(4)", "cure": ""},
+            {
+                "level": "warning",
+                "where": "p",
+                "what": "p has the opposite sign of the attitude's derivative",
+                "cure": "scale: -1 in the mapping",
+            },
+            {
+                "level": "repair",
+                "where": "dive-1.csv",
+                "what": "duplicate stamps were dropped (4)",
+                "cure": "",
+            },
             {"level": "info", "where": "columns", "what": "kept but not used: gps_fix", "cure": ""},
         ],
         kinematics={
-            c: {"scale": -0.97 if c in "pq" else 1.01, "correlation": 0.97, "lag_s": 0.02, "verdict": "agrees"}
-            for c in CHANNELS
+            c: {"scale": s, "correlation": 0.97, "lag_s": 0.02, "verdict": "agrees" if s > 0 else "reversed"}
+            for c, s in zip(CHANNELS, (1.01, 0.99, 1.02, -0.97, -0.98, 1.0), strict=True)
         },
         excitation={
             "condition": 12.0,
@@ -318,7 +349,7 @@ def quality(n: int = 4000, runs: int = 3, **other) -> Fake:
                 for c, s in zip(CHANNELS, (0.4, 0.1, 0.05, 0.006, 0.02, 0.3), strict=True)
             },
         },
-    )  # fmt: skip
+    )
     answer.json = tuple(k for k in vars(answer) if k not in ("json", "log"))
     answer.__dict__.update(other)
     return answer
@@ -368,11 +399,12 @@ def demo(n: int = 4000, **other) -> Fake:
     return answer
 
 
-ANSWERS = {
-    "quality": quality,
-    "comparison": comparison,
-    "diagnosis": diagnosis,
-    "improvement": improvement,
-    "training": training,
-    "demo": demo,
-}
+KINDS = ("quality", "comparison", "diagnosis", "improvement", "training", "demo")
+
+
+def make(kind: str, n: int = 300, runs: int = 2) -> Fake:
+    """Return an answer of any kind with `n` samples in each of its runs."""
+    sized = {"quality": quality, "comparison": comparison, "improvement": improvement}
+    if kind in sized:
+        return sized[kind](n, runs)
+    return {"diagnosis": diagnosis, "training": training, "demo": lambda: demo(n)}[kind]()

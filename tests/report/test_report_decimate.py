@@ -104,7 +104,7 @@ def test_a_diverged_moment_does_not_hide_a_long_error():
     model[10, 0] = 1e30
     model[4000:4300] += 5.0
     part = telling_window(t, measured, model, 60.0)
-    assert 4000 >= part.start and part.stop >= 4300
+    assert part.start <= 4000 and part.stop >= 4300
 
 
 def test_a_short_record_is_its_own_window():

@@ -11,10 +11,12 @@ from auvnn.report.plots.timeline import timeline
 
 EVIL = """<?xml version="1.0"?>
 <!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd">
-<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="0 0 9 9" onload="x()">
+<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="0 0 9 9"
+onload="x()">
 <!-- <script>alert(1)</script> -->
 <script>alert(1)</script><style>@import url(http://evil/x.css); body {display: none}</style>
-<foreignObject><body xmlns="http://www.w3.org/1999/xhtml" onload="x()"><script>alert(2)</script></body></foreignObject>
+<foreignObject><body xmlns="http://www.w3.org/1999/xhtml" onload="x()"><script>alert(2)</script></body>
+</foreignObject>
 <a xlink:href="javascript:alert(3)"><path id="inside" d="M0 0"/></a>
 <image xlink:href="http://evil/x.png"/><image xlink:href="data:image/svg+xml;base64,AAAA"/>
 <image xlink:href="data:image/png;base64,AAAA"/>

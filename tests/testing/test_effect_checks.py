@@ -1,4 +1,4 @@
-"""The contract checks catch what they are there to catch: for each, an effect that breaks just that promise."""
+"""The contract checks catch what they are there for: for each, an effect that breaks just that promise."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from auvnn.effects import EFFECTS, Effect, Parameter
+from auvnn.effects import EFFECTS, Effect, Parameter, Response
 from auvnn.testing import EFFECT_CHECKS, check_effect, example_vehicle
 from auvnn.testing.units import Units, powers
 
@@ -121,14 +121,38 @@ class MovesNothing(Push):
         return torch.zeros_like(moment.nu) * self.theta[0] * self.theta[1]
 
 
+class Overshoots(EFFECTS.get("thruster_lag")):
+    def respond(self, state, demand, step):
+        return replace(super().respond(state, demand, step), mean=demand)
+
+
+class RateLimited(EFFECTS.get("thruster_lag")):
+    def respond(self, state, demand, step):
+        end = state + torch.clamp(demand - state, -1.0, 1.0) * step
+        return Response(end, 0.5 * (state + end), end - state, state)
+
+
 BROKEN = [
-    ("describes_itself", NoScale), ("describes_itself", NullOutOfBounds), ("describes_itself", NoCause),
-    ("describes_itself", NoHook), ("describes_itself", NotSI), ("refuses", AnythingGoes), ("vanishes", NeverQuiet),
-    ("batches", MixesRuns), ("follows_precision", AlwaysDouble), ("follows_device", AlwaysDouble),
-    ("has_right_gradient", Detached), ("has_right_gradient", HalfDetached), ("has_right_gradient", MovesNothing),
-    ("transforms", LooksAtNumbers), ("keeps_units", WrongUnit), ("restores", ForgetsItsState),
+    ("answers_like_a_lag", Overshoots),
+    ("answers_like_a_lag", RateLimited),
+    ("describes_itself", NoScale),
+    ("describes_itself", NullOutOfBounds),
+    ("describes_itself", NoCause),
+    ("describes_itself", NoHook),
+    ("describes_itself", NotSI),
+    ("refuses", AnythingGoes),
+    ("vanishes", NeverQuiet),
+    ("batches", MixesRuns),
+    ("follows_precision", AlwaysDouble),
+    ("follows_device", AlwaysDouble),
+    ("has_right_gradient", Detached),
+    ("has_right_gradient", HalfDetached),
+    ("has_right_gradient", MovesNothing),
+    ("transforms", LooksAtNumbers),
+    ("keeps_units", WrongUnit),
+    ("restores", ForgetsItsState),
     ("recovers", Degenerate),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("check", "kind"), BROKEN, ids=lambda x: x if isinstance(x, str) else x.__name__)
@@ -156,9 +180,16 @@ def test_the_example_vehicle_is_a_sound_one_that_has_everything():
 
 @pytest.mark.parametrize(
     ("unit", "expected"),
-    [("1", (0, 0, 0)), ("m/s2", (0, 1, -2)), ("N m", (1, 2, -2)), ("N s2/m2", (1, -1, 0)), ("1/s", (0, 0, -1)),
-     ("rad/s", (0, 0, -1)), ("N s/rad", (1, 1, -1))],
-)  # fmt: skip
+    [
+        ("1", (0, 0, 0)),
+        ("m/s2", (0, 1, -2)),
+        ("N m", (1, 2, -2)),
+        ("N s2/m2", (1, -1, 0)),
+        ("1/s", (0, 0, -1)),
+        ("rad/s", (0, 0, -1)),
+        ("N s/rad", (1, 1, -1)),
+    ],
+)
 def test_units_are_read(unit, expected):
     assert powers(unit) == expected
 

@@ -1,0 +1,159 @@
+"""Check a Parquet file's own counts and checksums before anything is decoded.
+
+A decoder believes the counts in the footer and in the page headers and reserves memory for them; on
+damage that ends the whole process, which no `except` can catch. Here every count is compared with the
+others and every checksum with its page. The structures are those of the parquet-format specification.
+"""
+
+from __future__ import annotations
+
+import mmap
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from auvnn.errors import InputError
+from auvnn.logs.readers.thrift import Cursor, Struct, ThriftError
+
+MAGIC = b"PAR1"
+_MAX_ROWS = 2**40
+_DATA, _DICTIONARY, _DATA_V2 = 0, 2, 3
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What the footer says.
+
+    Args:
+        rows: number of rows.
+        flat: names of the columns that hold one value per row.
+        nested: names of those that hold lists or records.
+        bytes: size of all pages when unpacked.
+    """
+
+    rows: int
+    flat: list[str]
+    nested: list[str]
+    bytes: int
+
+
+def check(path: Path) -> Contents:
+    """Return what a Parquet file holds, after its counts and checksums have been compared.
+
+    Raises:
+        InputError: it is cut short or damaged.
+    """
+    where = str(path)
+    try:
+        with path.open("rb") as stream:
+            size = stream.seek(0, 2)
+            if size < 12:
+                raise InputError(f"{where}: is cut short: {size} bytes are no Parquet file; copy it again")
+            with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+                return _check(data, size, where)
+    except OSError as problem:
+        raise InputError(f"{where}: cannot be read: {problem}") from None
+    except InputError:
+        raise
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as problem:
+        # Fields of another type than they must have raise these; any of them means damage.
+        raise InputError(f"{where}: is a damaged Parquet file ({problem}); copy it again") from None
+
+
+def _check(data: Any, size: int, where: str) -> Contents:
+    if data[size - 4 : size] == b"PARE":
+        raise InputError(f"{where}: is an encrypted Parquet file; save it without encryption")
+    if data[size - 4 : size] != MAGIC:
+        raise InputError(
+            f"{where}: is cut short: the table of contents at its end is missing; copy it again"
+        )
+    footer = int.from_bytes(data[size - 8 : size - 4], "little")
+    start = size - 8 - footer
+    if start < 4:
+        raise ThriftError("its table of contents is larger than the file")
+    meta = Cursor(data, start, size - 8).struct()
+    rows, groups = meta[3], meta[4]
+    if not 0 <= rows < _MAX_ROWS or sum(group[3] for group in groups) != rows:
+        raise ThriftError("the number of rows is not that of its parts")
+    total = 0
+    for group in groups:
+        for chunk in group[1]:
+            total += _check_chunk(data, chunk, group[3], start)
+    flat, nested = _columns(meta[2])
+    return Contents(rows, flat, nested, total)
+
+
+def _columns(schema: list[Struct]) -> tuple[list[str], list[str]]:
+    flat, nested = [], []
+    root, i = schema[0].get(5, 0), 1
+    for _ in range(root):
+        element = schema[i]
+        repeated = element.get(3, 0) == 2
+        (nested if element.get(5, 0) or repeated else flat).append(element[4].decode())
+        i = _after(schema, i)
+    return flat, nested
+
+
+def _after(schema: list[Struct], i: int) -> int:
+    """Return the index behind a schema element and all that is below it."""
+    pending = 1
+    while pending:
+        pending += schema[i].get(5, 0) - 1
+        i += 1
+        if pending < 0:
+            raise ThriftError("its schema is no tree")
+    return i
+
+
+def _check_chunk(data: Any, chunk: Struct, rows: int, end: int) -> int:
+    meta = chunk[3]
+    values, unpacked = meta[5], meta[6]
+    flat = len(meta[3]) == 1
+    if rows < 0 or values < 0 or unpacked < 0 or (flat and values != rows):
+        raise ThriftError("a column has another number of values than rows")
+    dictionary = meta.get(11, 0)
+    place = min(p for p in (meta[9], dictionary) if p > 0)
+    seen = 0
+    while seen < values:
+        if not 4 <= place < end:
+            raise ThriftError("a page lies outside the file")
+        cursor = Cursor(data, place, end)
+        header = cursor.struct()
+        count = _check_page(data, header, cursor.place, end, unpacked)
+        if header[1] in (_DATA, _DATA_V2):
+            if count == 0:
+                raise ThriftError("a page is empty")
+            seen += count
+        place = cursor.place + header[3]
+    if seen != values:
+        raise ThriftError("the pages of a column hold another number of values than the column")
+    return int(unpacked)
+
+
+def _check_page(data: Any, header: Struct, place: int, end: int, most: int) -> int:
+    """Return the number of values that a page header promises, after all its numbers have been compared."""
+    unpacked, packed = header[2], header[3]
+    if not (0 <= packed <= end - place and 0 <= unpacked <= max(most, packed)):
+        raise ThriftError("a page is larger than its column")
+    if 4 in header and zlib.crc32(data[place : place + packed]) != header[4] & 0xFFFFFFFF:
+        raise ThriftError("a page's checksum is wrong")
+    if header[1] == _DATA_V2:
+        page = header[8]
+        levels = page[5] + page[6]
+        if not (0 <= page[2] <= page[1] and 0 <= page[3] <= page[1] and min(page[5], page[6]) >= 0):
+            raise ThriftError("a page's counts contradict each other")
+        if levels > packed:
+            raise ThriftError("a page's levels are larger than the page")
+    elif header[1] == _DATA:
+        page = header[5]
+    elif header[1] == _DICTIONARY:
+        page = header[7]
+        if page[1] > unpacked:
+            raise ThriftError("a dictionary has more entries than bytes")
+    else:
+        return 0
+    count = page[1]
+    if not 0 <= count < _MAX_ROWS:
+        raise ThriftError("a page has an impossible number of values")
+    return int(count)

@@ -1,0 +1,271 @@
+"""The page of `benchmark`: how often the right name is found, how often a wrong one, how sure."""
+
+from __future__ import annotations
+
+import functools
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from auvnn.report.html import Table
+from auvnn.report.page import Page, Plot
+from auvnn.report.pages import outcomes
+from auvnn.report.pages.outcomes import NOTHING, Row, in_group, names, right, rows_of, text, values
+from auvnn.report.plots.confusion import confusion
+from auvnn.report.plots.coverage import Z95, coverage
+from auvnn.report.plots.recovery import recovery, wilson
+from auvnn.report.view import View
+from auvnn.report.words import count, finite, listing, number, p_value, percent, plural
+
+TARGET = 0.9
+MOST_CONDITIONS = 8  # for which there is a figure each
+
+
+class BenchmarkPage(Page):
+    """What a benchmark says."""
+
+    kind = "benchmark"
+
+    def title(self, view: View) -> str:
+        """Return the heading."""
+        return "Hidden effects: how often the right one is named"
+
+    def about(self, view: View) -> str:
+        """Return vehicles and conditions."""
+        rows = rows_of(view)
+        vehicle, noise, excitation = (listing(values(rows, key)) for key in outcomes.CONDITION)
+        return f"{vehicle}, noise {noise}, manoeuvre {excitation}: {plural(len(rows), 'log')}" if rows else ""
+
+    def brief(self, view: View) -> list[str]:
+        """Return the verdict in plain words."""
+        rows = rows_of(view)
+        if not rows:
+            return []
+        hidden = outcomes.with_effect(rows)
+        out = [*_naming_words(hidden), _null_words(outcomes.with_nothing(rows))]
+        out += [_wrong_words(rows, view.mapping("metrics")), *_interval_words(hidden)]
+        faults = sum(text(r, "verdict") == "fault" for r in rows)
+        if faults:
+            out.append(f"{plural(faults, 'log')} ended in a fault instead of an answer.")
+        return out
+
+    def warnings(self, view: View) -> list[str]:
+        """Return what a reader must keep in mind."""
+        out = view.texts("warnings")
+        if values(rows_of(view), "coefficients") == ["exact"]:
+            out.append(
+                "The plants' coefficients are exactly those of the model. A vehicle's are not; with "
+                "coefficients=drawn they are off by their stated uncertainty."
+            )
+        return out
+
+    def plots(self, view: View) -> list[Plot]:
+        """Return the figures."""
+        rows = rows_of(view)
+        found = [
+            Plot(
+                "confusion",
+                "What was hidden, and what was answered",
+                lambda: confusion(*outcomes.confusion_counts(rows)),
+                "Each row holds the logs that hide the same. The number says how many of them got this "
+                "answer in the first step, the shade their share of the row. Framed: the right answer; bold: "
+                "another. Ambiguous: a group was declared that the log cannot tell apart.",
+            ),
+            Plot(
+                "recovery",
+                "How often the hidden effect is named first",
+                lambda: _recovery(rows),
+                "Share of the logs in which the hidden effect, and it alone, is named first, with Wilson's "
+                "95 % interval. Sizes are in standard errors of a fit that knows everything else.",
+            ),
+            Plot(
+                "coverage",
+                "Whether the stated uncertainties are true",
+                lambda: coverage(outcomes.errors(rows, "z")),
+                "Errors of the parameters in units of their own standard errors, from all logs in which the "
+                "hidden effect was named first. Left: true standard errors would give the drawn curve. "
+                "Right: they would give points on the line; a steeper course means that the standard errors "
+                "are too small, a flatter one that they are too large. Parameters of one log err together, "
+                "so the points may leave the band more often than one in twenty.",
+            ),
+        ]
+        parts = outcomes.by_condition(rows)
+        if 1 < len(parts) <= MOST_CONDITIONS:
+            found += [_one_condition(i, *part) for i, part in enumerate(parts.items(), 1)]
+        return found
+
+    def tables(self, view: View) -> list[Table]:
+        """Return the tables."""
+        rows = rows_of(view)
+        metrics = [[str(k), _value(v)] for k, v in view.mapping("metrics").items()]
+        caption = (
+            "Candidates: the three that came first, whatever the verdict said of them. The seed and the "
+            "options make the same log again."
+        )
+        return [
+            Table("By condition", *_condition_table(rows), words=3),
+            Table("By what was hidden", *_case_table(view), words=5),
+            Table("Logs that were not answered right", *_wrong_table(rows), caption, words=7),
+            Table("Metrics", ["name", "value"], metrics),
+        ]
+
+    def assumed(self, view: View) -> list[tuple[str, str]]:
+        """Return what was read and assumed."""
+        rows = rows_of(view)
+        seeds = [str(round(s)) for s in outcomes.numbers(rows, "seed")]
+        runs, duration, rate = (
+            listing(map(number, outcomes.numbers(rows, key))) for key in ("runs", "duration", "rate")
+        )
+        repeats = finite(view.mapping("options").get("repeats"))
+        return [
+            ("Vehicles", listing(values(rows, "vehicle"))),
+            ("Hidden", listing(values(rows, "hidden"))),
+            ("Sizes", listing(s for s in values(rows, "size") if s != "none")),
+            ("Noise", listing(values(rows, "noise"))),
+            ("Manoeuvres", listing(values(rows, "excitation"))),
+            ("Coefficients", listing(values(rows, "coefficients"))),
+            ("Each log", f"{runs} runs of {duration} s at {rate} Hz" if runs and duration and rate else ""),
+            ("Of each kind", "" if repeats is None else plural(repeats, "log")),
+            ("Seeds", " to ".join(dict.fromkeys([seeds[0], seeds[-1]])) if seeds else ""),
+        ]
+
+
+def _recovery(rows: Sequence[Row]) -> Figure:
+    return recovery(outcomes.found_by_size(rows), target=TARGET)
+
+
+def _one_condition(i: int, condition: Sequence[str], rows: Sequence[Row]) -> Plot:
+    vehicle, noise, excitation = condition
+    return Plot(
+        f"recovery_{i}",
+        f"Named first: {vehicle}, noise {noise}, manoeuvre {excitation}",
+        functools.partial(_recovery, rows),
+        f"As the figure of this kind above, from the {plural(len(rows), 'log')} of one condition alone.",
+        folded=True,
+    )
+
+
+def _share_words(k: int, n: int) -> str:
+    low, high = (100 * end for end in wilson(k, n))
+    return f"{percent(k / n)}; 95\N{NO-BREAK SPACE}% interval {low:.0f} to {high:.0f}\N{NO-BREAK SPACE}%"
+
+
+def _naming_words(hidden: Sequence[Row]) -> list[str]:
+    if not hidden:
+        return ["No log hides an effect, so this says nothing of how often one is found."]
+    named, groups = sum(map(right, hidden)), sum(map(in_group, hidden))
+    also = f"; in {count(groups)} more it is in a group that the log cannot tell apart" if groups else ""
+    out = [
+        f"In {count(named)} of {plural(len(hidden), 'log')} the hidden effect is named first "
+        f"({_share_words(named, len(hidden))}){also}."
+    ]
+    lost = [r for r in hidden if not right(r)]
+    if lost:
+        name, most = Counter(text(r, "hidden") for r in lost).most_common(1)[0]
+        of = sum(text(r, "hidden") == name for r in hidden)
+        instead = Counter(outcomes.answer(r) for r in lost if text(r, "hidden") == name).most_common(2)
+        words = listing(f"{answer} ({count(n)})" for answer, n in instead)
+        out.append(f"Most often missed is {name}, {count(most)} of {count(of)}: the answer was {words}.")
+    return out
+
+
+def _null_words(null: Sequence[Row]) -> str:
+    if not null:
+        return "Something is hidden in every log, so this says nothing of false alarms."
+    found = sum(map(right, null))
+    words = f"With nothing hidden, {count(found)} of {plural(len(null), 'log')}"
+    return f"{words} {'is' if found == 1 else 'are'} found adequate ({_share_words(found, len(null))})."
+
+
+def _wrong_words(rows: Sequence[Row], metrics: Mapping[str, Any]) -> str:
+    share = finite(metrics.get("false_discovery_share"))
+    given = [(text(r, "hidden"), n) for r in rows if text(r, "verdict") == "named" for n in names(r)]
+    if not given:
+        return "No effect is named in any log."
+    if share is None:
+        share = sum(name != hidden for hidden, name in given) / len(given)
+    return f"Of {plural(len(given), 'name')} that were given, {percent(share)} are wrong."
+
+
+def _interval_words(hidden: Sequence[Row]) -> list[str]:
+    z = outcomes.errors(hidden, "z")
+    if not z.size:
+        return []
+    worst = []
+    for noise in values(hidden, "noise"):
+        off = outcomes.errors([r for r in hidden if r.get("noise") == noise], "relative")
+        worst += [f"{percent(off.max())} with noise {noise}"] if off.size else []
+    inside = int((np.abs(z) < Z95).sum())
+    sizes = f"; the largest error is, relative to the effect's size, {listing(worst)}" if worst else ""
+    return [f"{count(inside)} of {plural(z.size, '95 % interval')} hold the true value{sizes}."]
+
+
+def _condition_table(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
+    head = ["vehicle", "noise", "manoeuvre", "logs with an effect", "named first", "or in a group",
+            "largest relative error", "logs with nothing", "found adequate", "faults"]  # fmt: skip
+    out = []
+    for condition, members in outcomes.by_condition(rows).items():
+        hidden, null = outcomes.with_effect(members), outcomes.with_nothing(members)
+        named, off = sum(map(right, hidden)), outcomes.errors(hidden, "relative")
+        group = named + sum(map(in_group, hidden))
+        found = [count(len(hidden)), _of(named, len(hidden)), _of(group, len(hidden))]
+        nothing = [count(len(null)), _of(sum(map(right, null)), len(null))]
+        faults = count(sum(text(r, "verdict") == "fault" for r in members))
+        out.append([*condition, *found, percent(off.max()) if off.size else "–", *nothing, faults])
+    return head, out
+
+
+def _of(k: int, n: int) -> str:
+    return f"{count(k)} ({percent(k / n)})" if n else "–"
+
+
+def _case_table(view: View) -> tuple[list[str], list[list[str]]]:
+    head = ["hidden", "size", "noise", "manoeuvre", "answers", "logs", "named first", "or in a group",
+            "largest relative error"]  # fmt: skip
+    entries = [e for e in view.items("table") if isinstance(e, Mapping)]
+    several = len({text(e, "vehicle") for e in entries}) > 1
+    out = []
+    for e in entries:
+        found = e["answers"].items() if isinstance(e.get("answers"), Mapping) else ()
+        answers = sorted(found, key=lambda a: -(finite(a[1]) or 0))
+        named = [count(e.get(k)) for k in ("named_first", "in_group")]
+        out.append([
+            text(e, "hidden") + (f" ({text(e, 'vehicle')})" if several else ""),
+            *(text(e, k, "–") for k in ("size", "noise", "excitation")),
+            ", ".join(f"{name} {count(n)}" for name, n in answers), count(e.get("logs")),
+            *(named if e.get("hidden") != NOTHING else ["–", "–"]),
+            percent(e.get("worst_relative_error")),
+        ])  # fmt: skip
+    return head, out
+
+
+def _wrong_table(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
+    head = ["hidden", "answer", "candidates", "size", "noise", "manoeuvre", "vehicle", "seed", "p"]
+    out = []
+    for r in rows:
+        if outcomes.flawless(r):
+            continue
+        verdict = text(r, "verdict")
+        given = listing(names(r), "or" if verdict == "ambiguous" else "and")
+        words = [verdict if verdict != "named" else "", given, text(r, "fault", "")]
+        ranking = r.get("ranking")
+        seed = finite(r.get("seed"))
+        out.append([
+            text(r, "hidden"), ": ".join(filter(None, words)),
+            ", ".join(map(str, ranking)) if isinstance(ranking, (list, tuple)) else "–",
+            *(text(r, k, "–") for k in ("size", "noise", "excitation", "vehicle")),
+            "–" if seed is None else str(round(seed)), p_value(r.get("p_value")),
+        ])  # fmt: skip
+    return head, out
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, (int, np.integer)) and not isinstance(value, bool):
+        return count(value)
+    return number(value, 4)
+
+
+PAGE = BenchmarkPage()

@@ -1,0 +1,113 @@
+"""The logs of a benchmark, read without trusting them, and counted."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.report.plots.confusion import OUTCOMES
+from auvnn.report.view import View
+from auvnn.report.words import finite
+
+Row = Mapping[str, Any]
+NOTHING = "nothing"
+CONDITION = ("vehicle", "noise", "excitation")
+
+
+def rows_of(view: View) -> list[Row]:
+    """Return the logs, one row each."""
+    return [r for r in view.items("rows") if isinstance(r, Mapping)]
+
+
+def text(row: Row, key: str, unknown: str = "?") -> str:
+    """Return one entry as text."""
+    return str(row.get(key) or unknown)
+
+
+def names(row: Row) -> list[str]:
+    """Return the effects that were named, or that a declared group holds."""
+    found = row.get("missing")
+    return [str(m) for m in found] if isinstance(found, (list, tuple)) else []
+
+
+def answer(row: Row) -> str:
+    """Return what was answered in the first step: the first name, or the verdict where none was given."""
+    given = names(row) if text(row, "verdict") == "named" else []
+    return given[0] if given else text(row, "verdict")
+
+
+def right(row: Row) -> bool:
+    """Whether the hidden effect, and it alone, was named first; with nothing, whether none was."""
+    if text(row, "hidden") == NOTHING:
+        return answer(row) == "adequate"
+    return text(row, "verdict") == "named" and answer(row) == text(row, "hidden")
+
+
+def in_group(row: Row) -> bool:
+    """Whether a group was declared that holds the hidden effect."""
+    return text(row, "verdict") == "ambiguous" and text(row, "hidden") in names(row)
+
+
+def flawless(row: Row) -> bool:
+    """Whether the answer is right and no further name was given."""
+    return right(row) and len(names(row)) <= (text(row, "hidden") != NOTHING)
+
+
+def with_effect(rows: Sequence[Row]) -> list[Row]:
+    """Return the logs that hide an effect."""
+    return [r for r in rows if text(r, "hidden") != NOTHING]
+
+
+def with_nothing(rows: Sequence[Row]) -> list[Row]:
+    """Return the logs that hide nothing."""
+    return [r for r in rows if text(r, "hidden") == NOTHING]
+
+
+def values(rows: Sequence[Row], key: str) -> list[str]:
+    """Return the texts that an entry takes, each once, in their order."""
+    return list(dict.fromkeys(str(r[key]) for r in rows if r.get(key) is not None))
+
+
+def numbers(rows: Sequence[Row], key: str) -> list[float]:
+    """Return the numbers that an entry takes, each once, rising."""
+    return sorted({value for r in rows if (value := finite(r.get(key))) is not None})
+
+
+def by_condition(rows: Sequence[Row]) -> dict[tuple[str, ...], list[Row]]:
+    """Return the logs of each vehicle, noise and manoeuvre."""
+    out: dict[tuple[str, ...], list[Row]] = {}
+    for r in rows:
+        out.setdefault(tuple(text(r, k) for k in CONDITION), []).append(r)
+    return out
+
+
+def errors(rows: Sequence[Row], key: str) -> NDArray[np.float64]:
+    """Return one number of every parameter of the logs in which the hidden effect was named first."""
+    entries = [e for r in with_effect(rows) if right(r) and isinstance(r.get("errors"), Mapping)
+               for e in r["errors"].values() if isinstance(e, Mapping)]  # fmt: skip
+    return np.array([value for e in entries if (value := finite(e.get(key))) is not None])
+
+
+def confusion_counts(rows: Sequence[Row]) -> tuple[list[str], list[str], NDArray[np.float64]]:
+    """Return what was hidden (n), what was answered (m), and how many logs (n, m)."""
+    hidden = list(dict.fromkeys(text(r, "hidden") for r in with_effect(rows)))
+    given = [a for a in dict.fromkeys(map(answer, rows)) if a not in hidden and a not in OUTCOMES]
+    columns = [*hidden, *given, *OUTCOMES]
+    lines = [*hidden, *([NOTHING] if with_nothing(rows) else [])]
+    counts = Counter((text(r, "hidden"), answer(r)) for r in rows)
+    table = np.array([[counts[h, c] for c in columns] for h in lines], dtype=float)
+    return lines, columns, table.reshape(len(lines), len(columns))
+
+
+def found_by_size(rows: Sequence[Row]) -> dict[str, dict[str, tuple[int, int]]]:
+    """Return {effect: {size: (logs in which it was named first, logs)}}."""
+    out: dict[str, dict[str, tuple[int, int]]] = {}
+    for r in with_effect(rows):
+        sizes = out.setdefault(text(r, "hidden"), {})
+        named, logs = sizes.get(text(r, "size"), (0, 0))
+        sizes[text(r, "size")] = (named + right(r), logs + 1)
+    return out
