@@ -15,6 +15,7 @@ from typing import Any
 import hydra
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException
+from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -65,7 +66,7 @@ def run_verb(name: str, verb: Verb, arguments: list[str]) -> int:
 def _job(name: str, verb: Verb, composer: Composer, config: DictConfig) -> int:
     """Run one job of perhaps many; whatever befalls it is its own affair."""
     own = HydraConfig.get()
-    number = own.job.get("num") if own.mode is not None and own.mode.name == "MULTIRUN" else None
+    number = own.job.num if own.mode == RunMode.MULTIRUN else None
     root = own.run.dir if number is None else own.sweep.dir
     out = Path(str(config.out)) / os.path.relpath(own.runtime.output_dir, str(root))
     label = f"auvnn {name}" if number is None else f"auvnn {name} (job {number})"
@@ -82,14 +83,14 @@ def _run(verb: Verb, composer: Composer, config: DictConfig, out: Path) -> None:
         # A model may also be a name, which is not ours to judge.
         if options[key] is not None and (key != "model" or _is_path(options[key])):
             files(options, key)
-    refuse_taken(out, overwrite=config.overwrite is True)
     if options["dry_run"]:
+        refuse_taken(out, overwrite=options["overwrite"])
         for key in verb.reads:
             if options[key] is not None:
                 say(f"would read   {key}={options[key]}")
         say(f"would write  {', '.join(verb.writes)} in {out}")
         return
-    with written(out, overwrite=config.overwrite is True) as folder:
+    with written(out, overwrite=options["overwrite"]) as folder:
         answer = verb.run(Job(options, out, folder, say))
         write_text(folder / ".hydra" / "config.yaml", OmegaConf.to_yaml(config))
         write_text(folder / ".hydra" / "overrides.yaml", OmegaConf.to_yaml(HydraConfig.get().overrides.task))

@@ -59,7 +59,6 @@ def locked(path: Path) -> Iterator[None]:
     Raises:
         ConfigError: another run holds it.
     """
-    (path / WORK).mkdir(exist_ok=True)
     lock = path / WORK / LOCK
     stream = _hold(lock)
     if stream is None:
@@ -79,12 +78,17 @@ def _hold(lock: Path) -> IO[str] | None:
     try:
         import fcntl
     except ImportError:  # not POSIX: an exclusive file must do
+        lock.parent.mkdir(exist_ok=True)
         try:
             return lock.open("x", encoding="ascii")
         except FileExistsError:
             return None
     while True:
-        stream = lock.open("a+", encoding="ascii")
+        lock.parent.mkdir(exist_ok=True)
+        try:
+            stream = lock.open("a+", encoding="ascii")
+        except FileNotFoundError:  # whoever held it has just taken the folder away
+            continue
         try:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -113,8 +117,8 @@ def written(path: Path, *, overwrite: bool) -> Iterator[Path]:
             old.mkdir()
             for entry in sorted(new.iterdir()):
                 target = path / entry.name
-                if target.is_dir() and not target.is_symlink():
-                    target.rename(old / entry.name)  # a folder cannot be replaced in one step
+                if os.path.lexists(target) and (target.is_dir() or entry.is_dir()):
+                    target.rename(old / entry.name)  # only files can be replaced in one step
                 entry.replace(target)
             for entry in (path / WORK).iterdir():
                 if entry.is_dir():  # also what an interrupted run would have gone on from

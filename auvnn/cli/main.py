@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import sys
@@ -65,7 +66,8 @@ def _prepare() -> None:
     def end(_signal: int, _frame: Any) -> None:
         raise Terminated
 
-    signal.signal(signal.SIGTERM, end)
+    with contextlib.suppress(ValueError):  # signals are heard in the main thread alone
+        signal.signal(signal.SIGTERM, end)
     if not sys.warnoptions and os.environ.get("AUVNN_DEBUG") != "1":
         # What a user should know stands in the answer; a library's notes to programmers are not for users.
         warnings.simplefilter("ignore")

@@ -11,12 +11,14 @@ def _run(job: Job) -> Answering:
     from auvnn.training import train
 
     log, test = job.log(), job.held_out()
+    model = job.model(log)
     if job["overwrite"] and not job["resume"]:
         shutil.rmtree(job.checkpoint, ignore_errors=True)
     try:
         training = train(
-            job.model(log), log, job["scheme"], job["damping"], test=test, seed=job["seed"],
-            checkpoint=job.checkpoint, resume=job["resume"] or False, progress=job.say.progress,
+            model, log, job["scheme"], job["damping"], test=test, seed=job["seed"],
+            derivative=job["derivative"], checkpoint=job.checkpoint, resume=job["resume"] or False,
+            progress=job.say.progress,
         )  # fmt: skip
     except KeyboardInterrupt as end:
         if job.checkpoint.is_dir():
@@ -24,14 +26,22 @@ def _run(job: Job) -> Answering:
         raise
     training.model.save(job.folder / "model")
     training.write(job.folder)
-    for name, value in training.to_dict()["metrics"].items():
-        job.say(f"result    {name} {value:.4g}" if isinstance(value, float) else f"result    {name} {value}")
+    data = training.to_dict()
+    job.say(f"assumed   {data['derivative']['held_out']}")
+    job.warn([warning for warning in data["warnings"] if warning not in model.vehicle.warnings])
+    job.say(f"trained   {data['metrics']['iterations']} iterations: {data['stopped']}")
+    for when in ("before", "after"):
+        scores = {name: data["metrics"][f"held_out_r2_{name}_{when}"] for name in _ACCELERATIONS}
+        shown = ", ".join(f"{n} {'unknown' if v is None else format(v, '.3f')}" for n, v in scores.items())
+        job.say(f"result    held-out one-step R2 {when}: {shown}")
     return training
 
+
+_ACCELERATIONS = ("du", "dv", "dw", "dp", "dq", "dr")
 
 VERB = Verb(
     summary="train the damping subnetworks on a log",
     reads=("log", "mapping", "model", "test"),
-    writes=("model/", "training.json", "report.html", "figures/"),
+    writes=("training.json", "model/", "report.html", "figures/"),
     run=_run,
 )

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.effects import EFFECTS
-from auvnn.effects.inertia_factors import InertiaFactors
+from auvnn.effects import effect_class
 from auvnn.models import GreyBox
 from auvnn.training.prediction_error import Priors
 
@@ -64,8 +63,7 @@ def lay_out(model: GreyBox, candidates: Sequence[str]) -> Layout:
     for name in dict.fromkeys([*groups, *candidates]):
         if name in present:
             continue
-        kind = InertiaFactors if name == "inertia" else EFFECTS.get(name)
-        effects.append(kind.build(model.vehicle, model.actuation))
+        effects.append(effect_class(name).build(model.vehicle, model.actuation))
     full = model.rebuilt(effects)
     columns, means, at = {}, {}, 0
     for effect in full.effects:

@@ -26,12 +26,27 @@ EFFECTS = Catalogue(
     "auvnn.effects",
 )
 
-__all__ = ["EFFECTS", "Body", "Effect", "Moment", "Parameter", "Response", "Sensed"]
+# Known, so that a model that holds one can be saved and loaded, but not offered as a name for what is missing.
+_UNOFFERED = {"inertia": "auvnn.effects.inertia_factors:InertiaFactors"}
+
+
+def effect_class(name: str) -> type[Effect]:
+    """Return the class of any effect that a model may hold, whether the catalogue offers it or not.
+
+    Raises:
+        ConfigError: there is no such effect.
+    """
+    if name in _UNOFFERED:
+        return Catalogue("effect", _UNOFFERED, "auvnn.unoffered_effects").get(name)
+    return EFFECTS.get(name)
+
+
+__all__ = ["EFFECTS", "Body", "Effect", "Moment", "Parameter", "Response", "Sensed", "effect_class"]
 
 
 def __getattr__(name: str) -> Any:
     # The list of names must not cost the import of torch.
-    if name in __all__:
+    if name in __all__ and name != "effect_class":
         from auvnn.effects import base
 
         return getattr(base, name)

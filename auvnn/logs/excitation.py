@@ -45,7 +45,7 @@ class Excitation:
     @property
     def excited(self) -> bool:
         """Whether the component moves by more than three times its noise."""
-        return self.std > max(EXCITED * np.nan_to_num(self.noise_std), _STILL)
+        return bool(self.std > max(EXCITED * np.nan_to_num(self.noise_std), _STILL))
 
     def to_dict(self) -> dict[str, object]:
         """Return the entry of the quality answer."""

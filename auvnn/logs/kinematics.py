@@ -212,13 +212,18 @@ def _judge(
         verdict = f"{name} follows {of}, but {scale:.2f} times as large; {cure}"
         return Agreement(**facts, verdict=verdict, level="warning", cure=cure)
     other = _other_axis(chosen, axis, y)
-    if other is not None:
+    if other is not None and 0.6 < abs(other[1]) < 1.6:
         j, slope = other
         cure = f"check which column holds {name} and which {names[j]}"
-        verdict = (
-            f"{name} follows {of} that belongs to {names[j]} (scale {slope:.2f}): axes exchanged? {cure}"
-        )
+        verdict = f"{name} follows {of} that belongs to {names[j]} (scale {slope:.2f}): exchanged? {cure}"
         return Agreement(**facts, verdict=verdict, level="error", cure=cure)
+    if other is not None:
+        j, slope = other
+        cure = "consider a sensor that is turned in its mounting"
+        if source == "position":
+            cure += " (velocity_misalignment)"
+        verdict = f"{name} holds {slope:.2f} of {names[j]} and little of its own; {cure}"
+        return Agreement(**facts, verdict=verdict, level="warning", cure=cure)
     if abs(correlation) < _NONE:
         cure = "check the column, its clock and the frame in which it is given"
         verdict = f"{name} moves, but not as {of} (correlation {correlation:.2f}); {cure}"

@@ -12,22 +12,30 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from auvnn.effects import EFFECTS, Body, Effect, Moment, Sensed
+from auvnn.effects import Body, Effect, Moment, Sensed, effect_class
 from auvnn.errors import ConfigError
 from auvnn.models.actuators import Actuators
 from auvnn.models.inputs import Inputs
 from auvnn.physics.attitude import quat_to_matrix
 from auvnn.physics.coriolis import coriolis_force
 from auvnn.physics.current import water_velocity
-from auvnn.physics.drag import damping_force, element_force
-from auvnn.physics.fins import fin_force
+from auvnn.physics.drag import element_transform
+from auvnn.physics.fins import fin_frame, fin_wrench
 from auvnn.physics.inertia import rigid_body_inertia
 from auvnn.physics.kinematics import eta6_to_eta7
+from auvnn.physics.products import matvec
 from auvnn.physics.restoring import restoring_force
 from auvnn.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from auvnn.models.rollout import Trajectory
+
+
+def _tensor(value: Any) -> Tensor:
+    """Return numbers as a double tensor of their own; a vehicle's arrays are read-only."""
+    if isinstance(value, Tensor):
+        return value.detach().clone()
+    return torch.tensor(np.array(value, dtype=np.float64))
 
 
 @dataclass(frozen=True)
@@ -89,8 +97,7 @@ class GreyBox(nn.Module):
 
     def _constants(self, vehicle: Vehicle) -> None:
         def keep(name: str, value: Any) -> None:
-            tensor = None if value is None else torch.tensor(np.array(value, dtype=np.float64))
-            self.register_buffer(f"known_{name}", tensor, persistent=False)
+            self.register_buffer(f"known_{name}", None if value is None else _tensor(value), persistent=False)
 
         keep("mass", float(vehicle.mass))
         keep("weight", float(vehicle.mass) * float(vehicle.gravity))
@@ -102,14 +109,16 @@ class GreyBox(nn.Module):
         keep("linear", vehicle.linear_damping)
         keep("quadratic", vehicle.quadratic_damping)
         elements = vehicle.damping_elements
-        rows = {k: [list(map(list, getattr(e, k))) if k == "axes" else list(getattr(e, k)) for e in elements] or None
-                for k in ("position", "axes", "linear", "quadratic")}
-        for name, value in rows.items():
-            keep(f"element_{name}", value)
+        for name in ("linear", "quadratic"):
+            keep(f"element_{name}", [list(getattr(e, name)) for e in elements] or None)
+        # Geometry never changes: the way from the vehicle's velocity to each part's own is worked out once.
+        keep("element_transform", [element_transform(_tensor(e.position), _tensor(e.axes)).tolist() for e in elements]
+             or None)
         fins = vehicle.fins
-        for name in ("position", "axis", "area", "lift_slope", "stall"):
-            keep(f"fin_{name}", [list(map(float, getattr(f, name))) if name in ("position", "axis")
-                                 else float(getattr(f, name)) for f in fins] or None)
+        for name in ("area", "lift_slope", "stall"):
+            keep(f"fin_{name}", [float(getattr(f, name)) for f in fins] or None)
+        keep("fin_frame", fin_frame(_tensor([f.position for f in fins]), _tensor([f.axis for f in fins]))
+             if fins else None)
 
     def _known(self, name: str) -> Any:
         return getattr(self, f"known_{name}")
@@ -140,7 +149,7 @@ class GreyBox(nn.Module):
         The new model has parameters of its own; damping subnetworks and present effects are copied.
         """
         values = wanted if isinstance(wanted, Mapping) else dict.fromkeys(wanted)
-        new = [EFFECTS.get(n).build(self.vehicle, self.actuation, v) for n, v in values.items()]
+        new = [effect_class(n).build(self.vehicle, self.actuation, v) for n, v in values.items()]
         return self.rebuilt([*self.copied_effects(), *new])
 
     def copied_effects(self) -> list[Effect]:
@@ -224,7 +233,7 @@ class GreyBox(nn.Module):
         total = None
         for term in terms.values():
             total = term if total is None else total + term
-        return (prepared.inverse @ total.unsqueeze(-1)).squeeze(-1)
+        return matvec(prepared.inverse, total)
 
     def wrenches(
         self, position: Tensor, rotation: Tensor, nu: Tensor, thrust: Tensor, inputs: Inputs, time: Tensor
@@ -262,32 +271,26 @@ class GreyBox(nn.Module):
         terms["thrust"] = thrust @ self.actuators.allocation.mT
         if moving:
             terms["Coriolis"] = -coriolis_force(prepared.rigid, nu) - coriolis_force(prepared.added, nu_r)
-            terms["water acceleration"] = (prepared.added @ moment.nu_c_dot.unsqueeze(-1)).squeeze(-1)
+            terms["water acceleration"] = matvec(prepared.added, moment.nu_c_dot)
         else:
             terms["Coriolis"] = -coriolis_force(prepared.total, nu)
-        if body.linear is not None or body.quadratic is not None:
-            zero = torch.zeros_like(prepared.rigid)
-            terms["damping"] = -damping_force(
-                nu_r,
-                zero if body.linear is None else body.linear,
-                zero if body.quadratic is None else body.quadratic,
-            )
+        if body.linear is not None:
+            terms["linear damping"] = -matvec(body.linear, nu_r)
+        if body.quadratic is not None:
+            terms["quadratic damping"] = -matvec(body.quadratic, nu_r.abs() * nu_r)
         if body.element_linear is not None:
-            drag = None
-            for k in range(body.element_linear.shape[-2]):
-                part = element_force(nu_r, self._known("element_position")[k], self._known("element_axes")[k],
-                                     body.element_linear[..., k, :], body.element_quadratic[..., k, :])
-                drag = part if drag is None else drag + part
-            terms["damping elements"] = -drag
+            to_parts = self._known("element_transform").flatten(0, 1)
+            own = matvec(to_parts, nu_r)
+            law = body.element_linear.flatten(-2) + body.element_quadratic.flatten(-2) * own.abs()
+            terms["damping elements"] = -matvec(to_parts.mT, law * own)
         if self.damping is not None:
             terms["damping subnetworks"] = -self.damping(nu_r)
         terms["restoring"] = -restoring_force(rotation, body.weight, body.buoyancy, body.cg, body.cb)
         if self._known("fin_area") is not None:
             # Fins whose angles are not known are still there: they are taken as held at zero.
             angles = nu_r.new_zeros(len(self.vehicle.fins)) if inputs.fins is None else inputs.fins
-            terms["fins"] = fin_force(nu_r, angles, *(self._known(f"fin_{n}") for n in
-                                      ("position", "axis", "area", "lift_slope", "stall")),
-                                      float(self.vehicle.water_density))
+            terms["fins"] = fin_wrench(nu_r, angles, *(self._known(f"fin_{n}") for n in
+                                       ("frame", "area", "lift_slope", "stall")), float(self.vehicle.water_density))
         for effect in self.using("wrench"):
             terms[str(effect.name)] = effect.wrench(moment, body)
         return terms, prepared

@@ -15,6 +15,7 @@ from auvnn.models.inputs import Inputs
 from auvnn.models.limits import LIMIT
 from auvnn.physics.attitude import quat_derivative, quat_to_matrix
 from auvnn.physics.kinematics import eta6_to_eta7
+from auvnn.physics.products import matvec
 
 if TYPE_CHECKING:
     from auvnn.models.grey_box import GreyBox
@@ -209,7 +210,7 @@ def _fixed(model: GreyBox, state: tuple, inputs: Inputs, times: Tensor, drive: A
         position, quaternion, nu = y.split((3, 4, 6), dim=-1)
         rotation = quat_to_matrix(quaternion)
         return torch.cat([
-            (rotation @ nu[..., :3].unsqueeze(-1)).squeeze(-1),
+            matvec(rotation, nu[..., :3]),
             quat_derivative(quaternion, nu[..., 3:]),
             model.nu_dot(position, rotation, nu, thrust, row, time, prepared),
         ], dim=-1)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from auvnn.config import dump_yaml, read_yaml
-from auvnn.effects import EFFECTS
+from auvnn.effects import effect_class
 from auvnn.errors import ModelError
 from auvnn.models.grey_box import GreyBox
 from auvnn.storage import read_folder, tensors_from_bytes, tensors_to_bytes, write_folder
@@ -19,7 +19,7 @@ SUBNETWORKS = "damping_subnetworks"
 def from_vehicle(vehicle: Vehicle, actuation: str | None = None) -> GreyBox:
     """Return the model of a vehicle with the effects that its file states."""
     how = actuation or ("thrusters" if vehicle.thrusters else "wrench")
-    effects = [EFFECTS.get(name).build(vehicle, how, values) for name, values in vehicle.effects.items()]
+    effects = [effect_class(name).build(vehicle, how, values) for name, values in vehicle.effects.items()]
     return GreyBox(vehicle, effects, actuation=how)
 
 

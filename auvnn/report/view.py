@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+# What a description in plain data is called by, the first that is there.
+_NAMES = ("name", "scheme", "form", "path")
+
 
 class View:
     """Read-only access to what an answer may or may not have.
@@ -60,7 +63,11 @@ class View:
 
     def text(self, name: str, default: str = "") -> str:
         """Return something as text: a name where it has one."""
-        return name_of(self.get(name), default)
+        value = self.get(name)
+        if not isinstance(value, (str, int, float)):
+            # An answer may hold a model where its JSON has the model's name.
+            value = self.data.get(name, value)
+        return name_of(value, default)
 
 
 def name_of(value: Any, default: str = "") -> str:
@@ -70,10 +77,11 @@ def name_of(value: Any, default: str = "") -> str:
     if isinstance(value, (list, tuple)):
         return ", ".join(name_of(v) for v in value)
     if isinstance(value, Mapping):
-        return name_of(value.get("name") or value.get("path"), default)
+        return name_of(next((value[k] for k in _NAMES if value.get(k)), None), default)
     if isinstance(value, (str, int, float)):
         return str(value)
-    return str(getattr(value, "name", None) or default or value)
+    name = getattr(value, "name", None)
+    return name if isinstance(name, str) and name else default or type(value).__name__
 
 
 def _is_method(value: Any) -> bool:

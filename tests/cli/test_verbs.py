@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from auvnn.cli.main import VERBS, main
+from auvnn.cli.speech import Speaker
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -98,6 +99,30 @@ def test_add_then_remove(report, auvnn, made):
 def test_train(report, made):
     answer = report("train", "model=rov95", f"log={made / 'log.parquet'}", "damping=polynomial")
     assert answer["schema"] == "auvnn/training/1" and answer["metrics"]
+
+
+def test_an_interrupted_training_goes_on_to_the_same_end(auvnn, made, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    words = ["train", "model=rov95", f"log={made / 'log.parquet'}", "scheme=sgd", "scheme.epochs=60"]
+    assert auvnn(*words, "out=whole")[0] == 0
+
+    def interrupt(self: Speaker, words: str) -> None:
+        if "iteration 50" in words:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Speaker, "progress", interrupt)
+        status, _, err = auvnn(*words, "out=parts")
+    assert status == 130 and err.count("\n") == 1 and "out=parts resume=true" in err
+    assert [p.name for p in Path("parts").iterdir()] == [".auvnn"]
+    status, _, err = auvnn(*words, "out=parts")
+    assert status == 2 and "resume=true" in err, "what was reached is not thrown away unasked"
+    status, _, err = auvnn(*words, "scheme.learning_rate=0.5", "out=parts", "resume=true")
+    assert status == 2 and "learning_rate" in err
+    assert auvnn(*words, "out=parts", "resume=true")[0] == 0
+    weights = [Path(out, "model", "weights.safetensors").read_bytes() for out in ("whole", "parts")]
+    assert weights[0] == weights[1]
+    assert not Path("parts/.auvnn").exists()
 
 
 @pytest.mark.long

@@ -44,7 +44,7 @@ def test_an_equal_factor_on_all_axes_multiplies_the_power_of_matrix_and_elements
         zero = torch.zeros(4, 6, dtype=torch.float64)
         row = scene.inputs.each()[0]
         terms = model.wrenches(scene.eta[:, :3], rotation, scene.nu, zero, row, scene.times[0])
-        drag = terms["damping"] + terms["damping elements"]
+        drag = terms["linear damping"] + terms["damping elements"]
         powers.append((drag * scene.nu).sum(-1))
     assert (powers[0] < 0).all()
     torch.testing.assert_close(powers[1], 2.5 * powers[0], rtol=1e-13, atol=0)

@@ -75,6 +75,16 @@ def test_exchanged_axes_are_named() -> None:
     assert "belongs to p" in verdicts["q"].verdict
 
 
+def test_a_turned_sensor_is_no_exchange_of_axes() -> None:
+    run = make_run(1500)
+    nu = np.array(run.nu)
+    nu[:, 1] = 0.2 * nu[:, 0] + 0.02 * nu[:, 1]
+    agreement = kinematics.check(Log.from_runs([with_nu(run, nu)]))["v"]
+    assert agreement.level == "warning"
+    assert "holds 0.20 of u" in agreement.verdict
+    assert "velocity_misalignment" in agreement.cure
+
+
 def test_a_channel_of_another_world_is_a_warning() -> None:
     run = make_run(1500)
     nu = np.array(run.nu)

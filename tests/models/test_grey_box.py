@@ -108,7 +108,8 @@ def test_the_terms_add_up_to_inertia_times_acceleration(example, bank):
     assert {
         "thrust",
         "Coriolis",
-        "damping",
+        "linear damping",
+        "quadratic damping",
         "damping elements",
         "damping subnetworks",
         "restoring",

@@ -74,6 +74,14 @@ def test_a_model_without_subnetworks_needs_no_weights(tmp_path):
     assert load(folder).effect("net_buoyancy").values() == {"force": 1 / 3}
 
 
+def test_refitted_moments_of_inertia_come_back_too(tmp_path):
+    """They are no cause in the catalogue, but may be part of a model."""
+    model = GreyBox(load_vehicle("rov95")).with_effects({"inertia": {"K": 1.2, "N": 0.9}})
+    back = load(model.save(tmp_path / "m"))
+    assert back.effect("inertia").values() == {"K": 1.2, "M": 1.0, "N": 0.9}
+    assert torch.equal(predictions(back), predictions(model))
+
+
 def test_the_file_can_be_read_as_a_vehicle_that_states_its_effects(model, tmp_path):
     folder = model.save(tmp_path / "m")
     vehicle = load_vehicle(folder)
@@ -195,7 +203,9 @@ def test_names_that_look_like_numbers_come_back_as_names(tmp_path, name):
     assert load(model.save(tmp_path / "m")).vehicle.name == name
 
 
-def test_the_actuation_is_kept_and_can_be_chosen_anew(tmp_path):
-    folder = GreyBox(load_vehicle("rov95"), actuation="wrench").save(tmp_path / "m")
+@pytest.mark.parametrize("with_networks", [False, True])
+def test_the_actuation_is_kept_and_can_be_chosen_anew(tmp_path, bank, with_networks):
+    damping = bank if with_networks else None
+    folder = GreyBox(load_vehicle("rov95"), damping=damping, actuation="wrench").save(tmp_path / "m")
     assert load(folder).actuation == "wrench"
     assert load(folder, actuation="thrusters").actuation == "thrusters"

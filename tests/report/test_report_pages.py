@@ -86,7 +86,7 @@ def drawer(kind: str) -> Page:
 
 @pytest.fixture(scope="module")
 def pages() -> dict[str, str]:
-    return {kind: drawer(kind).page(make(kind, 1500)) for kind in KINDS}
+    return {kind: drawer(kind).page(make(kind, 1200, 1)) for kind in KINDS}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -146,25 +146,25 @@ def test_pages_stand_on_screens_of_any_size_in_the_dark_and_on_paper(pages, kind
     assert pictures and all(p.get("alt") or p.get("aria-label") for p in pictures)
 
 
-def test_comparison_says_how_far_off_and_where():
-    text = PageText(drawer("comparison").page(comparison(1500))).text
-    assert "Running free for 5 s, the model's error is 26\N{NO-BREAK SPACE}% of the spread" in text
-    assert "would give 95\N{NO-BREAK SPACE}%" in text and "The model predicts." in text
-    assert "sway (Y): heading -1.6 to 0 rad (42\N{NO-BREAK SPACE}% of the error)" in text
+def test_comparison_says_how_far_off_and_where(unseen):
+    text = PageText(drawer("comparison").page(comparison(60))).text
+    assert "Running free for 5 s, the model's error is 26 % of the spread" in text
+    assert "would give 95 %" in text and "The model predicts." in text
+    assert "sway (Y): heading -1.6 to 0 rad (42 % of the error)" in text
     assert "diverged in 1 window" in text
     assert "stands out most in roll (K): 9.00 N m rms, 30 times the noise floor" in text
     assert "bandwidth 1.70 Hz" in text
 
 
 @pytest.mark.parametrize(("held", "words"), [(0.1, "worse than none"), (0.26, "no better than none")])
-def test_comparison_does_not_flatter(held, words):
-    answer = comparison(300)
+def test_comparison_does_not_flatter(unseen, held, words):
+    answer = comparison(60)
     answer.rollout["5"]["persistence"] = held
     assert words in PageText(drawer("comparison").page(answer)).text
 
 
-def test_the_map_names_its_largest_cell():
-    answer = comparison(300)
+def test_the_map_names_its_largest_cell(unseen):
+    answer = comparison(60)
     answer.regimes["speed"]["rms"][3, 1] = 300.0
     text = PageText(drawer("comparison").page(answer)).text
     assert "The largest: K at speed 0.20 to 0.40 m/s, 1000 times the noise floor." in text
@@ -185,38 +185,38 @@ def test_the_map_names_its_largest_cell():
         ),
     ],
 )
-def test_diagnosis_says_its_verdict(verdict, words):
+def test_diagnosis_says_its_verdict(unseen, verdict, words):
     page = PageText(drawer("diagnosis").page(diagnosis(verdict)))
     for part in words:
-        assert part in page.text.replace("\N{NO-BREAK SPACE}", " ")
+        assert part in page.text
     assert "not judged: needs altitude" in page.text
 
 
 @pytest.mark.parametrize(("accepted", "words"), [(True, ": accepted."), (False, ": not accepted.")])
-def test_improvement_says_whether_it_was_accepted(accepted, words):
-    page = PageText(drawer("improvement").page(improvement(300, accepted=accepted)))
+def test_improvement_says_whether_it_was_accepted(unseen, accepted, words):
+    page = PageText(drawer("improvement").page(improvement(60, accepted=accepted)))
     assert words in page.text
     assert (
         "0.26 of the spread of the motion, 0.21 with its coefficients fitted again, and 0.052 with"
         in page.text
     )
-    assert "95\N{NO-BREAK SPACE}% of what could be gained" in page.text
+    assert "95 % of what could be gained" in page.text
 
 
-def test_quality_says_what_is_wrong_and_how_to_mend_it():
-    page = PageText(drawer("quality").page(quality(300)))
+def test_quality_says_what_is_wrong_and_how_to_mend_it(unseen):
+    page = PageText(drawer("quality").page(quality(60)))
     assert "p has the opposite sign of the attitude's derivative (scale: -1 in the mapping)" in page.text
     assert "the sign of roll (p) and pitch (q) is reversed" in page.text
     assert "Too little moves in roll (p)" in page.text
     error = {"level": "error", "where": "time", "what": "median step 20 s", "cure": "time: {unit: ms}"}
-    page = PageText(drawer("quality").page(quality(300, findings=[error])))
+    page = PageText(drawer("quality").page(quality(60, findings=[error])))
     assert (
         "Nothing should be fitted to this log as it is: time: median step 20 s (time: {unit: ms})."
         in page.text
     )
 
 
-def test_training_says_where_it_was_best():
+def test_training_says_where_it_was_best(unseen):
     text = PageText(drawer("training").page(training())).text
     assert "from 0.870 to 0.100" in text and "is step 127" in text
     assert "396" in text and "396.0" not in text
@@ -255,8 +255,8 @@ def test_demo_tells_the_whole_story_once(pages):
 
 
 @pytest.mark.parametrize("missing", ["quality", "comparison", "diagnosis", "improvement", "truth", "story"])
-def test_demo_goes_on_without_any_of_its_parts(small_figures, missing):
-    page = PageText(drawer("demo").page(demo(200, **{missing: None})))
+def test_demo_goes_on_without_any_of_its_parts(unseen, missing):
+    page = PageText(drawer("demo").page(demo(60, **{missing: None})))
     assert page.faults == [] and "In short" in page.text
     assert f"#{missing}" not in [a["href"] for a in page.named("a")]
 
@@ -345,8 +345,8 @@ def test_an_empty_answer_still_gives_a_page_and_a_figure(kind, answer):
     assert len(style.svg(next(iter(figures.values())))) > 500
 
 
-def test_a_missing_series_is_said_where_the_figure_would_be():
-    page = PageText(drawer("comparison").page(comparison(300, series=[])))
+def test_a_missing_series_is_said_where_the_figure_would_be(unseen):
+    page = PageText(drawer("comparison").page(comparison(60, series=[])))
     assert page.text.count("There is no figure here: the answer holds no time series.") == 3
     assert "Where the residual sits." in page.text
 
@@ -378,7 +378,7 @@ def test_unknown_numbers_are_dashes(kind):
 
 @pytest.mark.parametrize("kind", ["diagnosis", "improvement", "demo"])
 def test_a_page_and_its_figures_are_written_and_equal_twice(tmp_path, small_figures, kind):
-    answer = make(kind, 200)
+    answer = make(kind, 60)
     for name in ("one", "two"):
         assert drawer(kind).write(answer, tmp_path / name) == tmp_path / name / "report.html"
     one, two = (

@@ -65,9 +65,7 @@ def _check(data: Any, size: int, where: str) -> Contents:
     if data[size - 4 : size] == b"PARE":
         raise InputError(f"{where}: is an encrypted Parquet file; save it without encryption")
     if data[size - 4 : size] != MAGIC:
-        raise InputError(
-            f"{where}: is cut short: the table of contents at its end is missing; copy it again"
-        )
+        raise InputError(f"{where}: is cut short: the table of contents at its end is missing; copy it again")
     footer = int.from_bytes(data[size - 8 : size - 4], "little")
     start = size - 8 - footer
     if start < 4:

@@ -182,7 +182,7 @@ def arrays(series: Sequence[Any]) -> list[dict[str, Any]]:
 def run_words(entry: Mapping[str, Any], whole: bool) -> str:
     """Return what a picture of a run is called."""
     t = np.asarray(entry["t"], dtype=float)
-    name = f"run {entry.get('run', '')}".strip()
+    name = "run" if entry.get("run") is None else f"run {entry['run']}"
     return name if whole else f"{name}, {number(t[0], 4)} to {number(t[-1], 4)} s"
 
 

@@ -54,14 +54,7 @@ class ComparisonPage(Page):
             )
         out += _one_step_words(view.mapping("one_step"))
         out += _residual_words(view.mapping("residual_wrench"))
-        failures = [f for f in view.items("failures") if isinstance(f, Mapping)]
-        if failures:
-            first = failures[0]
-            share = f" ({percent(first.get('share'))} of the error)" if finite(first.get("share")) else ""
-            out.append(
-                f"The error sits first of all in {common.channel_words(first.get('channel'))}: "
-                f"{first.get('where', 'everywhere')}{share}."
-            )
+        out += _failure_words(view)
         if (ratio := _largest(view.mapping("residual_wrench"))) and ratio[1] > 1.5:
             out.append(
                 "Which physical effect would explain this, auvnn diagnose answers for the same model and log."
@@ -131,7 +124,7 @@ class ComparisonPage(Page):
     def tables(self, view: View) -> list[Table]:
         """Return the tables."""
         failures = [
-            [common.channel_words(f.get("channel")), str(f.get("where", "")), percent(f.get("share"))]
+            [common.channel_words(f.get("channel")), _where(f), percent(f.get("share"))]
             for f in view.items("failures")
             if isinstance(f, Mapping)
         ]
@@ -210,6 +203,24 @@ def _residual_words(residual: Mapping[str, Any]) -> list[str]:
         f"What it lacks stands out most in {common.channel_words(name)}: {rms} rms, "
         f"{number(ratio, 2)} times the noise floor."
     ]
+
+
+def _failure_words(view: View) -> list[str]:
+    found = [f for f in view.items("failures") if isinstance(f, Mapping)]
+    if not found:
+        return []
+    first = found[0]
+    share = f" ({percent(first.get('share'))} of the error)" if finite(first.get("share")) else ""
+    words = f"The error sits first of all in {common.channel_words(first.get('channel'))}: {_where(first)}{share}"
+    place = next((f for f in found if f.get("channel") == first.get("channel") and _where(f) != "everywhere"), None)
+    return [f"{words}; there look at {_where(place)}." if place not in (None, first) else f"{words}."]
+
+
+def _where(failure: Any) -> str:
+    """Return the place in words, without the motion, which the channel says already."""
+    where = str(failure.get("where") or "everywhere")
+    motion = common.channel_words(failure.get("channel")).split(" ")[0]
+    return where.removeprefix(f"{motion}, ")
 
 
 def _needed(entry: Mapping[str, Any], name: str) -> Any:

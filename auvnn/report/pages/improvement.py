@@ -135,7 +135,7 @@ class ImprovementPage(Page):
 
     def tables(self, view: View) -> list[Table]:
         """Return the tables."""
-        steps = [[str(s.get("step")), number(s.get("error"))] for s in _steps(view)]
+        steps = [[str(s.get("step") or "–"), number(s.get("error"))] for s in _steps(view)]
         return [
             common.parameter_table(view.mapping("parameters")),
             _stage_table(view, "rollout", "Free-running error over {} by channel", "nrmse"),
@@ -244,7 +244,7 @@ def _series_caption(entry: Mapping[str, Any]) -> str:
 
 
 def _waterfall_caption(steps: list[Mapping[str, Any]]) -> str:
-    known = [(str(s.get("step")), e) for s in steps if (e := finite(s.get("error"))) is not None]
+    known = [(str(s.get("step") or "–"), e) for s in steps if (e := finite(s.get("error"))) is not None]
     falls = [(a[1] - b[1], b[0]) for a, b in itertools.pairwise(known) if b[0] != FLOOR]
     words = (
         "Error on held-out data after each step (5 s free running, 1 is the spread of the motion); "

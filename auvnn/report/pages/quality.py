@@ -179,7 +179,7 @@ def _run_rows(view: View) -> list[list[str]]:
     runs = [r for r in view.data.get("runs") or [] if isinstance(r, Mapping)]
     return [
         [
-            str(r.get("run")),
+            _run_name(r.get("run")),
             count(r.get("samples")),
             number(r.get("duration_s")),
             number(r.get("rate_hz")),
@@ -189,6 +189,10 @@ def _run_rows(view: View) -> list[list[str]]:
         ]
         for r in runs
     ]
+
+
+def _run_name(number: Any) -> str:
+    return "–" if number is None else str(number)
 
 
 def _channel_rows(view: View) -> list[list[str]]:

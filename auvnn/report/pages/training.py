@@ -122,7 +122,7 @@ class TrainingPage(Page):
 def _value(value: Any) -> str:
     if isinstance(value, (int, np.integer)) and not isinstance(value, bool):
         return count(value)
-    return number(value, 4) if finite(value) is not None else str(value)
+    return str(value) if isinstance(value, str) else number(value, 4)
 
 
 def _errors(view: View, name: str) -> np.ndarray:

@@ -15,13 +15,19 @@ from auvnn.report.words import label, number
 
 @style.styled
 def history(
-    train: ArrayLike, held_out: ArrayLike = (), *, step: str = "epoch", error: str = "error (dimensionless)"
+    train: ArrayLike,
+    held_out: ArrayLike = (),
+    *,
+    steps: ArrayLike | None = None,
+    step: str = "epoch",
+    error: str = "error (dimensionless)",
 ) -> Figure:
     """Draw both errors over the steps of the fit, logarithmic, with the best held-out step marked.
 
     Args:
-        train: error on the fitted data after each step, from step 0.
+        train: error on the fitted data after each step.
         held_out: error on the held-out data after each step; may be empty.
+        steps: their numbers; counted from 0 where absent.
         step: what a step is called.
         error: what the error is, with its unit.
 
@@ -30,27 +36,28 @@ def history(
     """
     figure = style.new_figure(style.COLUMN * 1.25, 2.5)
     ax = figure.subplots()
+    numbers = None if steps is None else np.asarray(steps, dtype=float).ravel()
     drawn = []
     for values, look, name in (
         (train, style.BEFORE, "fitted data"),
         (held_out, style.AFTER, "held-out data"),
     ):
         y = np.asarray(values, dtype=float).ravel()
-        x = np.arange(y.size)
+        x = numbers[: y.size] if numbers is not None and numbers.size >= y.size else np.arange(y.size)
         if np.isfinite(y).any():
             drawn.append(y)
             ax.plot(*decimate(x, y, LIMIT), color=look.color, ls=look.dashes, lw=1.2, label=name)
             if name == "held-out data":
                 best = int(np.nanargmin(np.where(np.isfinite(y), y, np.inf)))
                 ax.plot(
-                    best,
+                    x[best],
                     y[best],
                     marker="o",
                     ms=6,
                     mfc="none",
                     mec=style.INK,
                     ls="none",
-                    label=f"best: {number(y[best])} at {label(step)} {best}",
+                    label=f"best: {number(y[best])} at {label(step)} {x[best]:.0f}",
                 )
     if not drawn:
         raise NoData("no step of the training has an error")
