@@ -79,7 +79,7 @@ def compare(
     scale = scale_of(log)
     rolled_table, rolled = table(model, log, scale, wanted)
     wrench = np.concatenate([p.wrench for p in parts])
-    noise = _wrench_noise(model, parts)
+    noise = _wrench_noise(parts)
     located = locate(log, parts)
     dt = float(np.median([run.dt for run in log.runs]))
     with np.errstate(invalid="ignore"):
@@ -106,12 +106,10 @@ def _horizon(value: str | float) -> str:
     return f"{number:g}"
 
 
-def _wrench_noise(model: GreyBox, parts: list[OneStep]) -> Array:
-    """Return what white noise of the velocities leaves in the residual wrench: sqrt(diag(M S M^T)), (6,)."""
+def _wrench_noise(parts: list[OneStep]) -> Array:
+    """Return what noise would leave in the residual wrench of a perfect model, (6,)."""
     weight = np.array([len(p.t) for p in parts], dtype=float)
-    variance = np.average([p.noise**2 for p in parts], axis=0, weights=weight)
-    inertia = model.prepare().total.detach().numpy() if not model.time_varying else np.diag(np.ones(6))
-    return np.sqrt(np.einsum("ij,j,ij->i", inertia, variance, inertia))
+    return np.sqrt(np.average([p.wrench_noise**2 for p in parts], axis=0, weights=weight))
 
 
 def _series(number: int, nu: Array, part: OneStep, rolled: Rolled | None) -> dict[str, Any]:

@@ -79,9 +79,11 @@ class Diagnosis(Answer):
         return plain({"schema": "auvnn/diagnosis/1", **{n: getattr(self, n) for n in names}})
 
 
-def candidates_for(model: GreyBox, log: Log, wanted: Sequence[str] | None) -> tuple[list[str], dict[str, list[str]]]:
+def candidates_for(model: GreyBox, log: Log, wanted: str | Sequence[str] | None) -> tuple[list[str], dict[str, list[str]]]:
     """Return the effects that can be asked for, and for the others which channels they lack."""
-    names = EFFECTS.names() if wanted is None else list(wanted)
+    if isinstance(wanted, str):
+        wanted = [wanted]
+    names = EFFECTS.names() if wanted is None else list(dict.fromkeys(wanted))
     needs: dict[str, list[str]] = {}
     usable = []
     for name in names:
@@ -108,7 +110,7 @@ def windows_for(model: GreyBox, log: Log) -> Windows:
 def diagnose(
     model: GreyBox,
     log: Log,
-    effects: Sequence[str] | None = None,
+    effects: str | Sequence[str] | None = None,
     *,
     max_effects: int = 4,
     progress: Callable[[str], None] | None = None,
@@ -149,6 +151,7 @@ class _Search:
         self.layout, self.windows, self.usable, self.say = layout, windows, usable, say
         self.base = [n for n in layout.names if n not in usable or n in layout.nuisance]
         self.floor = TRUST * motion(windows) + 1e-9
+        self.silent: list[str] = []
 
     def statistics(self, found: Explanation) -> tuple[Statistics, Layout]:
         """Linearise towards every parameter at a fit."""
@@ -178,6 +181,7 @@ class _Search:
                 global_p = p_value
                 similar = (remaining, similarity(sums, at, base, remaining))
                 table = self._table(scores, current, similar, needs)
+                self.silent = [n for n in remaining if not scores[n].degrees]
             missing_something = p_value < ALPHA
             if not missing_something or not remaining or len(chosen) >= most:
                 verdict = "unknown" if self._slow(current) else "adequate"
@@ -328,6 +332,8 @@ class _Search:
         found = list(model.vehicle.warnings)
         if len(log.runs) < 2:
             found.append("the log holds one run: what is left out in turn are stretches of it")
+        if self.silent:
+            found.append(f"{log.name} says nothing about {', '.join(self.silent)}: nothing in it depends on them")
         if not stated(model):
             found.append("no coefficient of the model is uncertain: any error of theirs will be given a name")
         return found

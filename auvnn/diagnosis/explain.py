@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.nuisance import Layout, priors, scales, stated
+from auvnn.diagnosis.nuisance import DETERMINED, Layout, priors, scales, stated
 from auvnn.diagnosis.score import inflation
 from auvnn.metrics.windows import Windows
 from auvnn.training.prediction_error import Fitted, Priors, Statistics, fit
@@ -132,8 +132,22 @@ def weigh(layout: Layout, explanation: Explanation, factor: float) -> Explanatio
     return replace(explanation, evidence=-0.5 * (data + float(away @ away) + volume))
 
 
+def determined(explanation: Explanation, columns: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return whether the log says more of some parameters than their priors do.
+
+    Args:
+        explanation: a fit.
+        columns: positions within its own parameter vector.
+    """
+    fitted = explanation.fitted
+    variance = np.diag(fitted.covariance())[columns]
+    return variance * fitted.priors.precision[columns] < DETERMINED**2
+
+
 def standard_errors(explanation: Explanation, columns: NDArray[np.int64]) -> tuple[Array, float]:
     """Return standard errors of some parameters, and the inflation that went into them.
+
+    A parameter of which the log says no more than its prior has none: NaN.
 
     Args:
         explanation: a fit.
@@ -147,4 +161,5 @@ def standard_errors(explanation: Explanation, columns: NDArray[np.int64]) -> tup
     by_window = statistics.slope[:, columns] - statistics.slope[:, others] @ carry
     information = total[np.ix_(columns, columns)] - total[np.ix_(columns, others)] @ carry
     factor = inflation(by_window, information, statistics.run)
-    return np.sqrt(np.maximum(np.diag(covariance)[columns], 0.0) * factor), factor
+    std = np.sqrt(np.maximum(np.diag(covariance)[columns], 0.0) * factor)
+    return np.where(determined(explanation, columns), std, np.nan), factor

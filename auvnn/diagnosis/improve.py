@@ -14,13 +14,13 @@ from auvnn.answers import Answer, plain
 from auvnn.diagnosis.bake import baked
 from auvnn.diagnosis.compare import stitch
 from auvnn.diagnosis.diagnose import windows_for
-from auvnn.diagnosis.explain import Explanation, explain, standard_errors
+from auvnn.diagnosis.explain import Explanation, determined, explain, standard_errors
 from auvnn.diagnosis.nuisance import lay_out
 from auvnn.effects import EFFECTS
-from auvnn.errors import ConfigError
+from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log
-from auvnn.logs.noise import noise_std
 from auvnn.logs.overlap import leakage
+from auvnn.metrics.noise import attitude_noise, white
 from auvnn.metrics.one_step import choose_derivative, one_step, scores
 from auvnn.metrics.rollouts import HORIZONS, Rolled, Scale, scale_of, table
 from auvnn.models import GreyBox
@@ -87,7 +87,7 @@ def add(
 
     Raises:
         ConfigError: an unknown effect, one that is there already, or one named twice.
-        InputError: the same data on both sides.
+        InputError: the same data on both sides, or `log` says nothing about an effect.
     """
     say = progress or (lambda words: None)
     names = [effects] if isinstance(effects, str) else list(effects)
@@ -110,23 +110,26 @@ def add(
         fits.append(found)
         models.append((names[count - 1], baked(model, layout, found)))
     final, best = models[-1][1], fits[-1]
+    silent = _silent(layout, best, names, log)
     say("free running on the held-out data")
     scale, how = scale_of(test), choose_derivative(test, derivative)
-    results, rolled = {}, {}
+    results, rolled, key = {}, {}, "5"
     for step, candidate in models:
-        horizons = HORIZONS if step in ("as given", "coefficients refitted") or candidate is final else ("5",)
+        horizons = HORIZONS if step in ("as given", "coefficients refitted") or candidate is final else (key,)
         rollout, kept = table(candidate, test, scale, horizons)
         results[step] = {"rollout": rollout}
         rolled[step] = kept
+        if key not in kept:
+            # The held-out stretches are shorter than that: the longest horizon that they bear.
+            key = next((h for h in ("2", "1", "0.5") if h in kept), "full")
         if len(horizons) > 1:
             results[step]["one_step"] = scores(one_step(candidate, test, how))
-    key = "5" if "5" in rolled["as given"] else next(iter(rolled["as given"]), "full")
     last = names[-1]
     gain, std = paired_gain(rolled["coefficients refitted"][key], rolled[last][key], scale)
     accepted = bool(np.isfinite(gain) and gain > std)
     waterfall = [{"step": s, "error": results[s]["rollout"][key]["total"]} for s, _ in models]
     waterfall.append({"step": "noise floor", "error": noise_floor(final, rolled[last][key], test, scale)})
-    warnings = _warnings(layout, best, accepted, gain, std)
+    warnings = [*silent, *_warnings(layout, best, accepted, gain, std)]
     if key != "5":
         warnings.append(f"no held-out stretch is 5 s long: gain and waterfall are for horizon {key}")
     return Improvement(
@@ -177,8 +180,8 @@ def noise_floor(model: GreyBox, rolled: Rolled, log: Log, scale: Scale, seed: in
     """
     from auvnn.metrics.free_run import initial_states, moved, predict
 
-    noise_nu = np.nanmean([np.nan_to_num(np.asarray(noise_std(r.t, r.nu))) for r in log.runs], axis=0)
-    angle = np.nanmean([np.nan_to_num(np.asarray(noise_std(r.t, 2 * r.quaternion[:, 1:]))) for r in log.runs], axis=0)
+    noise_nu = np.mean([white(r, r.nu) for r in log.runs], axis=0)
+    angle = np.mean([attitude_noise(r) for r in log.runs], axis=0)
     rng = np.random.default_rng(seed)
     windows = rolled.windows
     states = initial_states(model, windows)
@@ -210,6 +213,24 @@ def _values(layout: Any, found: Explanation, names: Sequence[str]) -> dict[str, 
         std, _ = standard_errors(found, columns)
         out[name] = {p.name: {"value": v, "std": s, "unit": p.unit} for p, v, s in
                      zip(layout.model.effect(name).parameters_of, found.fitted.theta[columns], std, strict=True)}
+    return out
+
+
+def _silent(layout: Any, found: Explanation, names: Sequence[str], log: Log) -> list[str]:
+    """Return a warning where the log says nothing about some parameters; refuse where it is all of an effect's."""
+    out, at = [], 0
+    for name in found.names:
+        size = len(layout.columns[name])
+        known = determined(found, np.arange(at, at + size))
+        at += size
+        if name not in names or known.all():
+            continue
+        labels = ", ".join(f"{name}.{p.name}" for p, k in zip(layout.model.effect(name).parameters_of, known,
+                                                              strict=True) if not k)
+        if not known.any():
+            raise InputError(f"{log.name} says nothing about {labels}: nothing in it depends on them; fit on a log "
+                             f"that excites them, or leave {name} out")
+        out.append(f"{log.name} says nothing about {labels}: they stay near where they were, without standard error")
     return out
 
 

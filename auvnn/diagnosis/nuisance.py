@@ -19,6 +19,8 @@ GROUPS = ("added_mass", "linear_damping", "quadratic_damping", "inertia")
 # An effect that is already part of the model was fitted or stated: it may move by its plausible scale.
 # A candidate is all but free, so that its prior neither pulls the estimate nor leaves it without bound.
 FREE = 10.0
+# A parameter whose standard error the log brings down by less than this share of its prior's is not determined.
+DETERMINED = 0.99
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from auvnn.diagnosis.nuisance import Layout, priors, scales, stated
+from auvnn.diagnosis.nuisance import DETERMINED, FREE, Layout, priors, scales, stated
 from auvnn.training.prediction_error import Statistics, parameters_of
 
 Array = NDArray[np.float64]
 # Shares of a parameter's information below this are rounding.
 TINY = 1e-10
+# Information on a parameter in units of its plausible scale that leaves it no better known than its prior does.
+BLIND = (DETERMINED**-2 - 1.0) / FREE**2
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class Score:
         degrees: parameters that the log says anything about.
         inflation: variance of the score over that of white noise, at least one.
         estimate: (p,) one-step estimate of the parameters.
-        std: (p,) its standard errors, inflated.
+        std: (p,) its standard errors, inflated; NaN where the log says no more than the prior.
         evidence: natural logarithm of the Bayes factor for the effect, with parameters of plausible size.
         gain: fall of the weighted squared error that the estimate promises.
     """
@@ -99,10 +101,12 @@ def score(statistics: Statistics, layout: Layout, base: Sequence[str], effect: s
     now = parameters_of(layout.model, [effect])
     # Work in units of the plausible scale, so that one threshold tells what the log says nothing about.
     values, vectors = np.linalg.eigh(information * scale[:, None] * scale)
-    seen = values > max(TINY * values.max(initial=0.0), 1e-8)
+    seen = values > max(TINY * values.max(initial=0.0), BLIND)
     if not seen.any():
         size = len(scale)
         return Score(effect, 1.0, 0.0, 0, factor, now, np.full(size, np.nan), -0.0, 0.0)
+    posterior = vectors**2 @ (1.0 / (np.maximum(values, 0.0) + FREE**-2))
+    unseen = FREE**2 * (vectors[:, ~seen] ** 2).sum(1)
     values, vectors = values[seen], vectors[:, seen]
     along = vectors.T @ (gradient * scale) / values  # one-step estimate, in scales
     spread = factor / values
@@ -124,7 +128,8 @@ def score(statistics: Statistics, layout: Layout, base: Sequence[str], effect: s
     windows = len(by_window)
     p_value = float(stats.f.sf(statistic / degrees, degrees, max(windows - degrees, 4)))
     estimate = now + scale * (vectors @ along)
-    std = scale * np.sqrt(np.einsum("ij,j,ij->i", vectors, spread, vectors))
+    std = scale * np.sqrt(vectors**2 @ spread + unseen)
+    std = np.where(posterior < (DETERMINED * FREE) ** 2, std, np.nan)
     gain = float(np.sum((along - centre) ** 2 * values))
     return Score(effect, p_value, statistic, degrees, factor, estimate, std, evidence, gain)
 

@@ -14,7 +14,9 @@ from auvnn.models import GreyBox
 Array = NDArray[np.float64]
 FOLDS = 4
 # Ridge, in units of the standardised features' variance: keeps collinear inputs from trading huge weights.
-RIDGE = 1e-3
+RIDGE = 1e-2
+# Explained on held-out data, below which a dependence is not worth a word.
+LEAST = 0.02
 
 
 def inputs_of(log: Log) -> dict[str, list[Array]]:
@@ -54,8 +56,9 @@ def depends_on(model: GreyBox, log: Log, windows: Windows, derivative: dict | No
     """Return by degree of freedom the share of the residual's energy that each measured input explains.
 
     A ridge regression on simple functions of every input is fitted on all folds but one and judged on that
-    one; an input's share is by how much the held-out error grows when its values are exchanged between
-    samples. Shares below one per cent are left out.
+    one. What it explains there is divided among the inputs by how much the held-out error grows when each
+    one's values are exchanged between samples. Shares below one per cent are left out, and so is a degree of
+    freedom of which the inputs together explain less than two.
 
     Reference: Breiman (2001), Machine Learning 45, for permutation importance.
     """
@@ -78,7 +81,7 @@ def depends_on(model: GreyBox, log: Log, windows: Windows, derivative: dict | No
     fold = np.arange(len(y)) * FOLDS // len(y)
     shuffle = np.random.default_rng(0)
     lost = {n: np.zeros(6) for n in blocks}
-    total = np.zeros(6)
+    total, left = np.zeros(6), np.zeros(6)
     for f in range(FOLDS):
         fit, out = fold != f, fold == f
         mean = y[fit].mean(0)
@@ -86,12 +89,19 @@ def depends_on(model: GreyBox, log: Log, windows: Windows, derivative: dict | No
         weights = np.linalg.solve(gram, x[fit].T @ (y[fit] - mean))
         error = np.sum((y[out] - mean - x[out] @ weights) ** 2, axis=0)
         total += np.sum((y[out] - y[out].mean(0)) ** 2, axis=0)
+        left += error
         for n, part in where.items():
             changed = x[out].copy()
             changed[:, part] = changed[shuffle.permutation(out.sum())][:, part]
             lost[n] += np.sum((y[out] - mean - changed @ weights) ** 2, axis=0) - error
     found: dict[str, dict[str, float]] = {}
     for k, axis in enumerate(AXES):
-        shares = {n: float(v[k] / (2 * total[k])) for n, v in lost.items() if total[k] > 0}
-        found[axis] = dict(sorted(((n, min(s, 1.0)) for n, s in shares.items() if s >= 0.01), key=lambda i: -i[1]))
+        explained = 1.0 - left[k] / total[k] if total[k] > 0 else 0.0
+        weights = {n: max(float(v[k]), 0.0) for n, v in lost.items()}
+        whole = sum(weights.values())
+        if explained < LEAST or whole <= 0:
+            found[axis] = {}
+            continue
+        shares = {n: explained * w / whole for n, w in weights.items()}
+        found[axis] = dict(sorted(((n, v) for n, v in shares.items() if v >= 0.01), key=lambda i: -i[1]))
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,12 +11,13 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.catalogue import unknown_name
-from auvnn.effects import Sensed
+from auvnn.effects import Moment, Sensed
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run
-from auvnn.logs.derivatives import LocalPolynomial, bandwidth_hz, noise_gain
-from auvnn.logs.noise import noise_std
+from auvnn.logs.derivatives import LocalPolynomial, bandwidth_hz
+from auvnn.metrics.noise import noisier
 from auvnn.models import GreyBox, Inputs
+from auvnn.models.actuators import Drive
 from auvnn.physics.attitude import quat_to_matrix
 
 Array = NDArray[np.float64]
@@ -28,8 +29,10 @@ class Derivative:
     """How accelerations are obtained.
 
     Attributes:
-        method: "measured", or "local_polynomial": the same filter on the measured velocity (its slope) and
-            on the model's acceleration (its smoothed value), so that smoothing makes no difference between them.
+        method: "measured", or "local_polynomial": the slope of the measured velocity beside the slope of what
+            the model's acceleration adds up to, by the same filter, so that smoothing makes no difference
+            between them. (The filter's smoothed value is another filter than its slope: a model's acceleration
+            that went through the one would differ from a measured velocity that went through the other.)
         half_width: samples on either side of the centre.
         order: of the polynomial.
     """
@@ -83,7 +86,8 @@ class OneStep:
         measured: (N, 6), m/s2 and rad/s2, after the filter.
         model: (N, 6), after the same filter.
         wrench: (N, 6), N and N m: what the model lacks, M (measured - model).
-        noise: (6,) standard deviation that white noise of the velocities leaves in `measured`.
+        noise: (6,) what noise as large as the log's would leave between `measured` and a perfect model's.
+        wrench_noise: (6,) the same of `wrench`.
     """
 
     run: int
@@ -92,83 +96,137 @@ class OneStep:
     model: Array
     wrench: Array
     noise: Array
+    wrench_noise: Array
 
 
-def model_acceleration(model: GreyBox, run: Run, centred: bool) -> Array:
+def model_acceleration(model: GreyBox, run: Run) -> Array:
     """Return the model's acceleration as the sensors would report it, at every measured state, (N, 6).
+
+    It is that just after the row's command has begun to act; NaN where a sample is missing.
 
     Args:
         model: the model.
         run: measurements.
-        centred: take the mean of the thrust before and after each sample, as a symmetric filter of held
-            commands sees it, instead of the thrust just after.
 
     Raises:
         InputError: the run lacks the commands that drive the model.
     """
-    command = run.thrusters if model.actuation == "thrusters" else run.wrench
-    if command is None:
-        raise InputError(f"run {run.number} has no commands of the kind that drives the model ({model.actuation})")
-    if command.shape[1] != model.actuators.size:
-        raise InputError(f"run {run.number} has {command.shape[1]} thruster columns, but {model.vehicle.name} has "
-                         f"{model.actuators.size} thrusters: give one column per thruster of the model file")
-    good = run.valid
+    return _Replay(model, run).accelerations(lambda drive: torch.stack(drive.start))
 
-    def tensor(x: Array | None) -> torch.Tensor | None:
-        return None if x is None else torch.tensor(np.nan_to_num(x), dtype=torch.float64)
 
-    fill = command.copy()
-    fill[~np.isfinite(command).all(1)] = 0.0
-    inputs = Inputs(torch.tensor(fill), tensor(run.fins), tensor(run.voltage), tensor(run.altitude))
-    times = torch.tensor(run.t)
-    with torch.no_grad():
-        drive = model.actuators.drive(inputs.command, times, model.using("command") + model.using("respond"))
-        if centred:
-            mean = torch.stack([part[0] for part in drive.mean])
-            thrust = 0.5 * (mean + torch.cat([mean[:1], mean[:-1]]))
-        else:
-            thrust = torch.stack(drive.start)
+def model_velocity(model: GreyBox, run: Run) -> Array:
+    """Return what the model's accelerations at the measured states add up to, (N, 6), from zero at the start.
+
+    v_{k+1} = v_k + (t_{k+1} - t_k) [a(x_k, T_k) + a(x_{k+1}, T_k)] / 2, with T_k the mean thrust of the
+    interval: the command of row k is held over it, so that a step of the command belongs to one side only.
+    NaN where a sample is missing; what lies on either side of it must not be compared.
+
+    Raises:
+        InputError: the run lacks the commands that drive the model.
+    """
+    replay = _Replay(model, run)
+
+    def mean(drive: Drive) -> torch.Tensor:
+        return torch.stack([part[0] for part in drive.mean])
+
+    def mean_before(drive: Drive) -> torch.Tensor:
+        held = mean(drive)
+        return torch.cat([held[:1], held[:-1]])
+
+    begin, end = replay.accelerations(mean), replay.accelerations(mean_before)
+    return integrated(run.t, begin, end)
+
+
+def integrated(t: Array, begin: Array, end: Array | None = None) -> Array:
+    """Return the trapezoidal integral of a signal, (N, k), zero at the start and NaN where the signal is.
+
+    Args:
+        t: s, (N,).
+        begin: (N, k), the signal as each interval begins.
+        end: (N, k), the signal as the interval before each sample ends; `begin` where it does not jump.
+    """
+    end = begin if end is None else end
+    steps = 0.5 * np.diff(t)[:, None] * (begin[:-1] + end[1:])
+    total = np.concatenate([np.zeros((1, begin.shape[1])), np.cumsum(np.nan_to_num(steps), axis=0)])
+    return np.where(np.isfinite(begin), total, np.nan)
+
+
+class _Replay:
+    """A run's measured states and inputs, for the model to say what acceleration it expects there."""
+
+    def __init__(self, model: GreyBox, run: Run) -> None:
+        command = run.thrusters if model.actuation == "thrusters" else run.wrench
+        if command is None:
+            raise InputError(f"run {run.number} has no commands of the kind that drives the model "
+                             f"({model.actuation})")
+        if command.shape[1] != model.actuators.size:
+            raise InputError(f"run {run.number} has {command.shape[1]} thruster columns, but {model.vehicle.name} "
+                             f"has {model.actuators.size} thrusters: give one column per thruster of the model file")
+        known = np.isfinite(command).all(1)
+
+        def tensor(x: Array | None) -> torch.Tensor | None:
+            return None if x is None else torch.tensor(np.nan_to_num(x), dtype=torch.float64)
+
+        self.model = model
+        self.good = known & np.isfinite(run.quaternion).all(1) & np.isfinite(run.nu).all(1)
+        self.inputs = Inputs(torch.tensor(np.where(known[:, None], command, 0.0)), tensor(run.fins),
+                             tensor(run.voltage), tensor(run.altitude))
+        self.times = torch.tensor(run.t)
+        # A missing position or attitude must not make the rest of the row a missing number.
         eta = torch.tensor(np.where(np.isfinite(run.eta), run.eta, np.array([0, 0, 0, 1.0, 0, 0, 0])))
-        nu = torch.tensor(np.nan_to_num(run.nu))
-        state = model.unsense(Sensed(eta[:, :3], eta[:, 3:], nu))
-        rate = model.nu_dot(state.position, quat_to_matrix(state.quaternion), state.nu, thrust, inputs, times)
-        seen = model.sense(Sensed(state.position, state.quaternion, state.nu, rate)).nu_dot
-    assert seen is not None
-    out = seen.numpy().copy()
-    out[~good] = np.nan
-    return out
+        with torch.no_grad():
+            self.state = model.unsense(Sensed(eta[:, :3], eta[:, 3:], torch.tensor(np.nan_to_num(run.nu))))
+            self.drive = model.actuators.drive(self.inputs.command, self.times,
+                                               model.using("command") + model.using("respond"))
+
+    def accelerations(self, thrust: Callable[[Drive], torch.Tensor]) -> Array:
+        """Return what the sensors would report under a thrust, (N, 6); NaN where a sample is missing."""
+        at = self.state
+        with torch.no_grad():
+            rate = self.model.nu_dot(at.position, quat_to_matrix(at.quaternion), at.nu, thrust(self.drive),
+                                     self.inputs, self.times)
+            seen = self.model.sense(Sensed(at.position, at.quaternion, at.nu, rate)).nu_dot
+        assert seen is not None
+        return np.where(self.good[:, None], seen.numpy(), np.nan)
 
 
 def one_step(model: GreyBox, log: Log, derivative: Derivative) -> list[OneStep]:
     """Compare accelerations run by run; see `OneStep`."""
-    with torch.no_grad():
-        inertia = None if model.time_varying else model.prepare().total.numpy()
     found = []
     for run in log.runs:
-        if derivative.method == "measured":
-            assert run.nu_dot is not None
-            measured, predicted = run.nu_dot, model_acceleration(model, run, centred=False)
-            noise = np.asarray(noise_std(run.t, run.nu_dot), dtype=float)
-        else:
-            smooth = LocalPolynomial(run.t, derivative.half_width, derivative.order)
-            velocity = np.where(run.valid[:, None], run.nu, np.nan)
-            measured = smooth(velocity)[1]
-            predicted = smooth(model_acceleration(model, run, centred=True))[0]
-            gain = noise_gain(run.dt, derivative.half_width, derivative.order)[1]
-            noise = np.asarray(noise_std(run.t, run.nu), dtype=float) * gain
-        gap = measured - predicted
-        wrench = gap @ (inertia if inertia is not None else _inertia(model, run)).T
-        found.append(OneStep(run.number, run.t, measured, predicted, wrench, np.nan_to_num(noise)))
+        measured, predicted = accelerations(model, run, derivative)
+        # The same once more with as much noise again: what changes is what noise does, to data and model alike.
+        again = accelerations(model, noisier(run), derivative)
+        floor = (again[0] - again[1]) - (measured - predicted)
+        to_wrench = inertia_of(model, run).T
+        found.append(OneStep(run.number, run.t, measured, predicted, (measured - predicted) @ to_wrench, _rms(floor),
+                             _rms(floor @ to_wrench)))
     return found
 
 
-def _inertia(model: GreyBox, run: Run) -> Array:
-    """Return the inertia of a model whose body varies in time, at the start of the run: the residual's scale."""
-    from auvnn.effects import Moment
+def accelerations(model: GreyBox, run: Run, derivative: Derivative) -> tuple[Array, Array]:
+    """Return measured and predicted acceleration of a run, after the same filter, (N, 6) each."""
+    if derivative.method == "measured":
+        assert run.nu_dot is not None
+        return run.nu_dot, model_acceleration(model, run)
+    smooth = LocalPolynomial(run.t, derivative.half_width, derivative.order)
+    velocity = np.where(run.valid[:, None], run.nu, np.nan)
+    return smooth(velocity)[1], smooth(model_velocity(model, run))[1]
 
-    zero3, zero6 = torch.zeros(3, dtype=torch.float64), torch.zeros(6, dtype=torch.float64)
-    moment = Moment(torch.tensor(float(run.t[0])), zero3, torch.eye(3, dtype=torch.float64), zero6, zero6, zero6,
-                    torch.zeros(model.actuators.size, dtype=torch.float64))
+
+def _rms(x: Array) -> Array:
+    """Return the root mean square of each column over what is finite, (k,); zero where nothing is."""
+    good = np.isfinite(x)
+    return np.sqrt((np.where(good, x, 0.0) ** 2).sum(0) / np.maximum(good.sum(0), 1))
+
+
+def inertia_of(model: GreyBox, run: Run) -> Array:
+    """Return the model's inertia matrix (6, 6); of a body that varies in time, that at the start of the run."""
+    moment = None
+    if model.time_varying:
+        zero3, zero6 = torch.zeros(3, dtype=torch.float64), torch.zeros(6, dtype=torch.float64)
+        moment = Moment(torch.tensor(float(run.t[0])), zero3, torch.eye(3, dtype=torch.float64), zero6, zero6,
+                        zero6, torch.zeros(model.actuators.size, dtype=torch.float64))
     with torch.no_grad():
         return model.prepare(moment).total.numpy()
 

@@ -102,13 +102,14 @@ def cut_windows(
 ) -> Windows:
     """Cut a log into windows.
 
-    Windows never cross a gap or a row without commands; they start at samples whose state was measured.
+    Windows never cross a gap or a row without commands or fin angles; they start at samples whose state was
+    measured.
 
     Args:
         log: the log.
         horizon: length, s; infinity for whole stretches.
         stride: from start to start, s; the horizon by default.
-        warmup: history for the actuators, s; rows before the run repeat its first one.
+        warmup: history for the actuators, s; rows before the unbroken stretch repeat its first one.
         kind: "thrusters" or "wrench": which commands to take; by default what the log has.
         partial: also keep a last window of at least half the length.
 
@@ -122,20 +123,23 @@ def cut_windows(
         if command is None:
             wanted = "thruster_1 ..." if kind == "thrusters" else "tau_X ... tau_N"
             raise InputError(f"run {run.number} has no {wanted}: the model is driven by {kind}")
-        for part in stretches(run.t, np.isfinite(command).all(axis=1), None, 2):
+        known = np.isfinite(command).all(axis=1)
+        if run.fins is not None:
+            known &= np.isfinite(run.fins).all(axis=1)
+        for part in stretches(run.t, known, None, 2):
             span = run.t[part.stop - 1] - run.t[part.start] if np.isinf(horizon) else horizon
-            pieces += [(run, command, a, b) for a, b in
+            pieces += [(run, command, a, b, part.start) for a, b in
                        _starts(run, part, span, stride or span, partial or bool(np.isinf(horizon)))]
     if not pieces:
         raise InputError(f"no stretch of {log.name} is {horizon:g} s long without a gap: choose a shorter horizon")
-    length = np.array([b - a + 1 for _, _, a, b in pieces])
+    length = np.array([b - a + 1 for _, _, a, b, _ in pieces])
     rows = int(length.max())
     before = max((int(np.ceil(warmup / run.dt)) for run, *_ in pieces), default=0)
     index = []
-    for _, _, a, b in pieces:
-        # Padding repeats the last row; history before the run repeats its first.
-        index.append(np.clip(np.arange(a - before, a + rows), 0, b))
-    gather = lambda get: np.stack([get(run, command)[i] for (run, command, _, _), i in zip(pieces, index, strict=True)])  # noqa: E731
+    for _, _, a, b, begin in pieces:
+        # Padding repeats the last row; history before the stretch repeats its first.
+        index.append(np.clip(np.arange(a - before, a + rows), begin, b))
+    gather = lambda get: np.stack([get(run, command)[i] for (run, command, *_), i in zip(pieces, index, strict=True)])  # noqa: E731
 
     def optional(name: str) -> np.ndarray | None:
         if any(getattr(run, name) is None for run, *_ in pieces):
@@ -144,10 +148,9 @@ def cut_windows(
 
     times = gather(lambda run, _: run.t)
     # Repeated history gets times of its own, so that the actuators have time to settle in it.
-    for row, ((run, _, a, _), i) in enumerate(zip(pieces, index, strict=True)):
-        missing = max(0, before - a)
-        times[row, :missing] = run.t[0] - run.dt * np.arange(missing, 0, -1)
-        del i
+    for row, (run, _, a, _, begin) in enumerate(pieces):
+        missing = max(0, before - (a - begin))
+        times[row, :missing] = run.t[begin] - run.dt * np.arange(missing, 0, -1)
     measured = np.concatenate(
         [gather(lambda run, _, n=n, w=w: np.full((run.samples, w), np.nan) if getattr(run, n) is None
                 else getattr(run, n))[:, before:] for n, w in
@@ -166,7 +169,7 @@ def cut_windows(
     eta = torch.tensor(filled[..., :7], **double)
     has_rate = bool(mask[..., ACCELERATION].any())
     return Windows(
-        np.array([run.number for run, *_ in pieces]), np.array([a for _, _, a, _ in pieces]),
+        np.array([run.number for run, *_ in pieces]), np.array([a for _, _, a, *_ in pieces]),
         torch.tensor(times, **double), eta, torch.tensor(filled[..., 7:13], **double),
         torch.tensor(filled[..., 13:], **double) if has_rate else None, inputs, torch.tensor(mask, **double),
         length, before,

@@ -141,7 +141,7 @@ class Page:
             kind=self.kind,
             title=safely("the title", lambda: self.title(view), self.kind),
             about=safely("the subject", lambda: self.about(view), ""),
-            brief=safely("the verdict", lambda: self.brief(view), [])
+            brief=safely("the verdict", lambda: self.brief(view)[:MOST_SENTENCES], [])
             or ["There is no verdict in this answer."],
             warnings=safely("the warnings", lambda: self.warnings(view), []),
             pictures=[_picture(plot, drawn, prefix, notes) for plot in plots],

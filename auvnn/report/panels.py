@@ -14,7 +14,6 @@ from auvnn.report import style
 from auvnn.report.decimate import LIMIT, decimate
 from auvnn.report.words import label
 
-
 FARTHEST = 1e100
 
 

@@ -45,7 +45,7 @@ class Look:
 MEASURED = Look("#000000", "-", 0.9, "o")
 AFTER = Look("#0060a8", (0, (4, 1.2)), 1.1, "s", "////")
 BEFORE = Look("#d55e00", (0, (1.6, 1.1)), 1.1, "^", "\\\\\\\\")
-REFITTED = Look("#56b4e9", (0, (5, 1, 1, 1)), 1.1, "D", "...")
+REFITTED = Look("#56b4e9", (0, (9, 1.2, 1.5, 1.2)), 1.7, "D", "...")
 PERSISTENCE = Look("#7f7f7f", (0, (1, 2)), 1.1, "x", "xxx")
 LOOKS = {"measured": MEASURED, "model": BEFORE, "as given": BEFORE, "refitted": REFITTED, "after": AFTER}
 

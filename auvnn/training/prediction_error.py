@@ -109,7 +109,10 @@ class Fitted:
 
     def covariance(self) -> Array:
         """Return the covariance (P, P) of the parameters under white noise of `sigma`."""
-        return np.linalg.pinv(self.statistics.hessian.sum(0) + np.diag(self.priors.precision), hermitian=True)
+        precision = self.statistics.hessian.sum(0) + np.diag(self.priors.precision)
+        # In units of each parameter's own: what is hardly known must not pass for rounding beside what is well known.
+        unit = 1.0 / np.sqrt(np.maximum(np.diag(precision), 1e-300))
+        return np.linalg.pinv(precision * unit[:, None] * unit, hermitian=True) * unit[:, None] * unit
 
 
 def parameters_of(model: GreyBox, names: Sequence[str]) -> Array:

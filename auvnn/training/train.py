@@ -18,7 +18,16 @@ from auvnn.errors import InputError
 from auvnn.logs import Log
 from auvnn.logs.derivatives import LocalPolynomial
 from auvnn.logs.overlap import leakage
-from auvnn.metrics.one_step import Derivative, OneStep, choose_derivative, one_step, scores
+from auvnn.metrics.one_step import (
+    Derivative,
+    OneStep,
+    accelerations,
+    choose_derivative,
+    inertia_of,
+    integrated,
+    one_step,
+    scores,
+)
 from auvnn.models import GreyBox
 from auvnn.training.fit_damping import Fit, fit_damping
 from auvnn.training.history import Record
@@ -78,14 +87,15 @@ def targets(model: GreyBox, log: Log, derivative: Derivative) -> tuple[Array, Ar
     bare = GreyBox(model.vehicle, model.copied_effects(), recorder, model.actuation)
     velocities, wrenches, numbers = [], [], []
     for run in log.runs:
-        part = one_step(bare, Log.from_runs([run], name=log.name), derivative)[0]
+        measured, predicted = accelerations(bare, run, derivative)
         assert recorder.seen is not None
         nu = recorder.seen.numpy()
         nu = np.where(run.valid[:, None], nu, np.nan)
         if derivative.method != "measured":
-            nu = LocalPolynomial(run.t, derivative.half_width, derivative.order)(nu)[0]
+            # The slope of its integral: what the same filter makes of a force that is linear in the velocity.
+            nu = LocalPolynomial(run.t, derivative.half_width, derivative.order)(integrated(run.t, nu))[1]
         velocities.append(nu)
-        wrenches.append(-part.wrench)
+        wrenches.append((predicted - measured) @ inertia_of(bare, run).T)
         numbers.append(np.full(run.samples, run.number))
     return np.concatenate(velocities), np.concatenate(wrenches), np.concatenate(numbers)
 

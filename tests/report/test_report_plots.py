@@ -265,12 +265,15 @@ def test_the_ranking_shows_shares_gains_and_p():
 
 def test_brackets_join_what_is_confusable_once():
     group = [
-        {"effect": "a", "confusable_with": [{"effect": "c"}, {"effect": "elsewhere"}]},
+        {"effect": "a", "explained": 0.5, "confusable_with": [{"effect": "c"}, {"effect": "elsewhere"}]},
         {"effect": "b", "confusable_with": []},
         {"effect": "c", "confusable_with": [{"effect": "a"}]},
         {"effect": "d"},
     ]
     assert brackets(group) == [["a", "c"]]
+    # What explains next to nothing needs no bracket, unless it was chosen.
+    group[0]["explained"], group[3]["explained"] = 0.01, 0.9
+    assert brackets(group) == [] and brackets(group, ["a"]) == [["a", "c"]]
 
 
 def test_similarities_are_shown_once_and_alike_pairs_are_framed():
@@ -368,8 +371,9 @@ def test_the_best_held_out_step_is_marked():
     ax = history([1, 0.5, 0.3, 0.2], [1.1, 0.7, 0.6, 0.8]).axes[0]
     best = next(line for line in ax.lines if line.get_marker() == "o")
     assert (best.get_xdata()[0], best.get_ydata()[0]) == (2, 0.6)
-    assert ax.get_yscale() == "log"
-    assert history([0.0, 1.0]).axes[0].get_yscale() == "linear"
+    assert ax.get_yscale() == "linear"
+    assert history([1.0, 0.01]).axes[0].get_yscale() == "log"
+    assert history([1.0, 0.0]).axes[0].get_yscale() == "linear"
 
 
 def test_damping_curves_shade_what_the_data_cover():

@@ -16,6 +16,7 @@ from auvnn.report.words import count, finite, interval, number
 
 CHANNELS = tuple(symbol for symbol, _ in VELOCITY)
 AXES = tuple(symbol for symbol, _ in WRENCH)
+PARAMETER_HEAD = ["effect", "parameter", "value ± one standard deviation", "95 % interval"]
 EXCERPT = 40.0  # s
 THINNED = "Long records are thinned so that the extremes of every short stretch remain."
 INTERVALS = "Values with 95 % intervals; the dashed stroke marks the value at which the effect vanishes."
@@ -104,6 +105,12 @@ def one_step_table(one_step: Mapping[str, Any]) -> Table:
     )
 
 
+def derivative_words(derivative: Mapping[str, Any]) -> str:
+    """Return how accelerations were obtained, in words."""
+    method, band = str(derivative.get("method") or ""), finite(derivative.get("bandwidth_hz"))
+    return method + (f", bandwidth {number(band)} Hz" if band is not None else "")
+
+
 def parameter_rows(fitted: Mapping[str, Any]) -> list[list[str]]:
     """Return effect, parameter, value with one standard deviation, and the 95 % interval."""
     rows = []
@@ -123,8 +130,7 @@ def parameter_rows(fitted: Mapping[str, Any]) -> list[list[str]]:
 
 def parameter_table(fitted: Mapping[str, Any]) -> Table:
     """Return the fitted parameters."""
-    head = ["effect", "parameter", "value ± one standard deviation", "95 % interval"]
-    return Table("Fitted parameters", head, parameter_rows(fitted), words=2)
+    return Table("Fitted parameters", PARAMETER_HEAD, parameter_rows(fitted), words=2)
 
 
 def parameter_words(members: Mapping[str, Any]) -> str:

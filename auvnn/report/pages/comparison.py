@@ -139,15 +139,13 @@ class ComparisonPage(Page):
         """Return what was read and assumed."""
         derivative, runs = view.mapping("derivative"), view.get("runs")
         runs = len(runs) if isinstance(runs, (list, tuple)) else runs
-        band = finite(derivative.get("bandwidth_hz"))
-        method = str(derivative.get("method", ""))
         read = f"{plural(view.get('samples'), 'sample')} in {plural(runs, 'run')}"
         return [
             ("Model", view.text("model")),
             ("Log", view.text("log")),
             ("Read", read if finite(view.get("samples")) is not None else ""),
             ("Held out", view.text("test")),
-            ("Accelerations", method + (f", bandwidth {number(band)} Hz" if band is not None else "")),
+            ("Accelerations", common.derivative_words(derivative)),
             (
                 "Windows",
                 "start every half horizon from the measured state; the first sample of each is not counted",
@@ -211,8 +209,12 @@ def _failure_words(view: View) -> list[str]:
         return []
     first = found[0]
     share = f" ({percent(first.get('share'))} of the error)" if finite(first.get("share")) else ""
-    words = f"The error sits first of all in {common.channel_words(first.get('channel'))}: {_where(first)}{share}"
-    place = next((f for f in found if f.get("channel") == first.get("channel") and _where(f) != "everywhere"), None)
+    words = (
+        f"The error sits first of all in {common.channel_words(first.get('channel'))}: {_where(first)}{share}"
+    )
+    place = next(
+        (f for f in found if f.get("channel") == first.get("channel") and _where(f) != "everywhere"), None
+    )
     return [f"{words}; there look at {_where(place)}." if place not in (None, first) else f"{words}."]
 
 

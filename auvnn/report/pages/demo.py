@@ -115,7 +115,9 @@ def _truth_words(view: View) -> list[str]:
             if finite(entry.get("value")) is not None:
                 found = interval(entry["value"], entry.get("std"), str(entry.get("unit") or ""))
                 words.append(f"{name} {number(real)} (found {found})")
-    return [f"What had been hidden: {listing(words)}."] if words else []
+    real = finite(view.get("true_error"))
+    beside = f"; the true model itself errs by {number(real, 2)}" if real is not None else ""
+    return [f"What had been hidden: {listing(words)}{beside}."] if words else []
 
 
 PAGE = DemoPage()

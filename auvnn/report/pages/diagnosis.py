@@ -12,7 +12,7 @@ from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
 from auvnn.report.panels import NoData
 from auvnn.report.plots.parameters import parameters
-from auvnn.report.plots.ranking import improvement, ranking
+from auvnn.report.plots.ranking import brackets, improvement, ranking
 from auvnn.report.plots.similarity import similarity
 from auvnn.report.view import View
 from auvnn.report.words import finite, listing, number, p_value, percent, plural
@@ -49,11 +49,16 @@ class DiagnosisPage(Page):
         if verdict in ("named", "ambiguous"):
             out += [_candidate_words(c) for c in leading[:3]]
             out += _rival_words(candidates, missing)
-        if left is not None and verdict != "adequate":
+        if left is not None and left < 0.01 and verdict != "adequate":
+            out.append("Next to nothing of the residual is left unexplained.")
+        elif left is not None and verdict != "adequate":
             out.append(
                 f"{percent(left)} of the residual's energy above the noise is explained by nothing in the "
                 f"catalogue."
             )
+        overall = finite(view.get("global_p_value"))
+        if overall is not None:
+            out.append(f"That nothing at all is missing has p = {p_value(overall)}.".replace("p = <", "p <"))
         if verdict in ("unknown", "adequate"):
             out += _best_of_the_rest(candidates)
         if verdict == "unknown":
@@ -142,12 +147,10 @@ class DiagnosisPage(Page):
     def assumed(self, view: View) -> list[tuple[str, str]]:
         """Return what was read and assumed."""
         derivative = view.mapping("derivative")
-        band = finite(derivative.get("bandwidth_hz"))
-        method = str(derivative.get("method", ""))
         return [
             ("Model", view.text("model")),
             ("Log", view.text("log")),
-            ("Accelerations", method + (f", bandwidth {number(band)} Hz" if band is not None else "")),
+            ("Accelerations", common.derivative_words(derivative)),
             ("Coefficients", "the model's nominal coefficients count as uncertain by their stated amounts"),
             ("Judged by", "cross-validation over the runs of this log; a test log was not looked at"),
             ("Catalogue", plural(len(_candidates(view)), "effect")),
@@ -239,7 +242,7 @@ def _ranking_caption(candidates: list[Mapping[str, Any]], missing: list[str]) ->
     )
     if missing:
         words += " Hatched and bold: what the verdict names."
-    if any(c.get("confusable_with") for c in candidates):
+    if brackets(candidates, missing):
         words += " Brackets join what this log can hardly tell apart."
     return words
 

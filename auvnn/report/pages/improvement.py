@@ -46,34 +46,8 @@ class ImprovementPage(Page):
         effects = listing(view.texts("effects")) or "the effects"
         gain, steps = view.mapping("gain"), _steps(view)
         fall, std = finite(gain.get("value")), finite(gain.get("std"))
-        words = f" by {interval(fall, std)}" if fall is not None else ""
-        accepted = view.get("accepted")
-        if accepted:
-            out = [
-                f"Adding {effects} lowers the 5 s error on held-out data{words}, more than its own "
-                f"uncertainty: accepted."
-            ]
-        elif fall is not None and fall <= 0:
-            out = [
-                f"Adding {effects} does not lower the 5 s error on held-out data (gain "
-                f"{interval(fall, std)}): not accepted."
-            ]
-        else:
-            out = [
-                f"Adding {effects} lowers the 5 s error on held-out data{words}, no more than chance "
-                f"could: not accepted."
-            ]
         errors = {stage: _main_error(view, stage) for stage in STAGES}
-        if errors["before"] is not None and errors["after"] is not None:
-            refitted = errors["refitted"]
-            middle = (
-                f", {number(refitted, 2)} with its coefficients fitted again" if refitted is not None else ""
-            )
-            out.append(
-                f"The model as given errs by {number(errors['before'], 2)} of the spread of the "
-                f"motion{middle}, and "
-                f"{number(errors['after'], 2)} with {effects}."
-            )
+        out = [_verdict(effects, bool(view.get("accepted")), fall, std), *_error_words(view, effects, errors)]
         out += _floor_words(steps, errors)
         fitted = view.mapping("parameters")
         if fitted:
@@ -135,9 +109,17 @@ class ImprovementPage(Page):
 
     def tables(self, view: View) -> list[Table]:
         """Return the tables."""
+        refitted = view.mapping("coefficients")
         steps = [[str(s.get("step") or "–"), number(s.get("error"))] for s in _steps(view)]
         return [
             common.parameter_table(view.mapping("parameters")),
+            Table(
+                "Coefficients fitted beside it",
+                common.PARAMETER_HEAD,
+                common.parameter_rows(refitted),
+                words=2,
+                folded=True,
+            ),
             _stage_table(view, "rollout", "Free-running error over {} by channel", "nrmse"),
             _stage_table(view, "one_step", "R² of the acceleration, one step ahead", "r2"),
             Table("Error step by step", ["step", "error"], steps),
@@ -148,7 +130,7 @@ class ImprovementPage(Page):
         return [
             ("Model", view.text("model")),
             ("Fitted on", view.text("log")),
-            ("Held out", view.text("test")),
+            ("Held out", view.text("held_out") or view.text("test")),
             ("Effects", listing(view.texts("effects"))),
             (
                 "Error",
@@ -159,6 +141,31 @@ class ImprovementPage(Page):
                 "from the refitted model to the extended one; one standard deviation over windows and runs",
             ),
         ]
+
+
+def _verdict(effects: str, accepted: bool, fall: float | None, std: float | None) -> str:
+    by = f" by {interval(fall, std)}" if fall is not None else ""
+    if accepted:
+        return (
+            f"Adding {effects} lowers the error on held-out data{by}, more than its own uncertainty: "
+            f"accepted."
+        )
+    if fall is not None and fall <= 0:
+        gain = f"(gain {interval(fall, std)})"
+        return f"Adding {effects} does not lower the error on held-out data {gain}: not accepted."
+    return f"Adding {effects} lowers the error on held-out data{by}, no more than chance could: not accepted."
+
+
+def _error_words(view: View, effects: str, errors: Mapping[str, float | None]) -> list[str]:
+    before, refitted, after = (errors[stage] for stage in STAGES)
+    if before is None or after is None:
+        return []
+    span = common.horizon_words(common.main_horizon(_stage(view, "after", "rollout")) or "")
+    middle = f", {number(refitted, 2)} with its coefficients fitted again" if refitted is not None else ""
+    return [
+        f"Running free for {span}, the model as given errs by {number(before, 2)} of the spread of the motion"
+        f"{middle}, and {number(after, 2)} with {effects}."
+    ]
 
 
 def _steps(view: View) -> list[Mapping[str, Any]]:
@@ -220,7 +227,8 @@ def _runs(entry: Mapping[str, Any], whole: bool) -> Figure:
 
 
 def _errors(entry: Mapping[str, Any]) -> Figure:
-    models = {name: entry[stage] for stage, name in STAGES.items() if entry.get(stage) is not None}
+    order = ("refitted", "before", "after")
+    models = {STAGES[stage]: entry[stage] for stage in order if entry.get(stage) is not None}
     title = f"held-out {common.run_words(entry, whole=False)}"
     return error_over_time(entry["t"], entry["measured"], models, title=title, limit=1000)
 

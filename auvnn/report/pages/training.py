@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,11 +15,12 @@ from auvnn.report.pages import common
 from auvnn.report.panels import NoData
 from auvnn.report.plots.damping_curves import damping_curves
 from auvnn.report.plots.history import history
-from auvnn.report.view import View
-from auvnn.report.words import count, finite, number, plural
+from auvnn.report.view import View, name_of
+from auvnn.report.words import count, finite, number, percent, plural
 
 _LEARNED = ("learned", "force", "damping", "d")
 _VELOCITY = ("nu", "velocity", "x")
+_R2 = re.compile(r"held_out_r2_(\w+)_before")
 
 
 class TrainingPage(Page):
@@ -38,50 +40,41 @@ class TrainingPage(Page):
     def brief(self, view: View) -> list[str]:
         """Return the verdict in plain words."""
         train, held = _errors(view, "train"), _errors(view, "held_out")
-        out = []
         judged, words = (held, "held-out data") if held.size else (train, "the fitted data")
-        if judged.size:
-            best = int(np.nanargmin(judged))
-            first, last = judged[np.isfinite(judged)][[0, -1]]
-            if judged[best] < first:
-                share = 100 * (1 - judged[best] / first) if first > 0 else 0.0
-                out.append(
-                    f"The error on {words} falls from {number(first)} to {number(judged[best])}, by "
-                    f"{number(share, 2)} %."
-                )
-            else:
-                out.append(
-                    f"The training does not lower the error on {words} (it starts at {number(first)})."
-                )
-            out.append(
-                f"The best of {plural(judged.size, 'step')} is step {best}; the fit ends at {number(last)}."
-            )
-            if last > 1.05 * judged[best]:
-                out.append(
-                    "After the best step the error on held-out data rises again; the best step's weights "
-                    "are the ones to keep."
-                )
+        out = _course(judged, words, _step(view), _numbers(view, judged.size)) if judged.size else []
         if held.size and train.size and np.isfinite(train[-1]) and np.isfinite(held[-1]) and train[-1] > 0:
             ratio = held[-1] / train[-1]
             verdict = ": the damping generalises" if ratio < 1.3 else ", a sign of data learned by heart"
             out.append(
                 f"Held out, the final error is {number(ratio, 2)} times that of the fitted data{verdict}."
             )
-        stopped = view.text("stopped") or view.text("status")
-        if stopped:
-            out.append(f"It stopped because: {stopped.rstrip('.')}.")
+        gains = {k: after - before for k, (before, after) in _r2(view).items()}
+        if gains:
+            best = max(gains, key=lambda k: gains[k])
+            before, after = _r2(view)[best]
+            out.append(
+                f"One step ahead on held-out data most is gained in {common.channel_words(best)}: R² from "
+                f"{number(before, 2)} to {number(after, 2)}."
+            )
+        if view.text("stopped"):
+            out.append(f"It stopped because: {view.text('stopped').rstrip('.')}.")
         return out or ["The training left no history of its error."]
 
     def plots(self, view: View) -> list[Plot]:
         """Return the figures."""
         found = view.mapping("history")
-        step = str(found.get("step") or "step")
-        error = str(found.get("error") or "error (dimensionless)")
+        error = str(found.get("error") or "error (dimensionless)").removesuffix(" (1)")
+
+        def draw() -> Figure:
+            train, held = _errors(view, "train"), _errors(view, "held_out")
+            steps = _numbers(view, max(train.size, held.size))
+            return history(train, held, steps=steps, step=_step(view), error=error)
+
         return [
             Plot(
                 "history",
                 "How the fit went",
-                lambda: history(_errors(view, "train"), _errors(view, "held_out"), step=step, error=error),
+                draw,
                 "Error on the fitted and on the held-out data; the circle marks the best held-out step. "
                 "Where "
                 "the two part, the fit begins to learn the data by heart.",
@@ -98,31 +91,81 @@ class TrainingPage(Page):
 
     def tables(self, view: View) -> list[Table]:
         """Return the tables."""
+        r2 = [[common.channel_words(k), number(a), number(b)] for k, (a, b) in _r2(view).items()]
         rows = [[str(k), _value(v)] for k, v in view.mapping("metrics").items()]
-        return [Table("Metrics", ["name", "value"], rows)]
+        return [
+            Table("R² of the acceleration, one step ahead, held out", ["channel", "before", "after"], r2),
+            Table("Metrics", ["name", "value"], rows),
+        ]
 
     def assumed(self, view: View) -> list[tuple[str, str]]:
         """Return what was read and assumed."""
-        damping = view.get("damping")
-        damping = (
-            ", ".join(f"{k} {v}" for k, v in damping.items())
-            if isinstance(damping, Mapping)
-            else view.text("damping")
-        )
+        derivative = view.mapping("derivative")
         return [
             ("Model", view.text("model")),
             ("Log", view.text("log")),
-            ("Held out", view.text("test")),
-            ("Scheme", view.text("scheme")),
-            ("Damping", damping if len(damping) < 200 else ""),
+            ("Held out", str(derivative.get("held_out") or view.text("test"))),
+            ("Accelerations", common.derivative_words(derivative)),
+            ("Scheme", _described(view.get("scheme"))),
+            ("Damping", _described(view.get("damping"))),
             ("Seed", view.text("seed")),
         ]
+
+
+def _course(errors: np.ndarray, words: str, step: str, numbers: np.ndarray) -> list[str]:
+    best = int(np.nanargmin(errors))
+    first, last = errors[np.isfinite(errors)][[0, -1]]
+    if errors[best] < first:
+        fall = percent(1 - errors[best] / first) if first > 0 else "–"
+        out = [f"The error on {words} falls from {number(first)} to {number(errors[best])}, by {fall}."]
+    else:
+        out = [f"The training does not lower the error on {words} (it starts at {number(first)})."]
+    out.append(
+        f"The best of {plural(errors.size, step)} is {step} {numbers[best]:.0f}; the fit ends at "
+        f"{number(last)}."
+    )
+    if last > 1.05 * errors[best]:
+        out.append(f"After the best {step} the error on {words} rises again.")
+    return out
+
+
+def _step(view: View) -> str:
+    return str(view.mapping("history").get("step") or "step")
+
+
+def _numbers(view: View, size: int) -> np.ndarray:
+    """Return the steps' own numbers, or count them from 0."""
+    found = view.mapping("history").get("iteration")
+    if isinstance(found, (list, tuple)) and len(found) >= size and all(finite(i) is not None for i in found):
+        return np.asarray(found[:size], dtype=float)
+    return np.arange(size, dtype=float)
 
 
 def _value(value: Any) -> str:
     if isinstance(value, (int, np.integer)) and not isinstance(value, bool):
         return count(value)
     return str(value) if isinstance(value, str) else number(value, 4)
+
+
+def _described(value: Any) -> str:
+    """Return a description in plain data as `mlp, hidden 5, ...`."""
+    if not isinstance(value, Mapping):
+        return name_of(value) if isinstance(value, str) else ""
+    rest = [f"{k.replace('_', ' ')} {v}" for k, v in value.items() if v != name_of(value) and v is not None]
+    text = ", ".join(part for part in (name_of(value), *rest) if part)
+    return text if len(text) < 600 else name_of(value)
+
+
+def _r2(view: View) -> dict[str, tuple[float, float]]:
+    """Return R² of the held-out acceleration before and after, by channel."""
+    metrics, out = view.mapping("metrics"), {}
+    for key in metrics:
+        match = _R2.fullmatch(str(key))
+        if match:
+            before, after = finite(metrics[key]), finite(metrics.get(f"held_out_r2_{match[1]}_after"))
+            if before is not None and after is not None:
+                out[match[1]] = (before, after)
+    return out
 
 
 def _errors(view: View, name: str) -> np.ndarray:
@@ -143,8 +186,8 @@ def curves(surfaces: Any) -> list[dict[str, Any]]:
     """Return one curve per degree of freedom from any of the forms in which they come.
 
     Args:
-        surfaces: a list of six mappings, a mapping from channel or axis to such a mapping, or one mapping of
-            tables (6, k): {nu, learned, nominal, covered (6, 2)}.
+        surfaces: a list of six mappings {nu, learned, nominal, covered: the range of nu in the data, or low
+            and high}, a mapping from channel or axis to such mappings, or one mapping of tables (6, k).
     """
     if isinstance(surfaces, Mapping):
         keys = next((k for k in (common.CHANNELS, common.AXES) if any(c in surfaces for c in k)), None)
@@ -160,7 +203,12 @@ def _curve(entry: Any) -> dict[str, Any]:
     if not isinstance(entry, Mapping):
         pair = np.asarray(entry, dtype=float)
         return {"nu": pair[0], "learned": pair[1]} if pair.ndim == 2 and len(pair) == 2 else {}
-    out = {k: entry.get(k) for k in ("nominal", "low", "high", "covered")}
+    out = {"nominal": entry.get("nominal"), "covered": entry.get("covered")}
+    low, high = entry.get("low"), entry.get("high")
+    if finite(low) is not None and finite(high) is not None:
+        out["covered"] = (finite(low), finite(high))
+    elif low is not None and high is not None:
+        out |= {"low": low, "high": high}
     for key, names in (("nu", _VELOCITY), ("learned", _LEARNED)):
         value = next((entry[n] for n in names if entry.get(n) is not None), None)
         if value is not None:

@@ -43,8 +43,7 @@ def before_after(
         NoData: there is nothing to draw.
     """
     remarks = rms_remarks(measured, {"before": before, "after": after}, symbols)
-    lines = {"measured": measured, "as given": before}
-    if refitted is not None:
-        lines["refitted"] = refitted
-    lines["after"] = after
+    # Refitted first: the two often coincide, and the dots of the model as given must stay visible on it.
+    lines = {"measured": measured} | ({} if refitted is None else {"refitted": refitted})
+    lines |= {"as given": before, "after": after}
     return time_series(t, lines, symbols=symbols, remarks=remarks, title=title, limit=limit)

@@ -40,9 +40,10 @@ def error_against_horizon(
     looks = [style.BEFORE, style.AFTER, style.REFITTED]
     names = {"as given": style.BEFORE, "refitted": style.REFITTED, "after": style.AFTER}
     for i, (name, errors) in enumerate(models.items()):
-        _line(ax, errors, end, names.get(name) or looks[i % 3], name)
+        # The first on top: where a later one coincides, both marks stay visible.
+        _line(ax, errors, end, names.get(name) or looks[i % 3], name, 10 - i)
     if persistence:
-        _line(ax, persistence, end, style.PERSISTENCE, "initial velocity held")
+        _line(ax, persistence, end, style.PERSISTENCE, "initial velocity held", 1)
     ax.axhline(1.0, color=style.FAINT, lw=0.6)
     ax.annotate(
         "as large as the motion itself",
@@ -76,13 +77,16 @@ def _seconds(horizon: str) -> float | None:
     return value if value > 0 and np.isfinite(value) else None
 
 
-def _line(ax: Axes, errors: Mapping[str, float | None], end: float, look: style.Look, name: str) -> None:
+def _line(
+    ax: Axes, errors: Mapping[str, float | None], end: float, look: style.Look, name: str, order: float
+) -> None:
     known = {
         s: v for h, e in errors.items() if (s := _seconds(h)) is not None and (v := finite(e)) is not None
     }
     seconds = sorted(known)
     marks = {"color": look.color, "marker": look.marker, "mfc": "white", "mec": look.color, "mew": 0.9}
-    ax.plot(seconds, [known[s] for s in seconds], ls=look.dashes, lw=1.2, label=label(name), **marks)
+    options = {"ls": look.dashes, "lw": 1.2, "label": label(name), "zorder": order}
+    ax.plot(seconds, [known[s] for s in seconds], **options, **marks)
     whole = finite(errors.get("full"))
     if whole is not None:
-        ax.plot([end], [whole], ls="none", **marks)
+        ax.plot([end], [whole], ls="none", zorder=order, **marks)

@@ -63,9 +63,10 @@ def history(
         raise NoData("no step of the training has an error")
     values = np.concatenate(drawn)
     values = values[np.isfinite(values)]
-    if values.min() > 0:
+    # Within a factor of twenty a logarithmic axis has next to no labels.
+    if values.min() > 0 and values.max() > 20 * values.min():
         ax.set_yscale("log")
-    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
     ax.set_xlabel(label(step))
     ax.set_ylabel(label(error, 60))
     style.show_grid(ax, "y")

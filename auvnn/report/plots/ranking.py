@@ -54,14 +54,15 @@ def ranking(
     right.set_xlabel(f"fall of the cross-validated error (%{sure})")
     right.axvline(0, color=style.INK, lw=0.6)
     low, high = right.get_xlim()
-    right.set_xlim(min(low, -2), max(high, 2))
+    room = 0.04 * (max(high, 2) - min(low, -2))
+    right.set_xlim(min(low, -2) - room, max(high, 2) + room)
     for ax in (left, right):
         ax.tick_params(axis="y", length=0)
         ax.spines["left"].set_visible(ax is left)
         style.show_grid(ax, "x")
     edge = right.get_yaxis_transform()
     right.text(1.24, -0.75, "p", style="italic", ha="right", va="bottom", transform=edge)
-    for column, group in enumerate(brackets(shown)):
+    for column, group in enumerate(brackets(shown, chosen)):
         _bracket(right, [names.index(name) for name in group], 1.275 + 0.04 * column)
     return figure
 
@@ -121,15 +122,22 @@ def improvement(candidate: Mapping[str, Any]) -> tuple[float | None, float | Non
     return (before - after) / before, None if std is None else std / before
 
 
-def brackets(candidates: Sequence[Mapping[str, Any]], most: int = 3) -> list[list[str]]:
-    """Return the groups that cannot be told apart, each led by its best-ranked member, at most three."""
+def brackets(
+    candidates: Sequence[Mapping[str, Any]], chosen: Sequence[str] = (), most: int = 3
+) -> list[list[str]]:
+    """Return the groups that cannot be told apart, each led by its best-ranked member, at most three.
+
+    Only groups that matter: led by an effect that was chosen, or that explains a tenth of what the best does.
+    """
+    best = max((e for c in candidates if (e := finite(c.get("explained"))) is not None), default=0.0)
     names = [str(c.get("effect", "?")) for c in candidates]
     seen: set[str] = set()
     groups = []
     for name, candidate in zip(names, candidates, strict=True):
         others = [str(o.get("effect")) for o in candidate.get("confusable_with") or []]
         group = [n for n in names if n == name or n in others]
-        if name not in seen and len(group) > 1:
+        matters = name in chosen or (finite(candidate.get("explained")) or 0.0) >= max(0.1 * best, 1e-12)
+        if matters and name not in seen and len(group) > 1:
             groups.append(group)
             seen.update(group)
     return groups[:most]

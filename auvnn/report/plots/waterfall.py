@@ -66,8 +66,8 @@ def _change(ax: Axes, i: int, previous: float, error: float, decimals: int) -> N
 
 def _value(ax: Axes, i: int, error: float, text: str, face: str, inside: bool) -> None:
     # The box keeps the hatch and the dashed floor from running through the figure.
-    box = {"fc": face, "ec": "none", "pad": 0.6} if inside else None
-    place = {"xytext": (0, -4 if inside else 2), "textcoords": "offset points", "ha": "center"}
+    box = {"fc": face if inside else "white", "ec": "none", "pad": 0.6}
+    place = {"xytext": (0, -4 if inside else 3), "textcoords": "offset points", "ha": "center"}
     ax.annotate(text, (i, error), va="top" if inside else "bottom", weight="bold", bbox=box, **place)
 
 
