@@ -134,7 +134,7 @@ def cut_windows(
         raise InputError(f"no stretch of {log.name} is {horizon:g} s long without a gap: choose a shorter horizon")
     length = np.array([b - a + 1 for _, _, a, b, _ in pieces])
     rows = int(length.max())
-    before = max((int(np.ceil(warmup / run.dt)) for run, *_ in pieces), default=0)
+    before = max((int(np.ceil(warmup / run.dt - 1e-6)) for run, *_ in pieces), default=0)
     index = []
     for _, _, a, b, begin in pieces:
         # Padding repeats the last row; history before the stretch repeats its first.

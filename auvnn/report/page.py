@@ -114,10 +114,11 @@ class Page:
         folder, view = Path(folder), View(answer)
         plots = self.planned(view)
         drawn = draw(plots)
-        for name, figure in drawn.figures.items():
-            drawn.vectors[name] = style.svg(style.settle(figure))
-            _write_bytes(folder / "figures" / f"{name}.png", style.png(figure, dpi=300))
-            write_text(folder / "figures" / f"{name}.svg", drawn.vectors[name])
+        for name in list(drawn.figures):
+            pixels = _rendered(drawn, name)
+            if pixels is not None:
+                _write_bytes(folder / "figures" / f"{name}.png", pixels)
+                write_text(folder / "figures" / f"{name}.svg", drawn.vectors[name])
         return write_text(folder / "report.html", render(self.part(view, plots, drawn)))
 
     def planned(self, view: View) -> list[Plot]:
@@ -169,6 +170,18 @@ def draw(plots: list[Plot]) -> Drawn:
             # A page with a hole that says why is worth more than no page after an hour of computing.
             drawn.reasons[plot.name] = f"it could not be drawn ({type(problem).__name__}: {problem})"
     return drawn
+
+
+def _rendered(drawn: Drawn, name: str) -> bytes | None:
+    """Render a figure to SVG (kept) and PNG (returned); one that cannot be rendered becomes a missing one."""
+    figure = drawn.figures[name]
+    try:
+        drawn.vectors[name] = style.svg(style.settle(figure))
+        return style.png(figure, dpi=300)
+    except Exception as problem:
+        del drawn.figures[name]
+        drawn.reasons[name] = f"it could not be rendered ({type(problem).__name__}: {problem})"
+        return None
 
 
 def _picture(plot: Plot, drawn: Drawn, prefix: str, notes: list[str]) -> Picture:

@@ -57,8 +57,10 @@ class Checkpoints:
         # A state may hold infinite costs of starts that failed; weights that are saved as a model may not.
         weights = tensors_to_bytes(tensors, finite=False)
         path = self.folder / f"checkpoint-{iteration:08d}"
-        files = {"state.json": state, "state.safetensors": weights}
-        write_folder(path, files, overwrite=True, schema=SCHEMA)
+        if path.exists():
+            # A damaged one that was passed over, or one ahead of where a resumed fit went on from.
+            shutil.rmtree(path)
+        write_folder(path, {"state.json": state, "state.safetensors": weights}, schema=SCHEMA)
         for old in self._found()[KEPT:]:
             shutil.rmtree(old, ignore_errors=True)
         return path

@@ -39,9 +39,12 @@ class LeastSquares:
     """State and step of the iteration, for `members * restarts` problems.
 
     Each problem minimises its own weighted mean square residual. The step solves the normal equations of
-    inner and outer parameters with Marquardt's damping on the inner ones alone, mu diag(J^T J); the outer
-    ones are then solved for exactly (Kaufman's form of variable projection). A step that does not lower the
-    cost, or gives no finite one, is taken back and mu grows; problems that have ended leave the batch.
+    inner and outer parameters, with damping mu D on the inner ones alone; the outer ones are then solved for
+    exactly (Kaufman's form of variable projection). D is the geometric mean of Marquardt's diag(J^T J) and
+    Levenberg's identity (scaled by the mean of that diagonal): Marquardt's alone lets hidden units that
+    hardly matter yet take huge steps and saturate, and ends in poorer optima. mu follows how well the last
+    step was predicted (Nielsen's rule). A step that does not lower the cost, or gives no finite one, is taken
+    back; problems that have ended leave the batch.
 
     Args:
         problems: what is fitted.
@@ -53,7 +56,7 @@ class LeastSquares:
 
     References:
         Marquardt 1963; Kaufman, A variable projection method for solving separable nonlinear least squares
-        problems, BIT 15 (1975).
+        problems, BIT 15 (1975); Nielsen, Damping parameter in Marquardt's method (1999).
     """
 
     def __init__(
@@ -114,12 +117,13 @@ class LeastSquares:
             return
         self.iteration += 1
         member = self.member[rows]
-        step, solved = self._solve(rows)
+        step, predicted, solved = self._solve(rows)
         theta = s["theta"][rows] + step
         beta, cost = self.problems.solve_outer(theta, member)
         good = solved & (cost < s["cost"][rows]) & torch.isfinite(cost)
-        mu = s["mu"][rows]
-        s["mu"][rows] = torch.where(good, mu / 3.0, mu * 4.0).clamp_min(1e-15)
+        ratio = (s["cost"][rows] - cost) * self.problems.total[member] / predicted.clamp_min(1e-300)
+        factor = torch.where(good, (1.0 - (2.0 * ratio - 1.0) ** 3).clamp(1.0 / 3.0, 2.0), 2.0)
+        s["mu"][rows] = (s["mu"][rows] * factor).clamp_min(1e-15)
         if bool(good.any()):
             taken = rows[good]
             s["theta"][taken], s["beta"][taken], s["cost"][taken] = theta[good], beta[good], cost[good]
@@ -130,12 +134,12 @@ class LeastSquares:
         s["recent"][rows, self.iteration % self.rules.window] = s["cost"][rows]
         self._end(rows)
 
-    def _solve(self, rows: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the damped step of the inner parameters (B, Q) and whether it could be computed (B,)."""
+    def _solve(self, rows: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Return the step (B, Q), the fall of the squared error it should bring, and if it is usable."""
         inner, cross, outer, slope, outer_slope = (self.state[name][rows] for name in _NORMAL)
         diagonal = torch.diagonal(inner, dim1=1, dim2=2)
-        floor = 1e-12 * diagonal.amax(1, keepdim=True).clamp_min(1e-300)
-        damping = self.state["mu"][rows, None] * diagonal.maximum(floor)
+        mean = diagonal.mean(1, keepdim=True).clamp_min(1e-300)
+        damping = self.state["mu"][rows, None] * (diagonal.clamp_min(1e-12 * mean) * mean).sqrt()
         if cross.shape[2]:
             own = torch.diagonal(outer, dim1=1, dim2=2)
             factor, _ = torch.linalg.cholesky_ex(outer + torch.diag_embed(1e-10 * own.clamp_min(1e-300)))
@@ -145,7 +149,9 @@ class LeastSquares:
         factor, info = torch.linalg.cholesky_ex(inner + torch.diag_embed(damping))
         step = -torch.cholesky_solve(slope[..., None], factor)[..., 0]
         good = (info == 0) & torch.isfinite(step).all(1)
-        return torch.where(good[:, None], step, 0.0), good
+        step = torch.where(good[:, None], step, 0.0)
+        curvature = (inner @ step[..., None])[..., 0]
+        return step, -(step * (2.0 * slope + curvature)).sum(1), good
 
     def _remember(self, rows: Tensor) -> None:
         """Keep the best parameters so far: by the held-out runs where there are some."""

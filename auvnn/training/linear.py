@@ -29,7 +29,8 @@ def solve_polynomial(
     Returns:
         Rows (m, p) in the order of the form's parameters (linear ones first), and the warnings.
     """
-    rows, warnings = [], []
+    rows: list[Tensor] = []
+    doubts: dict[str, list[str]] = {}
     for member, axis in enumerate(form.axes):
         columns, y = form.regressors(nu, member).numpy(), targets[member].numpy()
         if weights is not None:
@@ -39,8 +40,9 @@ def solve_polynomial(
         scaled = columns / np.where(size > 0, size, 1.0)
         solution = np.linalg.lstsq(scaled, y, rcond=RANK_TOLERANCE)[0]
         rows.append(torch.from_numpy(solution / np.where(size > 0, size, 1.0)))
-        warnings += _doubts(AXES[axis], _names(form, axis), scaled)
-    return torch.stack(rows), warnings
+        for doubt in _doubts(_names(form, axis), scaled):
+            doubts.setdefault(doubt, []).append(AXES[axis])
+    return torch.stack(rows), [f"{' '.join(axes)}: {doubt}" for doubt, axes in doubts.items()]
 
 
 def _names(form: Polynomial, axis: int) -> list[str]:
@@ -48,18 +50,18 @@ def _names(form: Polynomial, axis: int) -> list[str]:
     return [*own, *(f"|{name}|{name}" for name in own)]
 
 
-def _doubts(axis: str, names: list[str], columns: np.ndarray) -> list[str]:
+def _doubts(names: list[str], columns: np.ndarray) -> list[str]:
     """Say which coefficients cannot be known, or only in combination (correlation beyond 0.99)."""
     absent = [name for name, column in zip(names, columns.T, strict=True) if not np.any(column)]
     if absent:
-        return [f"{axis}: no motion in {', '.join(absent)}: their coefficients are set to zero, not measured"]
+        return [f"no motion in {', '.join(absent)}: their coefficients are set to zero, not measured"]
     _, singular, directions = np.linalg.svd(np.linalg.qr(columns, mode="r"))
     singular = np.concatenate([singular, np.zeros(len(names) - len(singular))])
     rank = int(np.sum(singular > RANK_TOLERANCE * singular[0]))
     if rank < len(names):
         loose = [n for n, part in zip(names, np.abs(directions[rank:]).max(0), strict=True) if part > 0.1]
         return [
-            f"{axis}: the coefficients of {', '.join(loose)} cannot be told apart on this data "
+            f"the coefficients of {', '.join(loose)} cannot be told apart on this data "
             f"(rank {rank} of {len(names)}): only their combination is known"
         ]
     covariance = (directions.T / singular**2) @ directions
@@ -67,7 +69,7 @@ def _doubts(axis: str, names: list[str], columns: np.ndarray) -> list[str]:
     correlation = covariance / np.outer(deviation, deviation)
     pairs = [(i, j) for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > 0.99]
     return [
-        f"{axis}: the coefficients of {names[j]} and {names[i]} are correlated by {correlation[i, j]:.3f}: "
+        f"the coefficients of {names[j]} and {names[i]} are correlated by {correlation[i, j]:.3f}: "
         "only their combination is well known"
         for i, j in pairs
     ]

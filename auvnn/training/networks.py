@@ -40,6 +40,7 @@ class Problems(Protocol):
     members: int
     inner_size: int
     outer_size: int
+    total: Tensor  # (members,) sum of the weights
 
     def draw(self, generator: torch.Generator) -> Tensor:
         """Return initial inner parameters (members, Q)."""

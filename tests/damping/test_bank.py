@@ -14,7 +14,12 @@ from auvnn.errors import ConfigError
 MIXED = {
     "form": "mlp",
     "hidden": 3,
-    "each": {"X": "dissipative", "K": "zero", "Z": "polynomial", "N": {"form": "polynomial", "coupled": False}},
+    "each": {
+        "X": "dissipative",
+        "K": "zero",
+        "Z": "polynomial",
+        "N": {"form": "polynomial", "coupled": False},
+    },
 }
 
 
@@ -63,9 +68,7 @@ def test_description_and_state_bring_it_back(description):
 
 
 def test_options_of_a_single_axis_widen_the_common_ones():
-    bank = DampingBank.from_description(
-        {"form": "mlp", "inputs": "quadratic", "each": {"Y": {"hidden": 9}}}
-    )
+    bank = DampingBank.from_description({"form": "mlp", "inputs": "quadratic", "each": {"Y": {"hidden": 9}}})
     by_axis = {axis: form for form in bank.groups() for axis in form.axes}
     assert by_axis[1].options() == {"hidden": 9, "inputs": "quadratic", "zero_at_rest": False}
 

@@ -71,7 +71,9 @@ def test_polynomial_is_the_matrices_of_the_classical_law():
     own = shaken(Polynomial((4, 1), coupled=False))
     for place, axis in enumerate((4, 1)):
         v = nu[:, axis]
-        torch.testing.assert_close(own(nu)[:, place], own.linear[place] * v + own.quadratic[place] * v * v.abs())
+        torch.testing.assert_close(
+            own(nu)[:, place], own.linear[place] * v + own.quadratic[place] * v * v.abs()
+        )
 
 
 @pytest.mark.parametrize("coupled", [True, False])

@@ -429,3 +429,63 @@ def test_the_json_beside_the_page_is_the_answers_own(tmp_path):
     assert (tmp_path / "report.html").exists() and (tmp_path / "figures" / "history.svg").exists()
     assert Real().report(tmp_path / "other.html").read_text().startswith("<!doctype html>")
     assert Real().plot().axes[0].get_xlabel() == "step"
+
+
+def test_a_figure_that_cannot_be_rendered_leaves_a_note(tmp_path, monkeypatch, small_figures):
+    real = style.svg
+
+    def fails(figure):
+        if len(figure.axes) == 2:  # the ranking
+            raise RuntimeError("no such glyph")
+        return real(figure)
+
+    monkeypatch.setattr(style, "svg", fails)
+    drawer("diagnosis").write(diagnosis(), tmp_path)
+    page = PageText((tmp_path / "report.html").read_text())
+    assert (
+        page.text.count("There is no figure here: it could not be rendered (RuntimeError: no such glyph).")
+        >= 1
+    )
+    assert not (tmp_path / "figures" / "ranking.png").exists()
+    assert (tmp_path / "figures" / "parameters.png").exists()
+
+
+class Network:
+    """A model as an answer carries it: no name of its own, and a very long description."""
+
+    def __str__(self):
+        return "GreyBox(" + "Linear(), " * 500
+
+
+@pytest.mark.parametrize("kind", ["improvement", "training"])
+def test_an_answer_that_carries_its_model_is_called_by_the_models_name(unseen, kind):
+    answer = make(kind, 60)
+    json_answer = {**answer.to_dict(), "model": "rov95"}
+    answer.model, answer.to_dict = Network(), lambda: json_answer
+    text = PageText(drawer(kind).page(answer)).text
+    assert "GreyBox(" not in text and "rov95" in text
+
+
+def test_training_as_the_verb_answers_it(unseen):
+    from auvnn.report.pages.training import curves
+
+    nu = np.linspace(-1, 1, 5)
+    found = curves([{"nu": nu, "learned": nu, "low": -0.5, "high": 0.25}] * 6)
+    assert found[0]["covered"] == (-0.5, 0.25) and "low" not in found[0]
+    answer = training(
+        scheme={"scheme": "levenberg_marquardt", "max_iterations": 300},
+        damping={"form": "mlp", "hidden": 5},
+        history={
+            "iteration": [1, 2, 3],
+            "train": [3.0, 2.0, 1.0],
+            "held_out": [3.0, 1.5, 2.0],
+            "step": "iteration",
+        },
+        metrics={"held_out_r2_du_before": 0.1, "held_out_r2_du_after": 0.7, "iterations": 3},
+        stopped="the held-out error rises",
+    )
+    text = PageText(drawer("training").page(answer)).text
+    assert "The best of 3 iterations is iteration 2" in text
+    assert "most is gained in surge (du): R² from 0.10 to 0.70" in text
+    assert "levenberg_marquardt, max iterations 300" in text and "mlp, hidden 5" in text
+    assert "It stopped because: the held-out error rises." in text

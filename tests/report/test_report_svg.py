@@ -21,10 +21,10 @@ onload="x()">
 <image xlink:href="http://evil/x.png"/><image xlink:href="data:image/svg+xml;base64,AAAA"/>
 <image xlink:href="data:image/png;base64,AAAA"/>
 <use xlink:href="#kept"/><use xlink:href="http://evil/x.svg#a"/>
-<path id="kept" d="M1.123456 2.987654L3 4" onclick="x()" style="fill: "
-                                                               "url(http://evil)" clip-path="url(#clip)"/>
-<path style="fill: url(#clip); stroke: #fff" d="M0 0"/><path style="background: URL( "
-                                                                   "'http://evil')" d="M0 0"/>
+<path id="kept" d="M1.123456 2.987654L3 4" onclick="x()" style="fill: url(http://evil)"
+clip-path="url(#clip)"/>
+<path style="fill: url(#clip); stroke: #fff" d="M0 0"/>
+<path style="background: URL( 'http://evil')" d="M0 0"/>
 <defs><clipPath id="clip"><rect width="9" height="9"/></clipPath></defs>
 <animate attributeName="href" to="javascript:alert(4)"/><set attributeName="onload" to="x()"/>
 <text>a &lt;script&gt; b</text>

@@ -87,7 +87,9 @@ def test_any_form(weighted):
             for name, tensor in names.items():
                 size = tensor[0].numel()
                 own = tensor.detach().clone()
-                other = [own[i] if i != axis else rows[start : start + size].view(own[0].shape) for i in (0, 1)]
+                other = [
+                    own[i] if i != axis else rows[start : start + size].view(own[0].shape) for i in (0, 1)
+                ]
                 state[name], start = torch.stack(other), start + size
             return torch.func.functional_call(form, state, (nu,))[:, axis]
 
@@ -106,7 +108,9 @@ def test_a_network_is_the_same_problem_by_hand_and_by_autograd():
     member = torch.zeros(1, dtype=torch.int64)
     by_autograd = FormProblems(form, nu, targets, None)
     packed = pack(form)
-    torch.testing.assert_close(by_hand.cost(theta, beta, member), by_autograd.cost(packed, beta[:, :0], member))
+    torch.testing.assert_close(
+        by_hand.cost(theta, beta, member), by_autograd.cost(packed, beta[:, :0], member)
+    )
     one, other = by_hand.normal(theta, beta, member), by_autograd.normal(packed, beta[:, :0], member)
     trace = one.inner.diagonal(dim1=1, dim2=2).sum() + one.outer.diagonal(dim1=1, dim2=2).sum()
     torch.testing.assert_close(trace, other.inner.diagonal(dim1=1, dim2=2).sum())

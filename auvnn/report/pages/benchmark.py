@@ -106,7 +106,14 @@ class BenchmarkPage(Page):
             "options make the same log again."
         )
         return [
-            Table("By condition", *_condition_table(rows), words=3),
+            Table(
+                "By condition",
+                *_condition_table(rows),
+                "Effects, nothing: logs that hide an effect, or nothing. Or in a group: named first, or in "
+                "a group that the log cannot tell apart. Largest error: of a parameter, relative to the "
+                "effect's size.",
+                words=3,
+            ),
             Table("By what was hidden", *_case_table(view), words=5),
             Table("Logs that were not answered right", *_wrong_table(rows), caption, words=7),
             Table("Metrics", ["name", "value"], metrics),
@@ -117,7 +124,7 @@ class BenchmarkPage(Page):
         rows = rows_of(view)
         seeds = [str(round(s)) for s in outcomes.numbers(rows, "seed")]
         runs, duration, rate = (
-            listing(map(number, outcomes.numbers(rows, key))) for key in ("runs", "duration", "rate")
+            listing(f"{n:g}" for n in outcomes.numbers(rows, key)) for key in ("runs", "duration", "rate")
         )
         repeats = finite(view.mapping("options").get("repeats"))
         return [
@@ -199,13 +206,14 @@ def _interval_words(hidden: Sequence[Row]) -> list[str]:
         off = outcomes.errors([r for r in hidden if r.get("noise") == noise], "relative")
         worst += [f"{percent(off.max())} with noise {noise}"] if off.size else []
     inside = int((np.abs(z) < Z95).sum())
-    sizes = f"; the largest error is, relative to the effect's size, {listing(worst)}" if worst else ""
-    return [f"{count(inside)} of {plural(z.size, '95 % interval')} hold the true value{sizes}."]
+    words = f"For {count(inside)} of {plural(z.size, 'parameter')} ({percent(inside / z.size)})"
+    sizes = f"; relative to the effect's size the largest error is {listing(worst)}" if worst else ""
+    return [f"{words} the 95\N{NO-BREAK SPACE}% interval holds the true value{sizes}."]
 
 
 def _condition_table(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
-    head = ["vehicle", "noise", "manoeuvre", "logs with an effect", "named first", "or in a group",
-            "largest relative error", "logs with nothing", "found adequate", "faults"]  # fmt: skip
+    head = ["vehicle", "noise", "manoeuvre", "effects", "named first", "or in a group", "largest error",
+            "nothing", "adequate", "faults"]  # fmt: skip
     out = []
     for condition, members in outcomes.by_condition(rows).items():
         hidden, null = outcomes.with_effect(members), outcomes.with_nothing(members)
@@ -224,18 +232,19 @@ def _of(k: int, n: int) -> str:
 
 def _case_table(view: View) -> tuple[list[str], list[list[str]]]:
     head = ["hidden", "size", "noise", "manoeuvre", "answers", "logs", "named first", "or in a group",
-            "largest relative error"]  # fmt: skip
+            "largest error"]  # fmt: skip
     entries = [e for e in view.items("table") if isinstance(e, Mapping)]
     several = len({text(e, "vehicle") for e in entries}) > 1
     out = []
     for e in entries:
-        found = e["answers"].items() if isinstance(e.get("answers"), Mapping) else ()
-        answers = sorted(found, key=lambda a: -(finite(a[1]) or 0))
+        answers = e.get("answers")
+        pairs = list(answers.items()) if isinstance(answers, Mapping) else []
+        pairs.sort(key=lambda pair: -(finite(pair[1]) or 0))
         named = [count(e.get(k)) for k in ("named_first", "in_group")]
         out.append([
             text(e, "hidden") + (f" ({text(e, 'vehicle')})" if several else ""),
             *(text(e, k, "–") for k in ("size", "noise", "excitation")),
-            ", ".join(f"{name} {count(n)}" for name, n in answers), count(e.get("logs")),
+            ", ".join(f"{name} {count(n)}" for name, n in pairs), count(e.get("logs")),
             *(named if e.get("hidden") != NOTHING else ["–", "–"]),
             percent(e.get("worst_relative_error")),
         ])  # fmt: skip

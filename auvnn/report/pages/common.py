@@ -74,10 +74,8 @@ def rollout_table(rollout: Mapping[str, Any]) -> Table:
     head = ["free running", *CHANNELS, "total", "velocity held", "diverged windows"]
     caption = (
         "Root mean square error divided by the standard deviation of the measured channel. 1 is as bad as "
-        "knowing "
-        "only the mean; – marks a channel that does not move enough to be judged. Velocity held: the "
-        "total if the "
-        "initial velocity simply stayed."
+        "knowing only the mean; – marks a channel that does not move enough to be judged. Velocity held: "
+        "the total if the initial velocity simply stayed."
     )
     return Table("Free-running error by horizon", head, rows, caption)
 

@@ -13,6 +13,7 @@ from auvnn.report import style
 from auvnn.report.html import Table
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
+from auvnn.report.pages import comparison_words as say
 from auvnn.report.panels import NoData
 from auvnn.report.plots.error_against_horizon import error_against_horizon
 from auvnn.report.plots.measured_against_model import measured_against_model
@@ -45,17 +46,17 @@ class ComparisonPage(Page):
         if error is None:
             out.append("No stretch of the log was long enough, or moved enough, to let the model run free.")
         else:
-            out.append(_verdict(common.horizon_words(horizon or ""), error, held))
+            out.append(say.verdict(common.horizon_words(horizon or ""), error, held))
         lost = sum(int(finite(e.get("diverged")) or 0) for e in rollout.values())
         if lost:
             out.append(
                 f"The model diverged in {plural(lost, 'window')}, counted with the error cut at ten standard "
                 "deviations."
             )
-        out += _one_step_words(view.mapping("one_step"))
-        out += _residual_words(view.mapping("residual_wrench"))
-        out += _failure_words(view)
-        if (ratio := _largest(view.mapping("residual_wrench"))) and ratio[1] > 1.5:
+        out += say.one_step_words(view.mapping("one_step"))
+        out += say.residual_words(view.mapping("residual_wrench"))
+        out += say.failure_words(view)
+        if (ratio := say.largest(view.mapping("residual_wrench"))) and ratio[1] > 1.5:
             out.append(
                 "Which physical effect would explain this, auvnn diagnose answers for the same model and log."
             )
@@ -124,7 +125,7 @@ class ComparisonPage(Page):
     def tables(self, view: View) -> list[Table]:
         """Return the tables."""
         failures = [
-            [common.channel_words(f.get("channel")), _where(f), percent(f.get("share"))]
+            [common.channel_words(f.get("channel")), say.where(f), percent(f.get("share"))]
             for f in view.items("failures")
             if isinstance(f, Mapping)
         ]
@@ -154,77 +155,6 @@ class ComparisonPage(Page):
         ]
 
 
-def _verdict(horizon: str, error: float, held: float | None) -> str:
-    words = f"Running free for {horizon}, the model's error is {percent(error)} of the spread of the motion"
-    if held is None:
-        return f"{words}."
-    beside = f"simply holding the initial velocity would give {percent(held)}"
-    if error < 0.95 * held:
-        return f"{words}; {beside}. The model predicts."
-    if error <= 1.05 * held:
-        return f"{words}; {beside}. The model is no better than none."
-    return f"{words}; {beside}. The model is worse than none."
-
-
-def _one_step_words(one_step: Mapping[str, Any]) -> list[str]:
-    known = {k: r for k, e in one_step.items() if (r := finite(e.get("r2"))) is not None}
-    if len(known) < 2:
-        return []
-    low, high = min(known, key=lambda k: known[k]), max(known, key=lambda k: known[k])
-    words = [f"{number(known[k], 2)} in {common.channel_words(k).split(' ')[0]}" for k in (low, high)]
-    return [f"One step ahead, R² of the acceleration lies between {words[0]} and {words[1]}."]
-
-
-def _largest(residual: Mapping[str, Any]) -> tuple[str, float] | None:
-    ratios = {
-        k: rms / floor
-        for k, e in residual.items()
-        if (rms := finite(e.get("rms"))) is not None and (floor := finite(e.get("noise_floor")))
-    }
-    name = max(ratios, key=lambda k: ratios[k], default=None)
-    return None if name is None else (name, ratios[name])
-
-
-def _residual_words(residual: Mapping[str, Any]) -> list[str]:
-    largest = _largest(residual)
-    if largest is None:
-        return []
-    name, ratio = largest
-    unit = dict(style.WRENCH).get(name, "N")
-    rms = f"{number(finite(residual[name].get('rms')))} {unit}"
-    if ratio <= 1.5:
-        return [
-            f"What the model lacks is close to sensor noise everywhere; at most {number(ratio, 2)} times, "
-            f"in {name}."
-        ]
-    return [
-        f"What it lacks stands out most in {common.channel_words(name)}: {rms} rms, "
-        f"{number(ratio, 2)} times the noise floor."
-    ]
-
-
-def _failure_words(view: View) -> list[str]:
-    found = [f for f in view.items("failures") if isinstance(f, Mapping)]
-    if not found:
-        return []
-    first = found[0]
-    share = f" ({percent(first.get('share'))} of the error)" if finite(first.get("share")) else ""
-    words = (
-        f"The error sits first of all in {common.channel_words(first.get('channel'))}: {_where(first)}{share}"
-    )
-    place = next(
-        (f for f in found if f.get("channel") == first.get("channel") and _where(f) != "everywhere"), None
-    )
-    return [f"{words}; there look at {_where(place)}." if place not in (None, first) else f"{words}."]
-
-
-def _where(failure: Any) -> str:
-    """Return the place in words, without the motion, which the channel says already."""
-    where = str(failure.get("where") or "everywhere")
-    motion = common.channel_words(failure.get("channel")).split(" ")[0]
-    return where.removeprefix(f"{motion}, ")
-
-
 def _needed(entry: Mapping[str, Any], name: str) -> Any:
     if entry.get(name) is None:
         raise NoData(f"the answer holds no '{name}'")
@@ -234,17 +164,15 @@ def _needed(entry: Mapping[str, Any], name: str) -> Any:
 def _series_caption(entry: Mapping[str, Any]) -> str:
     errors = common.relative_errors(entry["measured"], entry["model"])
     words = (
-        f"{common.run_words(entry, whole=False).capitalize()}: the stretch in which the model errs most. "
-        f"It starts from "
-        "the measured state every few seconds and then runs free, so the dashed line leaves the solid one "
-        "between two "
-        "restarts and jumps back at each."
+        f"{common.run_words(entry, whole=False).capitalize()}: the stretch in which the model errs most. It "
+        "starts from the measured state every few seconds and then runs free, so the dashed line leaves the "
+        "solid one between two restarts and jumps back at each."
     )
     if np.isfinite(errors).any():
         i = int(np.nanargmax(errors))
         words += (
-            f" Look at {style.MOTIONS[i]}: here its error is {percent(errors[i])} of its spread, the "
-            f"most of the six."
+            f" Look at {style.MOTIONS[i]}: here its error is {percent(errors[i])} of its spread, the most of "
+            "the six."
         )
     return words
 
@@ -282,7 +210,7 @@ def _horizon_caption(rollout: Mapping[str, Any]) -> str:
     if not better:
         return words + "At no horizon does the model beat holding the initial velocity (dotted)."
     return words + (
-        f"The model beats holding the initial velocity (dotted) at "
+        "The model beats holding the initial velocity (dotted) at "
         f"{listing(map(common.horizon_words, better))}."
     )
 
@@ -306,9 +234,8 @@ def _map_caption(regimes: Mapping[str, Any], floor: Any) -> str:
             best = (float(ratio[i, j]), f"{style.WRENCH[i][0]} at {where.strip()}")
     what = "the noise floor" if good else "the row's own rms"
     words = (
-        "Each cell is the residual in one range of a regime. A row that changes from left to right "
-        "depends on that "
-        "regime; a row of equal numbers does not."
+        "Each cell is the residual in one range of a regime. A row that changes from left to right depends "
+        "on that regime; a row of equal numbers does not."
     )
     return f"{words} The largest: {best[1]}, {number(best[0], 2)} times {what}." if best[1] else words
 
@@ -324,8 +251,8 @@ def _wrench_table(residual: Mapping[str, Any]) -> Table:
         if name in residual
     ]
     caption = (
-        "What the model lacks: inertia, Coriolis, damping and restoring forces of the measured "
-        "motion, less the command."
+        "What the model lacks: inertia, Coriolis, damping and restoring forces of the measured motion, less "
+        "the command."
     )
     return Table("Residual wrench", ["axis", "unit", "rms", "mean", "noise floor"], rows, caption, words=2)
 

@@ -54,7 +54,7 @@ class DiagnosisPage(Page):
         elif left is not None and verdict != "adequate":
             out.append(
                 f"{percent(left)} of the residual's energy above the noise is explained by nothing in the "
-                f"catalogue."
+                "catalogue."
             )
         overall = finite(view.get("global_p_value"))
         if overall is not None:
@@ -93,8 +93,7 @@ class DiagnosisPage(Page):
                 "What could be confused",
                 lambda: _similarity(view),
                 "How alike the marks are that two effects leave on this log: 1 means that the log cannot "
-                "tell "
-                "them apart, whatever the method. Framed pairs need another experiment.",
+                "tell them apart, whatever the method. Framed pairs need another experiment.",
             ),
         ]
 
@@ -129,8 +128,8 @@ class DiagnosisPage(Page):
             "cv error after",
         ]
         caption = (
-            "p: how likely so large a gain would be if the effect were absent. cv error: on runs "
-            "that were not fitted."
+            "p: how likely so large a gain would be if the effect were absent. cv error: on runs that were "
+            "not fitted."
         )
         return [
             Table("Steps of the search", ["step", "verdict", "effects"], steps, words=3),
@@ -212,9 +211,8 @@ def _best_of_the_rest(candidates: list[Mapping[str, Any]]) -> list[str]:
     best = tried[0]
     share, p = percent(best.get("explained")), p_value(best.get("p_value"))
     return [
-        f"{plural(len(tried), 'effect')} of the catalogue {'was' if len(tried) == 1 else 'were'} tried; "
-        f"the best, "
-        f"{best.get('effect')}, would explain {share} of the residual above the noise (p = {p})."
+        f"{plural(len(tried), 'effect')} of the catalogue {'was' if len(tried) == 1 else 'were'} tried; the "
+        f"best, {best.get('effect')}, would explain {share} of the residual above the noise (p = {p})."
     ]
 
 
@@ -236,9 +234,8 @@ def _dependence_words(depends: Mapping[str, Any]) -> list[str]:
 
 def _ranking_caption(candidates: list[Mapping[str, Any]], missing: list[str]) -> str:
     words = (
-        "Left: share of the residual's energy above the noise that each effect explains. Right: how far "
-        "the error falls "
-        "on runs that were not fitted; left of zero the effect harms."
+        "Left: share of the residual's energy above the noise that each effect explains. Right: how far the "
+        "error falls on runs that were not fitted; left of zero the effect harms."
     )
     if missing:
         words += " Hatched and bold: what the verdict names."

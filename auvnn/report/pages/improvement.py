@@ -82,9 +82,8 @@ class ImprovementPage(Page):
                 "Error against horizon",
                 lambda: _horizons(view),
                 "Error of free running on held-out data, averaged over the channels that move. The added "
-                "effect "
-                "is worth what lies between the refitted and the last line: refitting alone is not to its "
-                "credit.",
+                "effect is worth what lies between the refitted and the last line: refitting alone is not "
+                "to its credit.",
             ),
             Plot(
                 "parameters",
@@ -148,7 +147,7 @@ def _verdict(effects: str, accepted: bool, fall: float | None, std: float | None
     if accepted:
         return (
             f"Adding {effects} lowers the error on held-out data{by}, more than its own uncertainty: "
-            f"accepted."
+            "accepted."
         )
     if fall is not None and fall <= 0:
         gain = f"(gain {interval(fall, std)})"
@@ -163,8 +162,8 @@ def _error_words(view: View, effects: str, errors: Mapping[str, float | None]) -
     span = common.horizon_words(common.main_horizon(_stage(view, "after", "rollout")) or "")
     middle = f", {number(refitted, 2)} with its coefficients fitted again" if refitted is not None else ""
     return [
-        f"Running free for {span}, the model as given errs by {number(before, 2)} of the spread of the motion"
-        f"{middle}, and {number(after, 2)} with {effects}."
+        f"Running free for {span}, the model as given errs by {number(before, 2)} of the spread of the "
+        f"motion{middle}, and {number(after, 2)} with {effects}."
     ]
 
 
@@ -190,7 +189,7 @@ def _floor_words(steps: list[Mapping[str, Any]], errors: Mapping[str, float | No
     share = (start - end) / (start - floor)
     return [
         f"Sensor noise alone gives {number(floor, 2)}: {percent(share)} of what could be gained has been "
-        f"gained."
+        "gained."
     ]
 
 
@@ -238,15 +237,15 @@ def _series_caption(entry: Mapping[str, Any]) -> str:
     after = common.relative_errors(entry["measured"], entry["after"])
     words = (
         f"Held-out {common.run_words(entry, whole=False)}, the stretch in which the model as given errs "
-        f"most; free-running "
-        "windows of 5 s, restarted from the measured state. Each panel gives its rms error before and after."
+        "most; free-running windows of 5 s, restarted from the measured state. Each panel gives its rms "
+        "error before and after."
     )
     fall = before - after
     if np.isfinite(fall).any():
         i = int(np.nanargmax(fall))
         words += (
-            f" Look at {style.MOTIONS[i]}: {percent(before[i])} of its spread before, "
-            f"{percent(after[i])} after."
+            f" Look at {style.MOTIONS[i]}: {percent(before[i])} of its spread before, {percent(after[i])} "
+            "after."
         )
     return words
 
@@ -255,8 +254,8 @@ def _waterfall_caption(steps: list[Mapping[str, Any]]) -> str:
     known = [(str(s.get("step") or "–"), e) for s in steps if (e := finite(s.get("error"))) is not None]
     falls = [(a[1] - b[1], b[0]) for a, b in itertools.pairwise(known) if b[0] != FLOOR]
     words = (
-        "Error on held-out data after each step (5 s free running, 1 is the spread of the motion); "
-        "hatched: what the step took off."
+        "Error on held-out data after each step (5 s free running, 1 is the spread of the motion); hatched: "
+        "what the step took off."
     )
     if falls and max(falls)[0] > 0:
         words += f" The largest step is {max(falls)[1]}. Below the dashed line there is only sensor noise."

@@ -2,33 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Any
-
-import numpy as np
 
 from auvnn.report.html import Table
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
-from auvnn.report.panels import NoData
+from auvnn.report.pages import quality_reading as reading
 from auvnn.report.plots.excitation import excitation
 from auvnn.report.plots.kinematics import kinematics
 from auvnn.report.plots.timeline import timeline
-from auvnn.report.style import VELOCITY
 from auvnn.report.view import View, name_of
 from auvnn.report.words import count, finite, listing, number, percent, plural
-
-LEVELS = ("error", "warning", "repair", "info")
-_GROUPS = (
-    (r"q[wxyz]", "attitude"),
-    (r"d[uvwpqr]", "accelerations"),
-    (r"[xyz]", "position"),
-    (r"tau_[XYZKMN]", "wrench"),
-    (r"thruster_\d+", "thrusters"),
-    (r"fin_\d+", "fins"),
-)
-MOST_ROWS = 24
 
 
 class QualityPage(Page):
@@ -46,8 +31,8 @@ class QualityPage(Page):
 
     def brief(self, view: View) -> list[str]:
         """Return the verdict in plain words."""
-        found = _findings(view)
-        levels = {level: [f for f in found if f.get("level") == level] for level in LEVELS}
+        found = reading.findings(view)
+        levels = {level: [f for f in found if f.get("level") == level] for level in reading.LEVELS}
         errors, warnings = levels["error"], levels["warning"]
         if errors:
             out = [f"Nothing should be fitted to this log as it is: {_sentence(errors[0], cure=True)}."]
@@ -72,8 +57,8 @@ class QualityPage(Page):
         repairs = levels["repair"]
         if repairs:
             out.append(
-                f"On reading, {plural(len(repairs), 'kind of fault was', 'kinds of fault were')} mended "
-                f"and counted."
+                f"On reading, {plural(len(repairs), 'kind of fault was', 'kinds of fault were')} mended and "
+                "counted."
             )
         return out + _agreement_words(view) + _excitation_words(view)
 
@@ -81,7 +66,7 @@ class QualityPage(Page):
         """Return errors and warnings, each with its cure."""
         return [
             f"{str(f.get('level')).capitalize()}: {_sentence(f, cure=True)}."
-            for f in _findings(view)
+            for f in reading.findings(view)
             if f.get("level") in ("error", "warning")
         ]
 
@@ -91,24 +76,23 @@ class QualityPage(Page):
             Plot(
                 "timeline",
                 "What the log holds, when",
-                lambda: timeline(_tracks(view)),
+                lambda: timeline(reading.tracks(view)),
                 lambda: _timeline_caption(view),
             ),
             Plot(
                 "kinematics",
                 "Do the sensors agree",
-                lambda: kinematics(_checks(view)),
+                lambda: kinematics(reading.checks(view)),
                 "Slope of each measured velocity on the one that follows from the attitude (p, q, r) or the "
                 "position (u, v, w). Bars should end at the dashed line; a bar to the left is a reversed "
-                "axis, "
-                "one of another length a wrong unit. With a low correlation the slope means little.",
+                "axis, one of another length a wrong unit. With a low correlation the slope means little.",
             ),
             Plot(
                 "excitation",
                 "What moves",
-                lambda: excitation(_motion(view)),
-                "Spread of each velocity in units of its sensor's noise. What does not reach the dashed line "
-                "cannot be judged, and its coefficients cannot be found from this log.",
+                lambda: excitation(reading.motion(view)),
+                "Spread of each velocity in units of its sensor's noise. What does not reach the dashed "
+                "line cannot be judged, and its coefficients cannot be found from this log.",
             ),
         ]
 
@@ -133,28 +117,16 @@ class QualityPage(Page):
         ]
 
 
-def _plain(view: View, name: str) -> Mapping[str, Any]:
-    """Return a mapping of the JSON answer, where the attribute holds objects."""
-    value = view.data.get(name)
-    return value if isinstance(value, Mapping) else view.mapping(name)
-
-
 def _read(view: View) -> Mapping[str, Any]:
-    return _plain(view, "read")
+    return reading.plain_of(view, "read")
 
 
 def _metrics(view: View) -> Mapping[str, Any]:
-    return _plain(view, "metrics")
+    return reading.plain_of(view, "metrics")
 
 
 def _name(view: View) -> str:
     return name_of(view.data.get("log")) or name_of(view.get("log"))
-
-
-def _findings(view: View) -> list[Mapping[str, Any]]:
-    found = view.data.get("findings") or view.items("findings")
-    found = [f if isinstance(f, Mapping) else vars(f) for f in found]
-    return sorted(found, key=lambda f: LEVELS.index(f["level"]) if f.get("level") in LEVELS else len(LEVELS))
 
 
 _AGREEMENT_HEAD = ["channel", "verdict", "slope", "correlation", "late by (s)"]
@@ -163,11 +135,11 @@ _CHANNEL_HEAD = ("channel", "unit", "missing", "min", "max", "spread", "noise", 
 
 
 def _finding_rows(view: View) -> list[list[str]]:
-    return [[str(f.get(k, "")) for k in ("level", "where", "what", "cure")] for f in _findings(view)]
+    return [[str(f.get(k, "")) for k in ("level", "where", "what", "cure")] for f in reading.findings(view)]
 
 
 def _agreement_rows(view: View) -> list[list[str]]:
-    found = {k: a for k, a in _plain(view, "kinematics").items() if isinstance(a, Mapping)}
+    found = {k: a for k, a in reading.plain_of(view, "kinematics").items() if isinstance(a, Mapping)}
     digits = {"scale": 3, "correlation": 2, "lag_s": 2}
     return [
         [name, str(a.get("verdict", "")), *(number(a.get(k), d) for k, d in digits.items())]
@@ -196,7 +168,7 @@ def _run_name(number: Any) -> str:
 
 
 def _channel_rows(view: View) -> list[list[str]]:
-    found = {k: c for k, c in _plain(view, "channels").items() if isinstance(c, Mapping)}
+    found = {k: c for k, c in reading.plain_of(view, "channels").items() if isinstance(c, Mapping)}
     return [
         [
             name,
@@ -218,70 +190,11 @@ def _sentence(finding: Mapping[str, Any], cure: bool = False) -> str:
     return f"{words} ({mend})" if cure and mend and mend not in words else words
 
 
-def _checks(view: View) -> list[dict[str, Any]]:
-    found = _plain(view, "kinematics")
-    rows = [
-        {
-            "channel": name,
-            "slope": a.get("scale", a.get("slope")),
-            **{k: a.get(k) for k in ("correlation", "std")},
-        }
-        for name, a in found.items()
-        if isinstance(a, Mapping)
-    ]
-    return sorted(rows, key=lambda row: _order(row["channel"]))
-
-
-def _motion(view: View) -> list[dict[str, Any]]:
-    found = _plain(view, "excitation")
-    found = found.get("directions", found)
-    units = dict(VELOCITY)
-    rows = [
-        {
-            "channel": name,
-            "std": e.get("std"),
-            "noise": e.get("noise_std", e.get("noise")),
-            "ratio": e.get("signal_to_noise", e.get("ratio")),
-            "unit": units.get(name, ""),
-        }
-        for name, e in found.items()
-        if isinstance(e, Mapping)
-    ]
-    return sorted(rows, key=lambda row: _order(row["channel"]))
-
-
-def _order(channel: str) -> tuple[int, str]:
-    return (common.CHANNELS.index(channel) if channel in common.CHANNELS else len(common.CHANNELS), channel)
-
-
-def _tracks(view: View) -> list[dict[str, Any]]:
-    runs = getattr(view.get("log"), "runs", None)
-    if not runs:
-        raise NoData("the answer holds no samples")
-    return [{"run": r.number, "t": r.t, "channels": _grouped(r)} for r in runs]
-
-
-def _grouped(run: Any) -> dict[str, np.ndarray]:
-    """Join what one sensor gives: a group has a value where all its members have one."""
-    out: dict[str, np.ndarray] = {}
-    extra = getattr(run, "extra", None) or {}
-    for name, values in run.columns():
-        if name == "t":
-            continue
-        group = next((g for pattern, g in _GROUPS if re.fullmatch(pattern, name)), name)
-        group = "other columns" if name in extra else group
-        there = np.where(np.isfinite(np.asarray(values, dtype=float)), 0.0, np.nan)
-        out[group] = there + out[group] if group in out else there
-    order = ["attitude", *common.CHANNELS, "accelerations", "position", "wrench", "thrusters", "fins"]
-    names = [n for n in order if n in out] + [n for n in out if n not in order]
-    return {n: out[n] for n in names[:MOST_ROWS]}
-
-
 def _timeline_caption(view: View) -> str:
     words = "One row per channel, all runs one after the other. Dark is missing, hatched is a gap in time."
     missing = {
         name: share
-        for name, c in _plain(view, "channels").items()
+        for name, c in reading.plain_of(view, "channels").items()
         if isinstance(c, Mapping) and (share := finite(c.get("missing_share")))
     }
     if missing:
@@ -291,21 +204,21 @@ def _timeline_caption(view: View) -> str:
 
 
 def _agreement_words(view: View) -> list[str]:
-    known = {c["channel"]: s for c in _checks(view) if (s := finite(c["slope"])) is not None}
+    known = {c["channel"]: s for c in reading.checks(view) if (s := finite(c["slope"])) is not None}
     wrong = [common.channel_words(c) for c, s in known.items() if s < 0]
     if wrong:
         return [f"Against the derivative of attitude and position, the sign of {listing(wrong)} is reversed."]
     right = [c for c, s in known.items() if abs(s - 1) <= 0.2]
     if known and len(right) == len(known):
         return [
-            f"{listing(right)} {'agree' if len(right) > 1 else 'agrees'} with the derivative of attitude "
-            f"and position."
+            f"{listing(right)} {'agree' if len(right) > 1 else 'agrees'} with the derivative of attitude and "
+            "position."
         ]
     return []
 
 
 def _excitation_words(view: View) -> list[str]:
-    found = _plain(view, "excitation")
+    found = reading.plain_of(view, "excitation")
     directions = {k: e for k, e in found.get("directions", found).items() if isinstance(e, Mapping)}
     still = [common.channel_words(c) for c, e in directions.items() if e.get("excited") is False]
     if not directions or not any("excited" in e for e in directions.values()):

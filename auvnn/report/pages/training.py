@@ -76,16 +76,14 @@ class TrainingPage(Page):
                 "How the fit went",
                 draw,
                 "Error on the fitted and on the held-out data; the circle marks the best held-out step. "
-                "Where "
-                "the two part, the fit begins to learn the data by heart.",
+                "Where the two part, the fit begins to learn the data by heart.",
             ),
             Plot(
                 "damping_curves",
                 "What damping was found",
                 lambda: _damping(view),
                 "Force and moment opposing each velocity, the other five at zero. Only inside the shaded "
-                "range "
-                "has the log anything to say; outside, the curve is extrapolation.",
+                "range has the log anything to say; outside, the curve is extrapolation.",
             ),
         ]
 

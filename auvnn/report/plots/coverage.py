@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,8 +15,10 @@ from auvnn.report.panels import NoData
 from auvnn.report.plots.recovery import wilson
 
 FEWEST = 5
-FARTHEST = 6.0  # standard errors; what lies beyond is drawn at the edge
 Z95 = 1.96
+# On white: over the shaded interval its own patch would vanish.
+LEGEND: dict[str, Any] = {"fontsize": 7.5, "handlelength": 1.6, "borderaxespad": 0.1, "frameon": True,
+                          "facecolor": "white", "edgecolor": "none", "framealpha": 1.0}  # fmt: skip
 
 
 @style.styled
@@ -35,7 +39,9 @@ def coverage(z: ArrayLike) -> Figure:
     values = np.sort(values[np.isfinite(values)])
     if values.size < FEWEST:
         raise NoData(f"{values.size} parameters with a standard error are too few, {FEWEST} are the least")
-    edge = float(np.clip(np.ceil(np.abs(values).max() + 0.25), 3, FARTHEST))
+    # Two more than the farthest of so many true ones; what lies beyond is drawn at the edge.
+    farthest = np.ceil(ndtri(1 - 0.5 / values.size)) + 2
+    edge = float(np.clip(np.ceil(np.abs(values).max()), 3, max(farthest, 3)))
     figure = style.new_figure(style.PAGE, 2.9)
     left, right = figure.subplots(1, 2, width_ratios=[1.12, 1])
     _histogram(left, values, edge)
@@ -57,10 +63,10 @@ def _histogram(ax: Axes, z: NDArray[np.float64], edge: float) -> None:
     ax.set_title(remark, fontsize=8, loc="left", pad=3)
     beyond = int((np.abs(z) > edge).sum())
     if beyond:
-        style.note(ax, f"{beyond} beyond {edge:g}", x=0.98, y=0.5, ha="right")
+        style.note(ax, f"{beyond} beyond {edge:g}", x=0.98, y=0.12, ha="right")
     ax.set_ylim(0, max(ax.get_ylim()[1], 0.5) * 1.22)
     ax.set_xlim(-edge, edge)
-    ax.legend(loc="upper right", fontsize=7.5, handlelength=1.6, borderaxespad=0.1)
+    ax.legend(loc="upper right", **LEGEND)
     ax.set_xlabel("error / standard error, $z$")
     ax.set_ylabel("density (dimensionless)")
 
@@ -72,16 +78,17 @@ def _quantiles(ax: Axes, z: NDArray[np.float64], edge: float) -> None:
     ax.fill_between(expected, *band, fc="#c4c4c4", ec="none", zorder=1, label="95 % of true standard errors")
     ax.plot([-edge, edge], [-edge, edge], color=style.INK, lw=0.8, zorder=2)
     within = np.abs(z) <= edge
-    ax.plot(expected[within], z[within], ls="none", marker=style.AFTER.marker, ms=3, mfc=style.AFTER.color,
-            mec="white", mew=0.3, zorder=3, label="found")  # fmt: skip
+    ax.plot(expected[within], z[within], ls="none", marker=style.AFTER.marker, ms=2.6,
+            color=style.AFTER.color, mew=0, zorder=3, label="found")  # fmt: skip
     for side, mark in ((1, "^"), (-1, "v")):
         out = z * side > edge
-        ax.plot(expected[out], np.full(out.sum(), side * edge), ls="none", marker=mark, ms=5, clip_on=False,
-                color=style.BEFORE.color, zorder=3)  # fmt: skip
+        if out.any():
+            ax.plot(expected[out], np.full(out.sum(), side * edge), ls="none", marker=mark, ms=5,
+                    clip_on=False, color=style.BEFORE.color, zorder=3)  # fmt: skip
     reach = max(float(np.abs(expected).max()) * 1.08, 1.5)
     ax.set_xlim(-reach, reach)
     ax.set_ylim(-edge, edge)
     style.show_grid(ax, "both")
-    ax.legend(loc="upper left", fontsize=7.5, handlelength=1.6, borderaxespad=0.1)
+    ax.legend(loc="upper left", **LEGEND)
     ax.set_xlabel("expected at its rank, standard normal $z$")
     ax.set_ylabel("error / standard error, $z$")

@@ -16,7 +16,8 @@ from auvnn.report.words import label
 ORDER = ("small", "medium", "large")
 LOOKS = {"small": style.REFITTED, "medium": style.AFTER, "large": style.MEASURED}
 ALL = "all effects"
-STEP = 0.165  # inches from one marker to the next
+STEP = 0.165  # inches from one marker to the next, less where there are many effects
+TALLEST = 10.0  # inches
 
 
 @style.styled
@@ -46,7 +47,8 @@ def recovery(
     if len(rows) > 1:
         total = {s: _sum(by[s] for by in rows.values() if s in by) for s in sizes}
         rows = {ALL: total, **rows}
-    height = max(2, len(sizes)) * STEP + 0.09
+    height = min(max(2, len(sizes)) * STEP + 0.09, TALLEST / len(rows))
+    step = (height - 0.09) / max(2, len(sizes)) / height
     figure = style.new_figure(style.PAGE * 0.86, 0.95 + height * len(rows))
     ax = figure.subplots()
     handles = {}
@@ -55,7 +57,7 @@ def recovery(
             ax.axhspan(i - 0.5, i + 0.5, fc="#f4f4f4", ec="none", zorder=0)
         for k, size in enumerate(sizes):
             if size in by_size:
-                y = i + (k - (len(sizes) - 1) / 2) * STEP / height
+                y = i + (k - (len(sizes) - 1) / 2) * step
                 handles[size] = _marker(ax, y, *by_size[size], _look(size, k))
     if target is not None:
         line = ax.axvline(100 * target, color=style.BEFORE.color, ls=(0, (4, 2)), lw=1.1, zorder=1.5)

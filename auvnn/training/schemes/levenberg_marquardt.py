@@ -35,7 +35,7 @@ class LevenbergMarquardt(Scheme):
         tolerance: a problem has converged when its squared error fell by less than this share
         window: within this many iterations.
         patience: accepted steps without a better held-out error after which a problem stops.
-        damping: first value of Marquardt's parameter.
+        damping: first value of the damping parameter mu.
         goal: stop a degree of freedom at this relative error; None: go on until it converges.
     """
 
@@ -50,7 +50,7 @@ class LevenbergMarquardt(Scheme):
         tolerance: float = 1e-3,
         window: int = 20,
         patience: int = 30,
-        damping: float = 1e-2,
+        damping: float = 0.3,
         goal: float | None = None,
     ) -> None:
         """Check the options."""

@@ -1,0 +1,184 @@
+"""Fits judged on what was left out, evidence and standard errors against dense linear algebra."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from linear_world import STATED, World, layout
+from scipy.stats import multivariate_normal
+from small_logs import make_log, small_vehicle
+
+from auvnn.diagnosis.explain import (
+    FOLDS,
+    Explanation,
+    determined,
+    explain,
+    folds,
+    left_out,
+    standard_errors,
+    weigh,
+)
+from auvnn.diagnosis.nuisance import lay_out, priors, scales, stated
+from auvnn.metrics.windows import cut_windows
+from auvnn.models import GreyBox
+from auvnn.training.prediction_error import Fitted
+
+GROUPS = ["added_mass", "linear_damping", "quadratic_damping", "inertia"]
+
+
+@pytest.fixture(scope="module")
+def world():
+    return World.random(layout(), windows=60, strength=12.0, runs=4)
+
+
+def fitted(world, errors, effects):
+    """Return the explanation that a dense least-squares fit gives, and its columns in the world."""
+    names = [*GROUPS, *(e for e in effects if e not in GROUPS)]
+    columns = world.layout.of(names)
+    held = priors(world.layout, names, effects)
+    flat = world.jacobian.reshape(-1, world.jacobian.shape[-1])[:, columns]
+    theta = world.means[columns] + np.linalg.solve(flat.T @ flat + np.diag(held.precision), flat.T @ errors.ravel())
+    everything = world.means.copy()
+    everything[columns] = theta
+    sums = world.statistics(errors, everything).columns(columns)
+    sigma = np.where(np.arange(18) == 6, 1.0, np.inf)
+    fit = Fitted(world.layout.model, tuple(names), theta, torch.zeros(60, 13), sigma, sums, held, 0.0, True, 1)
+    return Explanation(tuple(effects), fit, tuple(names), 0.0, np.zeros(60), np.full(60, 20.0)), columns
+
+
+def drawn(world, seed, **changed):
+    random = np.random.default_rng(seed)
+    return world.errors(world.drawn(random, **changed), random)
+
+
+def test_what_is_left_out_is_predicted_by_a_fit_without_it(world):
+    errors = drawn(world, 0, ocean_current=np.array([0.2, 0.1, 0.0]))
+    found, columns = fitted(world, errors, ["ocean_current"])
+    held, fold = found.fitted.priors, world.run
+    cost = left_out(found.fitted.statistics, found.fitted.theta, held, fold)
+    pull = np.diag(np.sqrt(held.precision))
+    for f in range(4):
+        keep = fold != f
+        j = world.jacobian[keep][..., columns].reshape(-1, len(columns))
+        # Free parameters start from their nulls, uncertain ones from what was stated.
+        y = np.concatenate([errors[keep].ravel(), pull @ (held.mean - world.means[columns])])
+        step = np.linalg.lstsq(np.concatenate([j, pull]), y, rcond=None)[0]
+        missed = errors[~keep] - world.jacobian[~keep][..., columns] @ step
+        np.testing.assert_allclose(cost[~keep], np.sum(missed**2, 1), rtol=1e-7)
+    assert cost.sum() > found.fitted.statistics.cost.sum()
+
+
+def test_nothing_to_fit_leaves_the_error_as_it_is(world):
+    sums = world.statistics(drawn(world, 1)).columns([])
+    empty = priors(world.layout, [])
+    np.testing.assert_allclose(left_out(sums, np.zeros(0), empty, world.run), sums.cost)
+
+
+def test_folds_are_runs_or_stretches_of_the_only_run():
+    model = GreyBox(small_vehicle())
+    three = cut_windows(make_log(model, runs=3, duration=6.0), 1.0)
+    fold = folds(three)
+    assert len(set(fold)) == 3 and all(len(set(fold[three.run == r])) == 1 for r in (0, 1, 2))
+    one = cut_windows(make_log(model, runs=1, duration=12.0), 1.0)
+    fold = folds(one)
+    assert list(np.unique(fold)) == list(range(FOLDS)) and (np.diff(fold) >= 0).all()
+    assert np.bincount(fold).min() >= 2
+    many = replace(one, run=np.arange(12))
+    assert np.bincount(folds(many)).max() <= 3
+
+
+@pytest.mark.parametrize("effects", [[], ["ocean_current"], ["added_mass"]])
+def test_the_evidence_is_the_marginal_likelihood_of_a_linear_world(world, effects):
+    """One constant is common to all explanations, so it is their differences that are compared."""
+    errors = drawn(world, 2, ocean_current=np.array([0.05, 0.0, 0.05]))
+
+    def exact(asked):
+        prior = []
+        for name in [*GROUPS, *(e for e in asked if e not in GROUPS)]:
+            size = scales(world.layout, name)
+            if name in GROUPS and name not in asked:
+                size = stated(world.layout.model)[name] * np.abs(world.layout.means[name])
+            prior.append(size)
+        size = np.concatenate(prior)
+        columns = world.layout.of([*GROUPS, *(e for e in asked if e not in GROUPS)])
+        j = world.jacobian.reshape(-1, world.jacobian.shape[-1])[:, columns]
+        return multivariate_normal(cov=np.eye(len(j)) + (j * size**2) @ j.T).logpdf(errors.ravel())
+
+    def found(asked):
+        return weigh(world.layout, fitted(world, errors, asked)[0], 1.0).evidence
+
+    assert found(effects) - found([]) == pytest.approx(exact(effects) - exact([]), abs=0.15)
+    assert stated(world.layout.model)["added_mass"] == STATED
+
+
+def test_an_inflated_variance_divides_what_the_data_say(world):
+    errors = drawn(world, 3, ocean_current=np.array([0.3, 0.2, 0.1]))
+    with_it, without = fitted(world, errors, ["ocean_current"])[0], fitted(world, errors, [])[0]
+    gains = [weigh(world.layout, with_it, f).evidence - weigh(world.layout, without, f).evidence for f in (1.0, 4.0)]
+    assert gains[0] > 0 and 0.15 < gains[1] / gains[0] < 0.4
+
+
+def test_standard_errors_are_those_of_the_dense_fit_and_grow_with_the_inflation(world):
+    errors = drawn(world, 4)
+    found, columns = fitted(world, errors, ["ocean_current"])
+    j = world.jacobian.reshape(-1, world.jacobian.shape[-1])[:, columns]
+    dense = np.linalg.inv(j.T @ j + np.diag(found.fitted.priors.precision))
+    at = np.arange(len(columns))[-3:]
+    std, factor = standard_errors(found, at)
+    np.testing.assert_allclose(std, np.sqrt(np.diag(dense)[-3:] * factor), rtol=1e-6)
+    assert 1.0 <= factor < 1.4
+    loud, _ = fitted(world, 3 * errors, ["ocean_current"])
+    std, factor = standard_errors(loud, at)
+    assert factor == pytest.approx(9.0, rel=0.3)
+    np.testing.assert_allclose(std, np.sqrt(np.diag(dense)[-3:] * factor), rtol=1e-6)
+
+
+def test_what_the_log_says_nothing_about_has_no_standard_error(world):
+    silent = World(world.layout, world.jacobian.copy(), world.run)
+    silent.jacobian[..., silent.layout.columns["ocean_current"][2]] = 0.0
+    found, columns = fitted(silent, drawn(silent, 5), ["ocean_current"])
+    at = np.arange(len(columns))[-3:]
+    np.testing.assert_array_equal(determined(found, at), [True, True, False])
+    np.testing.assert_array_equal(np.isnan(standard_errors(found, at)[0]), [False, False, True])
+
+
+def test_priors_hold_what_is_uncertain_and_let_go_what_is_asked_for():
+    at = layout(["ocean_current"])
+    held = priors(at, ["added_mass", "ocean_current"])
+    np.testing.assert_allclose(held.precision[:6], STATED**-2.0)
+    np.testing.assert_allclose(held.mean, [1] * 6 + [0] * 3)
+    np.testing.assert_allclose(held.precision[6:] ** -0.5, [3.0, 3.0, 1.0])
+    freed = priors(at, ["added_mass"], free=["added_mass"])
+    np.testing.assert_allclose(freed.precision ** -0.5, 10.0)
+
+
+def test_a_layout_leaves_out_groups_that_the_vehicle_does_not_have_and_keeps_what_the_model_had():
+    bare = lay_out(GreyBox(small_vehicle(linear_damping=None)), ["net_buoyancy"])
+    assert bare.nuisance == ("added_mass", "quadratic_damping", "inertia")
+    model = GreyBox(small_vehicle()).with_effects({"linear_damping": {"X": 1.5}, "net_buoyancy": {"force": 3.0}})
+    kept = lay_out(model, ["ocean_current", "net_buoyancy"])
+    assert kept.names[:2] == ("linear_damping", "net_buoyancy") and set(kept.names) == {*GROUPS, "net_buoyancy",
+                                                                                        "ocean_current"}
+    np.testing.assert_array_equal(kept.means["linear_damping"], [1.5, 1, 1, 1, 1, 1])
+    # A stated uncertainty is a share of the value, wherever the value comes from.
+    assert priors(kept, ["linear_damping"]).precision[0] == pytest.approx((0.1 * 1.5) ** -2)
+    assert model.effect_names == ["linear_damping", "net_buoyancy"]
+
+
+def test_an_explanation_of_a_real_log_equals_a_refit_without_each_run():
+    """The only test here that runs a model: linear prediction of what is left out against fits without it."""
+    model = GreyBox(small_vehicle(uncertainty=0.0))
+    log = make_log(model.with_effects({"net_buoyancy": {"force": 4.0}}), runs=3, duration=8.0, noise=1.0)
+    windows = cut_windows(log, 2.0)
+    at = lay_out(model, ["net_buoyancy"])
+    found = explain(at, windows, [], ["net_buoyancy"])
+    for r in (0, 1, 2):
+        keep, out = windows.pick(windows.run != r), windows.pick(windows.run == r)
+        refit = explain(at, keep, [], ["net_buoyancy"], sigma=found.fitted.sigma)
+        guess = replace(at, model=refit.fitted.model)
+        alone = explain(guess, out, [], [], sigma=found.fitted.sigma)
+        np.testing.assert_allclose(found.left_out[windows.run == r], alone.fitted.statistics.cost, rtol=0.02)
+    assert 0.9 < found.cv < 1.1
