@@ -62,6 +62,7 @@ def make_log(
     uneven: float = 0.0,
     command: np.ndarray | None = None,
     first: int = 0,
+    max_step: float = 0.03,
 ) -> Log:
     """Return a log of a model driven by sums of sines.
 
@@ -77,10 +78,11 @@ def make_log(
         uneven: share of a step by which stamps are moved.
         command: (N, n) instead of sines.
         first: number of the first run.
+        max_step: of the integration, s.
     """
-    made = []
-    for number in range(first, first + runs):
-        random = np.random.default_rng([seed, number])
+    generators = [np.random.default_rng([seed, number]) for number in range(first, first + runs)]
+    times, commands, starts = [], [], []
+    for number, random in zip(range(first, first + runs), generators, strict=True):
         t = np.arange(round(duration * rate) + 1) / rate
         t[1:-1] += uneven / rate * random.uniform(-0.5, 0.5, len(t) - 2)
         if command is not None:
@@ -90,22 +92,26 @@ def make_log(
         else:
             held = np.clip(0.45 * size * sines(t, model.actuators.size, 1000 * seed + number), -0.95, 0.95)
         heading = random.uniform(-np.pi, np.pi)
-        eta = torch.tensor([0.0, 0.0, 5.0, np.cos(heading / 2), 0.0, 0.0, np.sin(heading / 2)], dtype=torch.float64)
-        nu = torch.tensor(0.05 * random.normal(size=6), dtype=torch.float64)
-        with torch.no_grad():
-            run = model.rollout(eta, nu, torch.tensor(held), torch.tensor(t), max_step=0.03)
-            rate_of = model.nu_dot(run.eta[:, :3], quat_to_matrix(run.eta[:, 3:]), run.nu, run.thrust,
-                                   Inputs(torch.tensor(held)), torch.tensor(t))
-            seen = model.sense(Sensed(run.eta[:, :3], run.eta[:, 3:], run.nu, rate_of))
-        count = len(t)
+        times.append(t)
+        commands.append(held)
+        starts.append([0.0, 0.0, 5.0, np.cos(heading / 2), 0.0, 0.0, np.sin(heading / 2), *0.05 * random.normal(size=6)])
+    t, held, start = (torch.tensor(np.stack(x)) for x in (times, commands, starts))
+    with torch.no_grad():
+        run = model.rollout(start[:, :7], start[:, 7:], held, t, max_step=max_step)
+        rate_of = model.nu_dot(run.eta[..., :3], quat_to_matrix(run.eta[..., 3:]), run.nu, run.thrust, Inputs(held), t)
+        seen = model.sense(Sensed(run.eta[..., :3], run.eta[..., 3:], run.nu, rate_of))
+    assert not run.diverged and seen.nu_dot is not None
+    made = []
+    for i, random in enumerate(generators):
+        count = t.shape[1]
         turn = noise * NOISE["attitude"] / 2 * random.normal(size=(count, 3))
         small = np.concatenate([np.sqrt(1 - (turn**2).sum(1, keepdims=True)), turn], axis=1)
         made.append(Run(
-            number, t, multiply(seen.quaternion.numpy(), small),
-            seen.nu.numpy() + noise * NOISE["nu"] * random.normal(size=(count, 6)),
-            nu_dot=seen.nu_dot.numpy() + noise * NOISE["nu_dot"] * random.normal(size=(count, 6))
-            if accelerations and seen.nu_dot is not None else None,
-            position=seen.position.numpy() + noise * NOISE["position"] * random.normal(size=(count, 3)),
-            **{model.actuation: held},
+            first + i, times[i], multiply(seen.quaternion[i].numpy(), small),
+            seen.nu[i].numpy() + noise * NOISE["nu"] * random.normal(size=(count, 6)),
+            nu_dot=seen.nu_dot[i].numpy() + noise * NOISE["nu_dot"] * random.normal(size=(count, 6))
+            if accelerations else None,
+            position=seen.position[i].numpy() + noise * NOISE["position"] * random.normal(size=(count, 3)),
+            **{model.actuation: commands[i]},
         ))
     return Log.from_runs(made, name=f"made-{seed}")

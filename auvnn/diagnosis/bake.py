@@ -42,6 +42,10 @@ def with_body(vehicle: Vehicle, body: Body) -> Vehicle:
     if linear is not None and quadratic is not None:
         elements = tuple(replace(e, linear=linear[k], quadratic=quadratic[k]) for k, e in enumerate(elements))
     return replace(
-        vehicle, inertia=array(body.inertia), added_mass=array(body.added_mass), linear_damping=array(body.linear),
-        quadratic_damping=array(body.quadratic), damping_elements=elements,
+        vehicle,
+        inertia=array(body.inertia),
+        added_mass=array(body.added_mass),
+        linear_damping=array(body.linear),
+        quadratic_damping=array(body.quadratic),
+        damping_elements=elements,
     )

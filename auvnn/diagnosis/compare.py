@@ -43,8 +43,18 @@ class Comparison(Answer):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
-        names = ("model", "log", "samples", "runs", "derivative", "one_step", "rollout", "residual_wrench",
-                 "failures", "warnings")
+        names = (
+            "model",
+            "log",
+            "samples",
+            "runs",
+            "derivative",
+            "one_step",
+            "rollout",
+            "residual_wrench",
+            "failures",
+            "warnings",
+        )
         return plain({"schema": "auvnn/comparison/1", **{n: getattr(self, n) for n in names}})
 
     def write(self, folder: str | Path, *, report: bool = True) -> Path:
@@ -83,14 +93,30 @@ def compare(
     located = locate(log, parts)
     dt = float(np.median([run.dt for run in log.runs]))
     with np.errstate(invalid="ignore"):
-        residual = {axis: {"rms": float(np.sqrt(np.nanmean(wrench[:, k] ** 2))), "mean": float(np.nanmean(wrench[:, k])),
-                           "noise_floor": float(noise[k])} for k, axis in enumerate(AXES)}
+        residual = {
+            axis: {
+                "rms": float(np.sqrt(np.nanmean(wrench[:, k] ** 2))),
+                "mean": float(np.nanmean(wrench[:, k])),
+                "noise_floor": float(noise[k]),
+            }
+            for k, axis in enumerate(AXES)
+        }
     shown = rolled.get("5") or next(iter(rolled.values()), None)
     return Comparison(
-        model.vehicle.name, log.name, log.samples, len(log.runs), how.describe(dt), scores(parts), rolled_table,
-        residual, failures(parts, located, noise), _warnings(model, log, rolled),
+        model.vehicle.name,
+        log.name,
+        log.samples,
+        len(log.runs),
+        how.describe(dt),
+        scores(parts),
+        rolled_table,
+        residual,
+        failures(parts, located, noise),
+        _warnings(model, log, rolled),
         [_series(run.number, run.nu, p, shown) for run, p in zip(log.runs, parts, strict=True)],
-        located, noise, None,
+        located,
+        noise,
+        None,
     )
 
 
@@ -117,8 +143,15 @@ def _series(number: int, nu: Array, part: OneStep, rolled: Rolled | None) -> dic
     stitched = np.full_like(nu, np.nan)
     if rolled is not None:
         stitched = stitch(rolled, number, nu)
-    return {"run": number, "t": part.t, "measured": nu, "model": stitched, "measured_acc": part.measured,
-            "model_acc": part.model, "residual": part.wrench}
+    return {
+        "run": number,
+        "t": part.t,
+        "measured": nu,
+        "model": stitched,
+        "measured_acc": part.measured,
+        "model_acc": part.model,
+        "residual": part.wrench,
+    }
 
 
 def stitch(rolled: Rolled, number: int, nu: Array) -> Array:
@@ -129,7 +162,7 @@ def stitch(rolled: Rolled, number: int, nu: Array) -> Array:
         first, length = int(rolled.windows.first[b]), int(rolled.windows.length[b])
         if first < upto:
             continue
-        trace[first:first + length] = rolled.predicted[b, :length]
+        trace[first : first + length] = rolled.predicted[b, :length]
         upto = first + length - 1
     return trace
 
@@ -143,10 +176,13 @@ def write_predictions(series: list[dict[str, Any]], path: Path) -> Path:
     frames = []
     for s in series:
         columns: dict[str, Any] = {"run": np.full(len(s["t"]), s["run"]), "t": s["t"]}
-        for key, names, suffix in (("measured", NAMES, ""), ("model", NAMES, "_model"),
-                                   ("measured_acc", [f"d{n}" for n in NAMES], ""),
-                                   ("model_acc", [f"d{n}" for n in NAMES], "_model"),
-                                   ("residual", AXES, "_residual")):
+        for key, names, suffix in (
+            ("measured", NAMES, ""),
+            ("model", NAMES, "_model"),
+            ("measured_acc", [f"d{n}" for n in NAMES], ""),
+            ("model_acc", [f"d{n}" for n in NAMES], "_model"),
+            ("residual", AXES, "_residual"),
+        ):
             columns.update({f"{n}{suffix}": s[key][:, k] for k, n in enumerate(names)})
         frames.append(pl.DataFrame(columns))
     if not frames:
@@ -165,7 +201,11 @@ def _warnings(model: GreyBox, log: Log, rolled: dict[str, Rolled]) -> list[str]:
     gone = {h: int(r.diverged.sum()) for h, r in rolled.items() if r.diverged.any()}
     if gone:
         found.append("free runs diverged: " + ", ".join(f"{n} of horizon {h} s" for h, n in gone.items()))
-    if log.runs[0].wrench is not None and log.runs[0].thrusters is not None and model.actuation == "thrusters":
+    if (
+        log.runs[0].wrench is not None
+        and log.runs[0].thrusters is not None
+        and model.actuation == "thrusters"
+    ):
         found.append(_commanded_against_thrusters(model, log))
     return found
 

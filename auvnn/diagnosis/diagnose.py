@@ -74,12 +74,27 @@ class Diagnosis(Answer):
         """Return the JSON answer."""
         from auvnn.answers import plain
 
-        names = ("model", "log", "derivative", "verdict", "missing", "steps", "candidates", "unexplained",
-                 "depends_on", "next_experiment", "warnings", "global_p_value", "story")
+        names = (
+            "model",
+            "log",
+            "derivative",
+            "verdict",
+            "missing",
+            "steps",
+            "candidates",
+            "unexplained",
+            "depends_on",
+            "next_experiment",
+            "warnings",
+            "global_p_value",
+            "story",
+        )
         return plain({"schema": "auvnn/diagnosis/1", **{n: getattr(self, n) for n in names}})
 
 
-def candidates_for(model: GreyBox, log: Log, wanted: str | Sequence[str] | None) -> tuple[list[str], dict[str, list[str]]]:
+def candidates_for(
+    model: GreyBox, log: Log, wanted: str | Sequence[str] | None
+) -> tuple[list[str], dict[str, list[str]]]:
     """Return the effects that can be asked for, and for the others which channels they lack."""
     if isinstance(wanted, str):
         wanted = [wanted]
@@ -147,7 +162,9 @@ def diagnose(
 class _Search:
     """One diagnosis under way."""
 
-    def __init__(self, layout: Layout, windows: Windows, usable: list[str], say: Callable[[str], None]) -> None:
+    def __init__(
+        self, layout: Layout, windows: Windows, usable: list[str], say: Callable[[str], None]
+    ) -> None:
         self.layout, self.windows, self.usable, self.say = layout, windows, usable, say
         self.base = [n for n in layout.names if n not in usable or n in layout.nuisance]
         self.floor = TRUST * motion(windows) + 1e-9
@@ -157,8 +174,11 @@ class _Search:
         """Linearise towards every parameter at a fit."""
         model = self.layout.model.rebuilt(self.layout.model.copied_effects())
         set_parameters(model, found.names, found.fitted.theta)
-        sums, _, _ = reduce(self.windows, answers(model, self.windows, found.fitted.initial, self.layout.names),
-                            found.fitted.sigma)
+        sums, _, _ = reduce(
+            self.windows,
+            answers(model, self.windows, found.fitted.initial, self.layout.names),
+            found.fitted.sigma,
+        )
         return sums, replace(self.layout, model=model)
 
     def run(self, model: GreyBox, log: Log, needs: dict[str, list[str]], most: int) -> Diagnosis:
@@ -204,8 +224,10 @@ class _Search:
             if noise_floor is None:
                 noise_floor = best
         missing = [e for s in steps for e in s["effects"]]
-        order = sorted(table.values(), key=lambda c: (missing.index(c["effect"]) if c["effect"] in missing else 99,
-                                                      -c.pop("_order")))
+        order = sorted(
+            table.values(),
+            key=lambda c: (missing.index(c["effect"]) if c["effect"] in missing else 99, -c.pop("_order")),
+        )
         verdict = steps[0]["verdict"]
         before, after = _excess(first, current), _excess(current, current)
         unexplained = float(np.clip(after / before, 0.0, 1.0)) if before > 0 else 0.0
@@ -213,37 +235,73 @@ class _Search:
         if verdict == "unknown" or steps[-1]["verdict"] == "unknown":
             depends = depends_on(current.fitted.model, log, self.windows)
         return Diagnosis(
-            model.vehicle.name, log.name, verdict, missing, steps, order,
-            0.0 if verdict == "adequate" else unexplained, depends, None, self._warnings(model, log),
-            {"method": f"none: free-running windows of {self._length():g} s with estimated initial states",
-             "bandwidth_hz": None},
-            global_p, similar, current,
+            model.vehicle.name,
+            log.name,
+            verdict,
+            missing,
+            steps,
+            order,
+            0.0 if verdict == "adequate" else unexplained,
+            depends,
+            None,
+            self._warnings(model, log),
+            {
+                "method": f"none: free-running windows of {self._length():g} s with estimated initial states",
+                "bandwidth_hz": None,
+            },
+            global_p,
+            similar,
+            current,
         )
 
     def _length(self) -> float:
-        times = self.windows.times[:, self.windows.warmup:]
+        times = self.windows.times[:, self.windows.warmup :]
         return round(float((times[:, -1] - times[:, 0]).max()), 3)
 
-    def _choose(self, scores: dict[str, Score], at: Layout, base: list[str], chosen: list[str],
-                current: Explanation) -> tuple[str, Explanation | None, list[Explanation]]:
+    def _choose(
+        self, scores: dict[str, Score], at: Layout, base: list[str], chosen: list[str], current: Explanation
+    ) -> tuple[str, Explanation | None, list[Explanation]]:
         """Refit the leading effects and return the verdict, the best, and all that were refitted."""
         leading = sorted((s for s in scores.values() if s.degrees), key=lambda s: -s.evidence)[:LEADERS]
         top = leading[0].evidence if leading else 0.0
-        leading = [s for s in leading if s.p_value < ALPHA and s.evidence > min(top - REACH, REACH_SHARE * top)]
+        leading = [
+            s for s in leading if s.p_value < ALPHA and s.evidence > min(top - REACH, REACH_SHARE * top)
+        ]
         tried = []
         for candidate in leading:
             self.say(f"fitting {candidate.effect}")
             guess = at.model.rebuilt(at.model.copied_effects())
-            set_parameters(guess, [candidate.effect], np.where(np.isfinite(candidate.estimate), candidate.estimate,
-                                                               parameters_of(at.model, [candidate.effect])))
-            tried.append(explain(self.layout, self.windows, base, [*chosen, candidate.effect], start=current.fitted,
-                                 guess=replace(at, model=guess), sigma=current.fitted.sigma, iterations=6))
+            set_parameters(
+                guess,
+                [candidate.effect],
+                np.where(
+                    np.isfinite(candidate.estimate),
+                    candidate.estimate,
+                    parameters_of(at.model, [candidate.effect]),
+                ),
+            )
+            tried.append(
+                explain(
+                    self.layout,
+                    self.windows,
+                    base,
+                    [*chosen, candidate.effect],
+                    start=current.fitted,
+                    guess=replace(at, model=guess),
+                    sigma=current.fitted.sigma,
+                    iterations=6,
+                )
+            )
         if not tried:
             return "unknown", None, []
         factor = min(self._factor(e) for e in tried)
         current = weigh(self.layout, current, factor)
         tried = sorted((weigh(self.layout, e, factor) for e in tried), key=lambda e: -e.evidence)
-        paying = [e for e in tried if e.evidence > current.evidence and self._pays(e, self._without(e, base, current))]
+        paying = [
+            e
+            for e in tried
+            if e.evidence > current.evidence and self._pays(e, self._without(e, base, current))
+        ]
         if not paying:
             return "unknown", None, tried
         best = paying[0]
@@ -252,8 +310,14 @@ class _Search:
             names = tuple(e.effects[-1] for e in [best, *rivals])
             return "ambiguous", replace(best, effects=(*chosen, *names)), tried
         # The weights follow the errors that the winner leaves.
-        final = explain(self.layout, self.windows, base, best.effects, start=best.fitted,
-                        guess=replace(at, model=best.fitted.model))
+        final = explain(
+            self.layout,
+            self.windows,
+            base,
+            best.effects,
+            start=best.fitted,
+            guess=replace(at, model=best.fitted.model),
+        )
         return "named", final, [final, *tried[1:]] if tried[0] is best else [final, *tried]
 
     def _factor(self, explanation: Explanation) -> float:
@@ -269,8 +333,15 @@ class _Search:
         if effect not in base:
             return current
         names = [n for n in base if n != effect]
-        return explain(self.layout, self.windows, names, after.effects[:-1], start=current.fitted,
-                       sigma=current.fitted.sigma, iterations=6)
+        return explain(
+            self.layout,
+            self.windows,
+            names,
+            after.effects[:-1],
+            start=current.fitted,
+            sigma=current.fitted.sigma,
+            iterations=6,
+        )
 
     def _pays(self, after: Explanation, before: Explanation) -> bool:
         """Whether the error on what was left out falls by more than its own uncertainty."""
@@ -289,25 +360,44 @@ class _Search:
             share = 1.0 - fast / slow
         return bool(np.any((count > 0) & (z > SLOW_Z) & (share > SLOW_SHARE)))
 
-    def _table(self, scores: dict[str, Score], current: Explanation, similar: tuple[list[str], Array],
-               needs: dict[str, list[str]]) -> dict[str, dict[str, Any]]:
+    def _table(
+        self,
+        scores: dict[str, Score],
+        current: Explanation,
+        similar: tuple[list[str], Array],
+        needs: dict[str, list[str]],
+    ) -> dict[str, dict[str, Any]]:
         names, matrix = similar
         excess = max(_excess(current, current), max((s.gain for s in scores.values()), default=0.0), 1e-12)
         table: dict[str, dict[str, Any]] = {}
         for name, absent in needs.items():
             found = scores.get(name)
-            entry: dict[str, Any] = {"effect": name, "p_value": None, "explained": None, "cv_before": None,
-                                     "cv_after": None, "parameters": {}, "confusable_with": [], "needs": absent,
-                                     "_order": -np.inf}
+            entry: dict[str, Any] = {
+                "effect": name,
+                "p_value": None,
+                "explained": None,
+                "cv_before": None,
+                "cv_after": None,
+                "parameters": {},
+                "confusable_with": [],
+                "needs": absent,
+                "_order": -np.inf,
+            }
             if found is not None:
                 row = names.index(name)
-                near = sorted(((matrix[row, j], names[j]) for j in range(len(names)) if j != row), reverse=True)
+                near = sorted(
+                    ((matrix[row, j], names[j]) for j in range(len(names)) if j != row), reverse=True
+                )
                 described = self.layout.model.effect(name).parameters_of
                 entry.update(
-                    p_value=found.p_value, explained=float(np.clip(found.gain / excess, 0.0, 1.0)),
-                    cv_before=current.cv, cv_after=_promised(current, found),
-                    parameters={p.name: {"value": v, "std": s, "unit": p.unit}
-                                for p, v, s in zip(described, found.estimate, found.std, strict=True)},
+                    p_value=found.p_value,
+                    explained=float(np.clip(found.gain / excess, 0.0, 1.0)),
+                    cv_before=current.cv,
+                    cv_after=_promised(current, found),
+                    parameters={
+                        p.name: {"value": v, "std": s, "unit": p.unit}
+                        for p, v, s in zip(described, found.estimate, found.std, strict=True)
+                    },
                     confusable_with=[{"effect": n, "similarity": float(v)} for v, n in near if v >= 0.5],
                     _order=found.evidence,
                 )
@@ -324,8 +414,10 @@ class _Search:
             table[name].update(
                 cv_before=before.cv,
                 cv_after=float(np.sqrt(_scaled_left_out(explanation, before) / before.left_out_count.sum())),
-                parameters={p.name: {"value": v, "std": s, "unit": p.unit}
-                            for p, v, s in zip(described, values, std, strict=True)},
+                parameters={
+                    p.name: {"value": v, "std": s, "unit": p.unit}
+                    for p, v, s in zip(described, values, std, strict=True)
+                },
             )
 
     def _warnings(self, model: GreyBox, log: Log) -> list[str]:
@@ -333,7 +425,9 @@ class _Search:
         if len(log.runs) < 2:
             found.append("the log holds one run: what is left out in turn are stretches of it")
         if self.silent:
-            found.append(f"{log.name} says nothing about {', '.join(self.silent)}: nothing in it depends on them")
+            found.append(
+                f"{log.name} says nothing about {', '.join(self.silent)}: nothing in it depends on them"
+            )
         if not stated(model):
             found.append("no coefficient of the model is uncertain: any error of theirs will be given a name")
         return found

@@ -66,8 +66,11 @@ def left_out(statistics: Statistics, theta: Array, held: Priors, fold: NDArray[n
         gradient = statistics.slope[keep].sum(0) - held.precision * (theta - held.mean)
         step = np.linalg.lstsq(hessian, gradient, rcond=1e-12)[0] if len(theta) else theta
         out = ~keep if (~keep).any() else keep
-        cost[out] = (statistics.cost[out] - 2 * statistics.slope[out] @ step
-                     + np.einsum("i,bij,j->b", step, statistics.hessian[out], step))
+        cost[out] = (
+            statistics.cost[out]
+            - 2 * statistics.slope[out] @ step
+            + np.einsum("i,bij,j->b", step, statistics.hessian[out], step)
+        )
     return cost
 
 
@@ -97,8 +100,15 @@ def explain(
     names = tuple(dict.fromkeys([*base, *effects]))
     held = priors(layout, names, free=effects)
     model = (guess or layout).model
-    fitted = fit(model, windows, names, held, initial=None if start is None else start.initial, sigma=sigma,
-                 iterations=iterations)
+    fitted = fit(
+        model,
+        windows,
+        names,
+        held,
+        initial=None if start is None else start.initial,
+        sigma=sigma,
+        iterations=iterations,
+    )
     cost = left_out(fitted.statistics, fitted.theta, held, folds(windows))
     count = fitted.statistics.count[:, np.isfinite(fitted.sigma)].sum(1)
     return Explanation(tuple(effects), fitted, names, 0.0, cost, count)

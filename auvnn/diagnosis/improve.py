@@ -61,9 +61,24 @@ class Improvement(Answer):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
-        names = ("log", "test", "effects", "accepted", "before", "refitted", "after", "gain", "waterfall",
-                 "parameters", "coefficients", "held_out", "warnings")
-        return plain({"schema": "auvnn/improvement/1", "model": self.name, **{n: getattr(self, n) for n in names}})
+        names = (
+            "log",
+            "test",
+            "effects",
+            "accepted",
+            "before",
+            "refitted",
+            "after",
+            "gain",
+            "waterfall",
+            "parameters",
+            "coefficients",
+            "held_out",
+            "warnings",
+        )
+        return plain(
+            {"schema": "auvnn/improvement/1", "model": self.name, **{n: getattr(self, n) for n in names}}
+        )
 
 
 def add(
@@ -133,16 +148,34 @@ def add(
     if key != "5":
         warnings.append(f"no held-out stretch is 5 s long: gain and waterfall are for horizon {key}")
     return Improvement(
-        model.vehicle.name, log.name, test.name, names, accepted,
-        *({"one_step": results[s]["one_step"], "rollout": results[s]["rollout"]}
-          for s in ("as given", "coefficients refitted", last)),
-        {"value": gain, "std": std}, waterfall, _values(layout, best, names),
-        _values(layout, best, [n for n in layout.nuisance if n not in names]), held_out, final, models[1][1],
+        model.vehicle.name,
+        log.name,
+        test.name,
+        names,
+        accepted,
+        *(
+            {"one_step": results[s]["one_step"], "rollout": results[s]["rollout"]}
+            for s in ("as given", "coefficients refitted", last)
+        ),
+        {"value": gain, "std": std},
+        waterfall,
+        _values(layout, best, names),
+        _values(layout, best, [n for n in layout.nuisance if n not in names]),
+        held_out,
+        final,
+        models[1][1],
         warnings,
-        [{"run": run.number, "t": run.t, "measured": run.nu,
-          "before": stitch(rolled["as given"][key], run.number, run.nu),
-          "refitted": stitch(rolled["coefficients refitted"][key], run.number, run.nu),
-          "after": stitch(rolled[last][key], run.number, run.nu)} for run in test.runs],
+        [
+            {
+                "run": run.number,
+                "t": run.t,
+                "measured": run.nu,
+                "before": stitch(rolled["as given"][key], run.number, run.nu),
+                "refitted": stitch(rolled["coefficients refitted"][key], run.number, run.nu),
+                "after": stitch(rolled[last][key], run.number, run.nu),
+            }
+            for run in test.runs
+        ],
     )
 
 
@@ -185,8 +218,14 @@ def noise_floor(model: GreyBox, rolled: Rolled, log: Log, scale: Scale, seed: in
     rng = np.random.default_rng(seed)
     windows = rolled.windows
     states = initial_states(model, windows)
-    kick = np.concatenate([np.zeros((len(windows), 3)), rng.normal(size=(len(windows), 3)) * angle,
-                           rng.normal(size=(len(windows), 6)) * noise_nu], axis=1)
+    kick = np.concatenate(
+        [
+            np.zeros((len(windows), 3)),
+            rng.normal(size=(len(windows), 3)) * angle,
+            rng.normal(size=(len(windows), 6)) * noise_nu,
+        ],
+        axis=1,
+    )
     with torch.no_grad():
         true = predict(model, windows, states)[1].numpy()
         started = predict(model, windows, moved(states, torch.as_tensor(kick)))[1].numpy()
@@ -211,8 +250,12 @@ def _values(layout: Any, found: Explanation, names: Sequence[str]) -> dict[str, 
         if name not in names:
             continue
         std, _ = standard_errors(found, columns)
-        out[name] = {p.name: {"value": v, "std": s, "unit": p.unit} for p, v, s in
-                     zip(layout.model.effect(name).parameters_of, found.fitted.theta[columns], std, strict=True)}
+        out[name] = {
+            p.name: {"value": v, "std": s, "unit": p.unit}
+            for p, v, s in zip(
+                layout.model.effect(name).parameters_of, found.fitted.theta[columns], std, strict=True
+            )
+        }
     return out
 
 
@@ -225,12 +268,19 @@ def _silent(layout: Any, found: Explanation, names: Sequence[str], log: Log) -> 
         at += size
         if name not in names or known.all():
             continue
-        labels = ", ".join(f"{name}.{p.name}" for p, k in zip(layout.model.effect(name).parameters_of, known,
-                                                              strict=True) if not k)
+        labels = ", ".join(
+            f"{name}.{p.name}"
+            for p, k in zip(layout.model.effect(name).parameters_of, known, strict=True)
+            if not k
+        )
         if not known.any():
-            raise InputError(f"{log.name} says nothing about {labels}: nothing in it depends on them; fit on a log "
-                             f"that excites them, or leave {name} out")
-        out.append(f"{log.name} says nothing about {labels}: they stay near where they were, without standard error")
+            raise InputError(
+                f"{log.name} says nothing about {labels}: nothing in it depends on them; fit on a log "
+                f"that excites them, or leave {name} out"
+            )
+        out.append(
+            f"{log.name} says nothing about {labels}: they stay near where they were, without standard error"
+        )
     return out
 
 
@@ -245,14 +295,16 @@ def _warnings(layout: Any, found: Explanation, accepted: bool, gain: float, std:
         for p in layout.model.effect(name).parameters_of:
             value = found.fitted.theta[at]
             at += 1
-            if value <= p.low + 1e-9 * abs(p.low) or value >= p.high - 1e-9 * abs(p.high):
-                if p.null not in (p.low, p.high) or value != p.null:
-                    out.append(f"{name}.{p.name} ended at its bound {value:g} {p.unit}: the data ask for more")
+            at_bound = value <= p.low + 1e-9 * abs(p.low) or value >= p.high - 1e-9 * abs(p.high)
+            if at_bound and value != p.null:
+                out.append(f"{name}.{p.name} ended at its bound {value:g} {p.unit}: the data ask for more")
     covariance = found.fitted.covariance()
     size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     rho = covariance / size[:, None] / size
     labels = [f"{n}.{p.name}" for n in found.names for p in layout.model.effect(n).parameters_of]
     pairs = [(i, j) for i in range(len(labels)) for j in range(i) if abs(rho[i, j]) > 0.99]
     for i, j in pairs[:5]:
-        out.append(f"{labels[j]} and {labels[i]} cannot be told apart on this log (correlation {rho[i, j]:.3f})")
+        out.append(
+            f"{labels[j]} and {labels[i]} cannot be told apart on this log (correlation {rho[i, j]:.3f})"
+        )
     return out

@@ -14,8 +14,17 @@ Array = NDArray[np.float64]
 AXES = ("X", "Y", "Z", "K", "M", "N")
 WORDS = {"X": "surge", "Y": "sway", "Z": "heave", "K": "roll", "M": "pitch", "N": "yaw"}
 BINS = 6
-UNITS = {"speed": "m/s", "turn rate": "rad/s", "attitude": "rad", "heading": "rad", "command": "share of largest",
-         "depth": "m", "time": "s"}
+# Energy above the noise floor, as a share of it, up to which the floor itself may be off: not a failure yet.
+BARELY = 0.3
+UNITS = {
+    "speed": "m/s",
+    "turn rate": "rad/s",
+    "attitude": "rad",
+    "heading": "rad",
+    "command": "share of largest",
+    "depth": "m",
+    "time": "s",
+}
 
 
 def regimes(run: Run) -> dict[str, Array]:
@@ -24,7 +33,9 @@ def regimes(run: Run) -> dict[str, Array]:
         "speed": np.linalg.norm(run.nu[:, :3], axis=1),
         "turn rate": np.linalg.norm(run.nu[:, 3:], axis=1),
         # Angle between the body's and the world's vertical: roll and pitch in one.
-        "attitude": np.arccos(np.clip(1 - 2 * (run.quaternion[:, 1] ** 2 + run.quaternion[:, 2] ** 2), -1, 1)),
+        "attitude": np.arccos(
+            np.clip(1 - 2 * (run.quaternion[:, 1] ** 2 + run.quaternion[:, 2] ** 2), -1, 1)
+        ),
         "heading": run.euler[:, 2],
         "time": run.t - run.t[0],
     }
@@ -58,31 +69,41 @@ def locate(log: Log, parts: list[OneStep]) -> dict[str, dict[str, Any]]:
             continue
         index = np.clip(np.digitize(x[good], edges[1:-1]), 0, len(edges) - 2)
         count = np.bincount(index, minlength=len(edges) - 1)
-        total = np.stack([np.bincount(index, weights=wrench[good, k] ** 2, minlength=len(edges) - 1)
-                          for k in range(6)])
+        total = np.stack(
+            [np.bincount(index, weights=wrench[good, k] ** 2, minlength=len(edges) - 1) for k in range(6)]
+        )
         with np.errstate(invalid="ignore", divide="ignore"):
-            found[name] = {"edges": edges.tolist(), "unit": UNITS[name], "rms": np.sqrt(total / count),
-                           "count": count}
+            found[name] = {
+                "edges": edges.tolist(),
+                "unit": UNITS[name],
+                "rms": np.sqrt(total / count),
+                "count": count,
+            }
     return found
 
 
-def failures(parts: list[OneStep], located: dict[str, dict[str, Any]], floor: Array, limit: int = 8
-             ) -> list[dict[str, Any]]:
+def failures(
+    parts: list[OneStep], located: dict[str, dict[str, Any]], floor: Array, limit: int = 8
+) -> list[dict[str, Any]]:
     """Return where the error sits, in plain words, largest first.
 
     A place's share is what its bin holds of the residual's energy above the noise floor, all six degrees of
-    freedom together, forces and moments made comparable by their floors.
+    freedom together, forces and moments made comparable by their floors. Degrees of freedom whose residual is
+    about as large as noise alone leaves it are left out.
     """
     wrench = np.concatenate([p.wrench for p in parts])
     unit = np.where(floor > 0, floor, 1e-9)
     energy = np.nanmean((wrench / unit) ** 2, axis=0) - 1.0
-    whole = float(np.maximum(energy, 0.0).sum())
+    energy = np.where(energy > BARELY, energy, 0.0)
+    whole = float(energy.sum())
     if not np.isfinite(whole) or whole <= 0:
         return []
     samples = len(wrench)
     found = []
     for k, axis in enumerate(AXES):
-        share = max(energy[k], 0.0) / whole
+        if energy[k] == 0.0:
+            continue
+        share = energy[k] / whole
         if share >= 0.01:
             found.append({"channel": axis, "where": f"{WORDS[axis]}, everywhere", "share": float(share)})
         for name, place in located.items():
@@ -90,10 +111,17 @@ def failures(parts: list[OneStep], located: dict[str, dict[str, Any]], floor: Ar
             if not np.isfinite(above).any() or np.nansum(above) <= 0:
                 continue
             at = int(np.nanargmax(above))
-            density = (above[at] / max(place["count"][at], 1)) / max(np.nansum(above) / place["count"].sum(), 1e-30)
+            density = (above[at] / max(place["count"][at], 1)) / max(
+                np.nansum(above) / place["count"].sum(), 1e-30
+            )
             if density > 1.5 and above[at] / samples / whole >= 0.01:
                 low, high = place["edges"][at], place["edges"][at + 1]
-                found.append({"channel": axis, "where": f"{WORDS[axis]}, {name} from {low:.3g} to {high:.3g} "
-                              f"{place['unit']}: {density:.1f} times its average",
-                              "share": float(above[at] / samples / whole)})
+                found.append(
+                    {
+                        "channel": axis,
+                        "where": f"{WORDS[axis]}, {name} from {low:.3g} to {high:.3g} "
+                        f"{place['unit']}: {density:.1f} times its average",
+                        "share": float(above[at] / samples / whole),
+                    }
+                )
     return sorted(found, key=lambda f: -f["share"])[:limit]

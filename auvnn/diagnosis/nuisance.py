@@ -54,7 +54,9 @@ def stated(model: GreyBox) -> dict[str, float]:
     elements = len(vehicle.damping_elements) > 0
     known["linear_damping"] = vehicle.linear_damping is not None or elements
     known["quadratic_damping"] = vehicle.quadratic_damping is not None or elements
-    return {g: float(vehicle.uncertainty[g]) for g in GROUPS if known[g] and vehicle.uncertainty.get(g, 0.0) > 0}
+    return {
+        g: float(vehicle.uncertainty[g]) for g in GROUPS if known[g] and vehicle.uncertainty.get(g, 0.0) > 0
+    }
 
 
 def lay_out(model: GreyBox, candidates: Sequence[str]) -> Layout:
@@ -93,7 +95,9 @@ def priors(layout: Layout, names: Sequence[str], free: Sequence[str] = ()) -> Pr
             precision.append((uncertain[name] * np.maximum(np.abs(stated_values), 1e-3)) ** -2)
         else:
             precision.append((FREE * scales(layout, name)) ** -2)
-    return Priors(np.concatenate(mean) if mean else np.zeros(0), np.concatenate(precision) if mean else np.zeros(0))
+    return Priors(
+        np.concatenate(mean) if mean else np.zeros(0), np.concatenate(precision) if mean else np.zeros(0)
+    )
 
 
 def scales(layout: Layout, name: str) -> Array:

@@ -54,8 +54,9 @@ class Score:
     gain: float
 
 
-def project(statistics: Statistics, layout: Layout, base: Sequence[str], effect: str, free: Sequence[str] = ()
-            ) -> tuple[Array, Array, Array]:
+def project(
+    statistics: Statistics, layout: Layout, base: Sequence[str], effect: str, free: Sequence[str] = ()
+) -> tuple[Array, Array, Array]:
     """Return score (B, p) by window, its gradient at the null (p,) and information (p, p), the base taken out.
 
     The effect itself is left out of the base where it stands for a stated uncertainty.
@@ -93,7 +94,9 @@ def inflation(by_window: Array, information: Array, run: Array) -> float:
     return float(max(1.0, ratio))
 
 
-def score(statistics: Statistics, layout: Layout, base: Sequence[str], effect: str, free: Sequence[str] = ()) -> Score:
+def score(
+    statistics: Statistics, layout: Layout, base: Sequence[str], effect: str, free: Sequence[str] = ()
+) -> Score:
     """Test one effect at the fitted null; see the module's text."""
     by_window, gradient, information = project(statistics, layout, base, effect, free)
     factor = inflation(by_window, information, statistics.run)
@@ -122,8 +125,12 @@ def score(statistics: Statistics, layout: Layout, base: Sequence[str], effect: s
         off = along - centre
         within, beyond = np.diag(spread) + prior, np.diag(spread + 1.0)
         statistic = float(off @ np.linalg.solve(within, off))
-        evidence = 0.5 * float(statistic - off @ np.linalg.solve(beyond, off)
-                               + np.linalg.slogdet(within)[1] - np.linalg.slogdet(beyond)[1])
+        evidence = 0.5 * float(
+            statistic
+            - off @ np.linalg.solve(beyond, off)
+            + np.linalg.slogdet(within)[1]
+            - np.linalg.slogdet(beyond)[1]
+        )
     degrees = len(values)
     windows = len(by_window)
     p_value = float(stats.f.sf(statistic / degrees, degrees, max(windows - degrees, 4)))

@@ -27,8 +27,11 @@ def inputs_of(log: Log) -> dict[str, list[Array]]:
         for k, n in enumerate(("phi", "theta", "psi")):
             columns[n] = run.euler[:, k]
         if run.command is not None:
-            names = [f"thruster_{i + 1}" for i in range(run.command.shape[1])] if run.thrusters is not None else [
-                f"tau_{a}" for a in AXES]
+            names = (
+                [f"thruster_{i + 1}" for i in range(run.command.shape[1])]
+                if run.thrusters is not None
+                else [f"tau_{a}" for a in AXES]
+            )
             columns.update({n: run.command[:, i] for i, n in enumerate(names)})
         if run.position is not None:
             columns.update({n: run.position[:, k] for k, n in enumerate("xyz")})
@@ -52,7 +55,9 @@ def _features(name: str, x: Array) -> Array:
     return np.stack([z, np.abs(z) * z, z * z, np.tanh(2 * z)], axis=1)
 
 
-def depends_on(model: GreyBox, log: Log, windows: Windows, derivative: dict | None = None) -> dict[str, dict[str, float]]:
+def depends_on(
+    model: GreyBox, log: Log, windows: Windows, derivative: dict | None = None
+) -> dict[str, dict[str, float]]:
     """Return by degree of freedom the share of the residual's energy that each measured input explains.
 
     A ridge regression on simple functions of every input is fitted on all folds but one and judged on that

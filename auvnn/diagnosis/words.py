@@ -25,7 +25,9 @@ def number(value: float | None, std: float | None, unit: str) -> str:
 
 def parameters(candidate: dict[str, Any]) -> str:
     """Return a candidate's parameters on one line."""
-    return ", ".join(f"{n} {number(p['value'], p['std'], p['unit'])}" for n, p in candidate["parameters"].items())
+    return ", ".join(
+        f"{n} {number(p['value'], p['std'], p['unit'])}" for n, p in candidate["parameters"].items()
+    )
 
 
 def tell(diagnosis: Diagnosis) -> list[str]:
@@ -33,17 +35,24 @@ def tell(diagnosis: Diagnosis) -> list[str]:
     by_name = {c["effect"]: c for c in diagnosis.candidates}
     lines = []
     if diagnosis.verdict == "adequate":
-        return [f"Nothing is missing that this log can show: the model is adequate within its stated "
-                f"uncertainties (global p = {diagnosis.global_p_value:.2g})."]
+        return [
+            f"Nothing is missing that this log can show: the model is adequate within its stated "
+            f"uncertainties (global p = {diagnosis.global_p_value:.2g})."
+        ]
     for step in diagnosis.steps:
         if step["verdict"] == "named":
             for name in step["effects"]:
                 lines.append(f"Missing: {name} ({EFFECTS.get(name).cause}): {parameters(by_name[name])}.")
         elif step["verdict"] == "ambiguous":
-            lines.append("One of these is missing, and this log cannot tell which: " + ", ".join(step["effects"]) + ".")
+            lines.append(
+                "One of these is missing, and this log cannot tell which: " + ", ".join(step["effects"]) + "."
+            )
         elif step["verdict"] == "unknown":
-            lines.append("Something is missing that no effect of the catalogue explains." if not lines else
-                         "What is left is not noise, and no further effect of the catalogue explains it.")
+            lines.append(
+                "Something is missing that no effect of the catalogue explains."
+                if not lines
+                else "What is left is not noise, and no further effect of the catalogue explains it."
+            )
         elif lines:
             lines.append("With that the model is adequate: what is left looks like noise.")
     if diagnosis.depends_on:

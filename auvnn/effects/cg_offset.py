@@ -22,7 +22,9 @@ class CgOffset(Effect):
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
         """Return the shift in body axes; a few per cent of the vehicle's length is plausible."""
         scale = 0.02 * float(vehicle.length)
-        return tuple(Parameter(n, "m", 0.0, scale, -float(vehicle.length), float(vehicle.length)) for n in "xyz")
+        return tuple(
+            Parameter(n, "m", 0.0, scale, -float(vehicle.length), float(vehicle.length)) for n in "xyz"
+        )
 
     def body(self, body: Body, moment: Moment | None) -> Body:
         """Move the centre of gravity."""

@@ -25,8 +25,10 @@ class ConstantForce(Effect):
         """Return the six components; two per cent of the weight, at a tenth of the length, is plausible."""
         force = 0.02 * float(vehicle.mass) * float(vehicle.gravity)
         moment = 0.1 * force * float(vehicle.length)
-        return tuple(Parameter(a, "N" if i < 3 else "N m", 0.0, (force, moment)[i >= 3], -1e6, 1e6)
-                     for i, a in enumerate(AXES))
+        return tuple(
+            Parameter(a, "N" if i < 3 else "N m", 0.0, (force, moment)[i >= 3], -1e6, 1e6)
+            for i, a in enumerate(AXES)
+        )
 
     def wrench(self, moment: Moment, body: Body) -> Tensor:
         """Return the constant wrench."""

@@ -25,8 +25,10 @@ class OceanCurrent(Effect):
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
         """Return the three components of the current, NED."""
-        return tuple(Parameter(n, "m/s", 0.0, s, -5.0, 5.0) for n, s in
-                     (("v_north", 0.3), ("v_east", 0.3), ("v_down", 0.1)))
+        return tuple(
+            Parameter(n, "m/s", 0.0, s, -5.0, 5.0)
+            for n, s in (("v_north", 0.3), ("v_east", 0.3), ("v_down", 0.1))
+        )
 
     def water(self, moment: Moment) -> tuple[Tensor, Tensor]:
         """Return the current and no acceleration."""

@@ -25,8 +25,16 @@ def predict(model: GreyBox, windows: Windows, initial: Tensor) -> tuple[Tensor, 
     Returns:
         eta (B, L, 7) and nu (B, L, 6), of the vehicle itself and not of what sensors report.
     """
-    run = rollout(model, initial[:, :7], initial[:, 7:], windows.inputs, windows.times, max_step=MAX_STEP,
-                  warmup=windows.warmup, check=False)
+    run = rollout(
+        model,
+        initial[:, :7],
+        initial[:, 7:],
+        windows.inputs,
+        windows.times,
+        max_step=MAX_STEP,
+        warmup=windows.warmup,
+        check=False,
+    )
     return run.eta, run.nu
 
 

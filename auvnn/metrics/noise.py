@@ -31,14 +31,21 @@ def attitude_noise(run: Run) -> Array:
     return white(run, np.where(np.isfinite(run.quaternion).all(1)[:, None], angle, np.nan))
 
 
-def noisier(run: Run, seed: int = 0) -> Run:
-    """Return the run with white noise added to attitude, velocity and acceleration, as large as its own."""
-    random = np.random.default_rng(seed)
+def noisier(run: Run, repeat: int = 0) -> Run:
+    """Return the run with white noise added to attitude, velocity and acceleration, as large as its own.
+
+    The noise is the same whenever it is asked for, and another one for another run or `repeat`.
+    """
+    random = np.random.default_rng([abs(run.number), repeat])
     half = 0.5 * attitude_noise(run) * random.normal(size=(run.samples, 3))
     small = np.concatenate([np.sqrt(np.clip(1 - (half**2).sum(1, keepdims=True), 0, 1)), half], axis=1)
 
     def louder(x: Array) -> Array:
         return x + white(run, x) * random.normal(size=x.shape)
 
-    return replace(run, quaternion=multiply(run.quaternion, small), nu=louder(run.nu),
-                   nu_dot=None if run.nu_dot is None else louder(run.nu_dot))
+    return replace(
+        run,
+        quaternion=multiply(run.quaternion, small),
+        nu=louder(run.nu),
+        nu_dot=None if run.nu_dot is None else louder(run.nu_dot),
+    )

@@ -22,6 +22,8 @@ from auvnn.physics.attitude import quat_to_matrix
 
 Array = NDArray[np.float64]
 METHODS = ("measured", "local_polynomial")
+# Times that noise is drawn to find out what it leaves.
+REPEATS = 4
 
 
 @dataclass(frozen=True)
@@ -45,8 +47,10 @@ class Derivative:
         """Return what the answers state of it; figures are comparable only at equal bandwidth."""
         if self.method == "measured":
             return {"method": "measured", "bandwidth_hz": 0.5 / dt}
-        return {"method": f"local polynomial of order {self.order} over {2 * self.half_width + 1} samples",
-                "bandwidth_hz": bandwidth_hz(dt, self.half_width, self.order)}
+        return {
+            "method": f"local polynomial of order {self.order} over {2 * self.half_width + 1} samples",
+            "bandwidth_hz": bandwidth_hz(dt, self.half_width, self.order),
+        }
 
 
 def choose_derivative(log: Log, options: Mapping[str, Any] | None = None) -> Derivative:
@@ -157,11 +161,14 @@ class _Replay:
     def __init__(self, model: GreyBox, run: Run) -> None:
         command = run.thrusters if model.actuation == "thrusters" else run.wrench
         if command is None:
-            raise InputError(f"run {run.number} has no commands of the kind that drives the model "
-                             f"({model.actuation})")
+            raise InputError(
+                f"run {run.number} has no commands of the kind that drives the model ({model.actuation})"
+            )
         if command.shape[1] != model.actuators.size:
-            raise InputError(f"run {run.number} has {command.shape[1]} thruster columns, but {model.vehicle.name} "
-                             f"has {model.actuators.size} thrusters: give one column per thruster of the model file")
+            raise InputError(
+                f"run {run.number} has {command.shape[1]} thruster columns, but {model.vehicle.name} "
+                f"has {model.actuators.size} thrusters: give one column per thruster of the model file"
+            )
         known = np.isfinite(command).all(1)
 
         def tensor(x: Array | None) -> torch.Tensor | None:
@@ -169,22 +176,28 @@ class _Replay:
 
         self.model = model
         self.good = known & np.isfinite(run.quaternion).all(1) & np.isfinite(run.nu).all(1)
-        self.inputs = Inputs(torch.tensor(np.where(known[:, None], command, 0.0)), tensor(run.fins),
-                             tensor(run.voltage), tensor(run.altitude))
+        self.inputs = Inputs(
+            torch.tensor(np.where(known[:, None], command, 0.0)),
+            tensor(run.fins),
+            tensor(run.voltage),
+            tensor(run.altitude),
+        )
         self.times = torch.tensor(run.t)
         # A missing position or attitude must not make the rest of the row a missing number.
         eta = torch.tensor(np.where(np.isfinite(run.eta), run.eta, np.array([0, 0, 0, 1.0, 0, 0, 0])))
         with torch.no_grad():
             self.state = model.unsense(Sensed(eta[:, :3], eta[:, 3:], torch.tensor(np.nan_to_num(run.nu))))
-            self.drive = model.actuators.drive(self.inputs.command, self.times,
-                                               model.using("command") + model.using("respond"))
+            self.drive = model.actuators.drive(
+                self.inputs.command, self.times, model.using("command") + model.using("respond")
+            )
 
     def accelerations(self, thrust: Callable[[Drive], torch.Tensor]) -> Array:
         """Return what the sensors would report under a thrust, (N, 6); NaN where a sample is missing."""
         at = self.state
         with torch.no_grad():
-            rate = self.model.nu_dot(at.position, quat_to_matrix(at.quaternion), at.nu, thrust(self.drive),
-                                     self.inputs, self.times)
+            rate = self.model.nu_dot(
+                at.position, quat_to_matrix(at.quaternion), at.nu, thrust(self.drive), self.inputs, self.times
+            )
             seen = self.model.sense(Sensed(at.position, at.quaternion, at.nu, rate)).nu_dot
         assert seen is not None
         return np.where(self.good[:, None], seen.numpy(), np.nan)
@@ -195,12 +208,15 @@ def one_step(model: GreyBox, log: Log, derivative: Derivative) -> list[OneStep]:
     found = []
     for run in log.runs:
         measured, predicted = accelerations(model, run, derivative)
-        # The same once more with as much noise again: what changes is what noise does, to data and model alike.
-        again = accelerations(model, noisier(run), derivative)
-        floor = (again[0] - again[1]) - (measured - predicted)
-        to_wrench = inertia_of(model, run).T
-        found.append(OneStep(run.number, run.t, measured, predicted, (measured - predicted) @ to_wrench, _rms(floor),
-                             _rms(floor @ to_wrench)))
+        gap, to_wrench = measured - predicted, inertia_of(model, run).T
+        # The same again with as much noise once more: what changes is what noise does, to data and model alike.
+        louder = [accelerations(model, noisier(run, k), derivative) for k in range(REPEATS)]
+        floor = np.concatenate([a - b - gap for a, b in louder])
+        found.append(
+            OneStep(
+                run.number, run.t, measured, predicted, gap @ to_wrench, _rms(floor), _rms(floor @ to_wrench)
+            )
+        )
     return found
 
 
@@ -225,8 +241,15 @@ def inertia_of(model: GreyBox, run: Run) -> Array:
     moment = None
     if model.time_varying:
         zero3, zero6 = torch.zeros(3, dtype=torch.float64), torch.zeros(6, dtype=torch.float64)
-        moment = Moment(torch.tensor(float(run.t[0])), zero3, torch.eye(3, dtype=torch.float64), zero6, zero6,
-                        zero6, torch.zeros(model.actuators.size, dtype=torch.float64))
+        moment = Moment(
+            torch.tensor(float(run.t[0])),
+            zero3,
+            torch.eye(3, dtype=torch.float64),
+            zero6,
+            zero6,
+            zero6,
+            torch.zeros(model.actuators.size, dtype=torch.float64),
+        )
     with torch.no_grad():
         return model.prepare(moment).total.numpy()
 
@@ -242,7 +265,9 @@ def scores(parts: list[OneStep]) -> dict[str, dict[str, float]]:
         good = np.isfinite(measured[:, k]) & np.isfinite(predicted[:, k])
         gap = measured[good, k] - predicted[good, k]
         total = float(np.sum((measured[good, k] - measured[good, k].mean()) ** 2)) if good.any() else 0.0
-        out[name] = {"rmse": float(np.sqrt(np.mean(gap**2))) if good.any() else np.nan,
-                     "noise_floor": float(floor[k]),
-                     "r2": 1.0 - float(np.sum(gap**2)) / total if total > 0 else np.nan}
+        out[name] = {
+            "rmse": float(np.sqrt(np.mean(gap**2))) if good.any() else np.nan,
+            "noise_floor": float(floor[k]),
+            "r2": 1.0 - float(np.sum(gap**2)) / total if total > 0 else np.nan,
+        }
     return out

@@ -12,10 +12,10 @@ from auvnn.effects import Sensed
 from auvnn.errors import InputError
 from auvnn.logs import Log
 from auvnn.logs.noise import noise_std
+from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.windows import VELOCITY, Windows, cut_windows
 from auvnn.models import GreyBox
 from auvnn.models.rollout import LIMIT
-from auvnn.metrics.free_run import initial_states, predict
 
 Array = NDArray[np.float64]
 HORIZONS = ("0.5", "1", "2", "5", "10", "full")
@@ -60,14 +60,18 @@ class Rolled:
     count: Array
     diverged: NDArray[np.bool_]
 
-    def nrmse(self, scale: Scale, chosen: NDArray[np.bool_] | slice = slice(None), held: bool = False) -> Array:
+    def nrmse(
+        self, scale: Scale, chosen: NDArray[np.bool_] | slice = slice(None), held: bool = False
+    ) -> Array:
         """Return each velocity's error over its standard deviation, (6,); NaN where it is not excited."""
         squared = (self.held if held else self.squared)[chosen].sum(0)
         with np.errstate(invalid="ignore", divide="ignore"):
             value = np.sqrt(squared / self.count[chosen].sum(0)) / scale.std
         return np.where(scale.excited, value, np.nan)
 
-    def total(self, scale: Scale, chosen: NDArray[np.bool_] | slice = slice(None), held: bool = False) -> float:
+    def total(
+        self, scale: Scale, chosen: NDArray[np.bool_] | slice = slice(None), held: bool = False
+    ) -> float:
         """Return the mean error of the excited velocities."""
         value = self.nrmse(scale, chosen, held)
         return float(np.nanmean(value)) if np.isfinite(value).any() else float("nan")
@@ -80,8 +84,9 @@ def roll(model: GreyBox, log: Log, horizon: str, scale: Scale) -> Rolled | None:
     """
     length = np.inf if horizon == "full" else float(horizon)
     try:
-        windows = cut_windows(log, length, None if np.isinf(length) else 0.5 * length, warmup=WARMUP,
-                              kind=model.actuation)
+        windows = cut_windows(
+            log, length, None if np.isinf(length) else 0.5 * length, warmup=WARMUP, kind=model.actuation
+        )
     except InputError:
         return None
     with torch.no_grad():
@@ -95,28 +100,42 @@ def roll(model: GreyBox, log: Log, horizon: str, scale: Scale) -> Rolled | None:
     error = np.where(gone[..., None], CUT * scale.std, measured - seen)
     error[diverged] = np.clip(error[diverged], -CUT * scale.std, CUT * scale.std)
     stay = measured - measured[:, :1]
-    return Rolled(windows, np.where(gone[..., None], np.nan, seen), (error**2 * mask).sum(1),
-                  (stay**2 * mask).sum(1), mask.sum(1), diverged)
+    return Rolled(
+        windows,
+        np.where(gone[..., None], np.nan, seen),
+        (error**2 * mask).sum(1),
+        (stay**2 * mask).sum(1),
+        mask.sum(1),
+        diverged,
+    )
 
 
-def table(model: GreyBox, log: Log, scale: Scale, horizons: tuple[str, ...] = HORIZONS
-          ) -> tuple[dict[str, dict], dict[str, Rolled]]:
+def table(
+    model: GreyBox, log: Log, scale: Scale, horizons: tuple[str, ...] = HORIZONS
+) -> tuple[dict[str, dict], dict[str, Rolled]]:
     """Return `rollout` of the comparison, and the runs behind it."""
     out: dict[str, dict] = {}
     kept: dict[str, Rolled] = {}
     for horizon in horizons:
         rolled = roll(model, log, horizon, scale)
         if rolled is None:
-            out[horizon] = {**{n: {"rmse": None, "nrmse": None} for n in NAMES}, "total": None,
-                            "persistence": None, "diverged": 0, "windows": 0}
+            out[horizon] = {
+                **{n: {"rmse": None, "nrmse": None} for n in NAMES},
+                "total": None,
+                "persistence": None,
+                "diverged": 0,
+                "windows": 0,
+            }
             continue
         with np.errstate(invalid="ignore", divide="ignore"):
             rmse = np.sqrt(rolled.squared.sum(0) / rolled.count.sum(0))
         nrmse = rolled.nrmse(scale)
         out[horizon] = {
             **{n: {"rmse": float(rmse[k]), "nrmse": float(nrmse[k])} for k, n in enumerate(NAMES)},
-            "total": rolled.total(scale), "persistence": rolled.total(scale, held=True),
-            "diverged": int(rolled.diverged.sum()), "windows": len(rolled.windows),
+            "total": rolled.total(scale),
+            "persistence": rolled.total(scale, held=True),
+            "diverged": int(rolled.diverged.sum()),
+            "windows": len(rolled.windows),
         }
         kept[horizon] = rolled
     return out, kept

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,8 +14,26 @@ from auvnn.logs import Log, Run
 from auvnn.logs.segments import stretches
 from auvnn.models.inputs import Inputs
 
-CHANNELS = ("x", "y", "z", "phi", "theta", "psi", "u", "v", "w", "p", "q", "r",
-            "du", "dv", "dw", "dp", "dq", "dr")
+CHANNELS = (
+    "x",
+    "y",
+    "z",
+    "phi",
+    "theta",
+    "psi",
+    "u",
+    "v",
+    "w",
+    "p",
+    "q",
+    "r",
+    "du",
+    "dv",
+    "dw",
+    "dp",
+    "dq",
+    "dr",
+)
 POSITION, ATTITUDE, VELOCITY, ACCELERATION = slice(0, 3), slice(3, 6), slice(6, 12), slice(12, 18)
 
 
@@ -61,11 +80,20 @@ class Windows:
         """Return some of the windows."""
         index = chosen if isinstance(chosen, slice) else torch.as_tensor(chosen)
         i = self.inputs
-        inputs = Inputs(i.command[index], *(None if x is None else x[index] for x in (i.fins, i.voltage, i.altitude)))
+        inputs = Inputs(
+            i.command[index], *(None if x is None else x[index] for x in (i.fins, i.voltage, i.altitude))
+        )
         return replace(
-            self, run=self.run[chosen], first=self.first[chosen], times=self.times[index], eta=self.eta[index],
-            nu=self.nu[index], nu_dot=None if self.nu_dot is None else self.nu_dot[index], inputs=inputs,
-            mask=self.mask[index], length=self.length[chosen],
+            self,
+            run=self.run[chosen],
+            first=self.first[chosen],
+            times=self.times[index],
+            eta=self.eta[index],
+            nu=self.nu[index],
+            nu_dot=None if self.nu_dot is None else self.nu_dot[index],
+            inputs=inputs,
+            mask=self.mask[index],
+            length=self.length[chosen],
         )
 
 
@@ -128,10 +156,14 @@ def cut_windows(
             known &= np.isfinite(run.fins).all(axis=1)
         for part in stretches(run.t, known, None, 2):
             span = run.t[part.stop - 1] - run.t[part.start] if np.isinf(horizon) else horizon
-            pieces += [(run, command, a, b, part.start) for a, b in
-                       _starts(run, part, span, stride or span, partial or bool(np.isinf(horizon)))]
+            pieces += [
+                (run, command, a, b, part.start)
+                for a, b in _starts(run, part, span, stride or span, partial or bool(np.isinf(horizon)))
+            ]
     if not pieces:
-        raise InputError(f"no stretch of {log.name} is {horizon:g} s long without a gap: choose a shorter horizon")
+        raise InputError(
+            f"no stretch of {log.name} is {horizon:g} s long without a gap: choose a shorter horizon"
+        )
     length = np.array([b - a + 1 for _, _, a, b, _ in pieces])
     rows = int(length.max())
     before = max((int(np.ceil(warmup / run.dt - 1e-6)) for run, *_ in pieces), default=0)
@@ -139,7 +171,9 @@ def cut_windows(
     for _, _, a, b, begin in pieces:
         # Padding repeats the last row; history before the stretch repeats its first.
         index.append(np.clip(np.arange(a - before, a + rows), begin, b))
-    gather = lambda get: np.stack([get(run, command)[i] for (run, command, *_), i in zip(pieces, index, strict=True)])  # noqa: E731
+
+    def gather(get: Callable[[Run, np.ndarray], np.ndarray]) -> np.ndarray:
+        return np.stack([get(run, command)[i] for (run, command, *_), i in zip(pieces, index, strict=True)])
 
     def optional(name: str) -> np.ndarray | None:
         if any(getattr(run, name) is None for run, *_ in pieces):
@@ -152,9 +186,16 @@ def cut_windows(
         missing = max(0, before - (a - begin))
         times[row, :missing] = run.t[begin] - run.dt * np.arange(missing, 0, -1)
     measured = np.concatenate(
-        [gather(lambda run, _, n=n, w=w: np.full((run.samples, w), np.nan) if getattr(run, n) is None
-                else getattr(run, n))[:, before:] for n, w in
-         (("position", 3), ("quaternion", 4), ("nu", 6), ("nu_dot", 6))], axis=-1)
+        [
+            gather(
+                lambda run, _, n=n, w=w: (
+                    np.full((run.samples, w), np.nan) if getattr(run, n) is None else getattr(run, n)
+                )
+            )[:, before:]
+            for n, w in (("position", 3), ("quaternion", 4), ("nu", 6), ("nu_dot", 6))
+        ],
+        axis=-1,
+    )
     spikes = gather(_spikes)[:, before:]
     seen = np.isfinite(measured)
     attitude = np.repeat(seen[..., 3:7].all(-1, keepdims=True), 3, axis=-1)
@@ -164,15 +205,23 @@ def cut_windows(
     filled[..., 3] = np.where(attitude[..., 0], filled[..., 3], 1.0)
     double = {"dtype": torch.float64}
     fins, voltage, altitude = optional("fins"), optional("voltage"), optional("altitude")
-    inputs = Inputs(torch.tensor(gather(lambda _, command: command), **double),
-                    *(None if x is None else torch.tensor(x, **double) for x in (fins, voltage, altitude)))
+    inputs = Inputs(
+        torch.tensor(gather(lambda _, command: command), **double),
+        *(None if x is None else torch.tensor(x, **double) for x in (fins, voltage, altitude)),
+    )
     eta = torch.tensor(filled[..., :7], **double)
     has_rate = bool(mask[..., ACCELERATION].any())
     return Windows(
-        np.array([run.number for run, *_ in pieces]), np.array([a for _, _, a, *_ in pieces]),
-        torch.tensor(times, **double), eta, torch.tensor(filled[..., 7:13], **double),
-        torch.tensor(filled[..., 13:], **double) if has_rate else None, inputs, torch.tensor(mask, **double),
-        length, before,
+        np.array([run.number for run, *_ in pieces]),
+        np.array([a for _, _, a, *_ in pieces]),
+        torch.tensor(times, **double),
+        eta,
+        torch.tensor(filled[..., 7:13], **double),
+        torch.tensor(filled[..., 13:], **double) if has_rate else None,
+        inputs,
+        torch.tensor(mask, **double),
+        length,
+        before,
     )
 
 

@@ -51,7 +51,9 @@ class Actuators(nn.Module):
         if actuation not in ("thrusters", "wrench"):
             raise ConfigError(f"actuation={actuation!r} is unknown: choose thrusters or wrench")
         if actuation == "thrusters" and not vehicle.thrusters:
-            raise ConfigError(f"{vehicle.name} has no thrusters in its model file: log tau_X ... tau_N instead")
+            raise ConfigError(
+                f"{vehicle.name} has no thrusters in its model file: log tau_X ... tau_N instead"
+            )
         self.actuation = actuation
         double = {"dtype": torch.float64}
         if actuation == "wrench":
@@ -67,7 +69,9 @@ class Actuators(nn.Module):
         for index, unit in enumerate(units):
             if unit.curve != "quadratic":
                 self.tables.append(index)
-                self.register_buffer(f"table_command_{index}", torch.tensor(list(unit.curve.command), **double))
+                self.register_buffer(
+                    f"table_command_{index}", torch.tensor(list(unit.curve.command), **double)
+                )
                 self.register_buffer(f"table_thrust_{index}", torch.tensor(list(unit.curve.thrust), **double))
 
     @property
@@ -135,13 +139,18 @@ def _lagged(demand: Tensor, times: Tensor, effect: Effect, substeps: int, warmup
         states.append(state)
         state = row + (state - row) * left
     gap = (torch.stack(states, dim=-2) - demand)[..., warmup:, :]
-    demand, answer = demand[..., warmup:, :], [x[..., warmup:, :] for x in
-                                               (answer.end, answer.mean, answer.slope, answer.start)]
+    demand, answer = (
+        demand[..., warmup:, :],
+        [x[..., warmup:, :] for x in (answer.end, answer.mean, answer.slope, answer.start)],
+    )
     end, mean, slope, start = answer
     means, slopes = [], []
     for part in range(substeps):
         now = gap * end**part
         means.append((demand + now * mean).unbind(-2))
         slopes.append((now * slope).unbind(-2))
-    return Drive([list(x) for x in zip(*means, strict=True)], [list(x) for x in zip(*slopes, strict=True)],
-                 list((demand + gap * start).unbind(-2)))
+    return Drive(
+        [list(x) for x in zip(*means, strict=True)],
+        [list(x) for x in zip(*slopes, strict=True)],
+        list((demand + gap * start).unbind(-2)),
+    )

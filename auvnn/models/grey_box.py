@@ -85,13 +85,17 @@ class GreyBox(nn.Module):
         names = [e.name for e in members]
         for effect in members:
             if names.count(effect.name) > 1:
-                raise ConfigError(f"effect {effect.name} is given twice: give it once, with all its parameters")
+                raise ConfigError(
+                    f"effect {effect.name} is given twice: give it once, with all its parameters"
+                )
             clash = [n for n in effect.excludes if n in names]
             if clash:
                 raise ConfigError(f"effects {effect.name} and {clash[0]} exclude each other: keep one")
         self.effects = nn.ModuleList(members)
-        self._by_hook = {h: [e for e in members if h in e.hooks()] for h in
-                         ("command", "respond", "thrust", "water", "body", "wrench", "sense")}
+        self._by_hook = {
+            h: [e for e in members if h in e.hooks()]
+            for h in ("command", "respond", "thrust", "water", "body", "wrench", "sense")
+        }
         self.time_varying = any(e.time_varying for e in self._by_hook["body"])
         self._constants(vehicle)
 
@@ -112,13 +116,17 @@ class GreyBox(nn.Module):
         for name in ("linear", "quadratic"):
             keep(f"element_{name}", [list(getattr(e, name)) for e in elements] or None)
         # Geometry never changes: the way from the vehicle's velocity to each part's own is worked out once.
-        keep("element_transform", [element_transform(_tensor(e.position), _tensor(e.axes)).tolist() for e in elements]
-             or None)
+        keep(
+            "element_transform",
+            [element_transform(_tensor(e.position), _tensor(e.axes)).tolist() for e in elements] or None,
+        )
         fins = vehicle.fins
         for name in ("area", "lift_slope", "stall"):
             keep(f"fin_{name}", [float(getattr(f, name)) for f in fins] or None)
-        keep("fin_frame", fin_frame(_tensor([f.position for f in fins]), _tensor([f.axis for f in fins]))
-             if fins else None)
+        keep(
+            "fin_frame",
+            fin_frame(_tensor([f.position for f in fins]), _tensor([f.axis for f in fins])) if fins else None,
+        )
 
     def _known(self, name: str) -> Any:
         return getattr(self, f"known_{name}")
@@ -141,7 +149,9 @@ class GreyBox(nn.Module):
         for effect in self.effects:
             if effect.name == name:
                 return effect
-        raise ConfigError(f"the model has no effect {name!r}; it has: {', '.join(self.effect_names) or 'none'}")
+        raise ConfigError(
+            f"the model has no effect {name!r}; it has: {', '.join(self.effect_names) or 'none'}"
+        )
 
     def with_effects(self, wanted: Sequence[str] | Mapping[str, Mapping[str, float] | None]) -> GreyBox:
         """Return the model with further effects, at the given values or at their nulls.
@@ -163,8 +173,24 @@ class GreyBox(nn.Module):
 
     def prepare(self, moment: Moment | None = None) -> Prepared:
         """Work out body and inertia matrices; `moment` is needed only where an effect varies in time."""
-        body = Body(*(self._known(n) for n in ("mass", "weight", "buoyancy", "cg", "cb", "inertia", "added_mass",
-                                               "linear", "quadratic", "element_linear", "element_quadratic")))
+        body = Body(
+            *(
+                self._known(n)
+                for n in (
+                    "mass",
+                    "weight",
+                    "buoyancy",
+                    "cg",
+                    "cb",
+                    "inertia",
+                    "added_mass",
+                    "linear",
+                    "quadratic",
+                    "element_linear",
+                    "element_quadratic",
+                )
+            )
+        )
         for effect in self.using("body"):
             body = effect.body(body, moment)
         rigid = rigid_body_inertia(body.mass, body.inertia, body.cg)
@@ -213,10 +239,13 @@ class GreyBox(nn.Module):
         moment_time = torch.as_tensor(time, dtype=nu.dtype, device=nu.device)
         lead = torch.broadcast_shapes(moment_time.shape, command.shape[:-1])
         drive = self.actuators.drive(
-            command.expand(*lead, self.actuators.size).unsqueeze(-2), moment_time.expand(lead).unsqueeze(-1),
+            command.expand(*lead, self.actuators.size).unsqueeze(-2),
+            moment_time.expand(lead).unsqueeze(-1),
             self.using("command"),
         )
-        return self.nu_dot(eta[..., :3], quat_to_matrix(eta[..., 3:]), nu, drive.start[0], inputs, moment_time)
+        return self.nu_dot(
+            eta[..., :3], quat_to_matrix(eta[..., 3:]), nu, drive.start[0], inputs, moment_time
+        )
 
     def nu_dot(
         self,
@@ -251,8 +280,18 @@ class GreyBox(nn.Module):
         time: Tensor,
         prepared: Prepared | None,
     ) -> tuple[dict[str, Tensor], Prepared]:
-        moment = Moment(time, position, rotation, nu, nu, torch.zeros_like(nu), inputs.command, inputs.fins,
-                        inputs.voltage, inputs.altitude)
+        moment = Moment(
+            time,
+            position,
+            rotation,
+            nu,
+            nu,
+            torch.zeros_like(nu),
+            inputs.command,
+            inputs.fins,
+            inputs.voltage,
+            inputs.altitude,
+        )
         nu_r, moving = nu, self.using("water")
         if moving:
             velocity, acceleration = moving[0].water(moment)
@@ -261,8 +300,18 @@ class GreyBox(nn.Module):
                 velocity, acceleration = velocity + more, acceleration + faster
             nu_c, nu_c_dot = water_velocity(rotation, nu[..., 3:], velocity, acceleration)
             nu_r = nu - nu_c
-            moment = Moment(time, position, rotation, nu, nu_r, nu_c_dot, inputs.command, inputs.fins,
-                            inputs.voltage, inputs.altitude)
+            moment = Moment(
+                time,
+                position,
+                rotation,
+                nu,
+                nu_r,
+                nu_c_dot,
+                inputs.command,
+                inputs.fins,
+                inputs.voltage,
+                inputs.altitude,
+            )
         if prepared is None or self.time_varying:
             prepared = self.prepare(moment)
         body, terms = prepared.body, {}
@@ -289,8 +338,12 @@ class GreyBox(nn.Module):
         if self._known("fin_area") is not None:
             # Fins whose angles are not known are still there: they are taken as held at zero.
             angles = nu_r.new_zeros(len(self.vehicle.fins)) if inputs.fins is None else inputs.fins
-            terms["fins"] = fin_wrench(nu_r, angles, *(self._known(f"fin_{n}") for n in
-                                       ("frame", "area", "lift_slope", "stall")), float(self.vehicle.water_density))
+            terms["fins"] = fin_wrench(
+                nu_r,
+                angles,
+                *(self._known(f"fin_{n}") for n in ("frame", "area", "lift_slope", "stall")),
+                float(self.vehicle.water_density),
+            )
         for effect in self.using("wrench"):
             terms[str(effect.name)] = effect.wrench(moment, body)
         return terms, prepared
@@ -316,12 +369,17 @@ class GreyBox(nn.Module):
                 rate = state.nu_dot + sensed.nu_dot - seen.nu_dot
             quaternion = state.quaternion + sensed.quaternion - seen.quaternion
             quaternion = quaternion / torch.linalg.norm(quaternion, dim=-1, keepdim=True)
-            state = Sensed(state.position + sensed.position - seen.position, quaternion,
-                           state.nu + sensed.nu - seen.nu, rate)
+            state = Sensed(
+                state.position + sensed.position - seen.position,
+                quaternion,
+                state.nu + sensed.nu - seen.nu,
+                rate,
+            )
         return state
 
-    def rollout(self, eta0: Tensor, nu0: Tensor, commands: Tensor | Inputs, times: Tensor, **options: Any
-                ) -> Trajectory:
+    def rollout(
+        self, eta0: Tensor, nu0: Tensor, commands: Tensor | Inputs, times: Tensor, **options: Any
+    ) -> Trajectory:
         """Run free from a state: see `auvnn.models.rollout.rollout`."""
         from auvnn.models.rollout import rollout
 

@@ -121,8 +121,11 @@ def rollout(
     rows = torch.broadcast_shapes(inputs.command.shape[:-1], times.shape)
     members = [e for e in model.effects if isinstance(e, Effect)]
     drive = model.actuators.drive(
-        inputs.command.expand(*rows, inputs.command.shape[-1]), times.expand(rows), members,
-        substeps, warmup,
+        inputs.command.expand(*rows, inputs.command.shape[-1]),
+        times.expand(rows),
+        members,
+        substeps,
+        warmup,
     )
     whole, inputs, times = (inputs, times), inputs.rows(warmup), times[..., warmup:]
     state = (eta0.expand(*batch, 7), nu0.expand(*batch, 6))
@@ -135,7 +138,9 @@ def rollout(
             raise ConfigError(f"solver {solver} has no option {sorted(solver_options)[0]!r}")
         eta, nu = _fixed(model, state, inputs, times, drive, substeps, TABLEAUS[solver])
     else:
-        raise ConfigError(f"no solver called '{solver}'. There are: {', '.join(TABLEAUS)}, torchdiffeq:METHOD")
+        raise ConfigError(
+            f"no solver called '{solver}'. There are: {', '.join(TABLEAUS)}, torchdiffeq:METHOD"
+        )
     thrust = torch.stack([row.expand(*batch, row.shape[-1]) for row in drive.start], dim=-2)
     result = Trajectory(times, eta, nu, thrust)
     return _checked(model, result, inputs) if check else result
@@ -170,10 +175,17 @@ def _leading_shape(
     fins = len(model.vehicle.fins)
     if fins and inputs.fins is not None and inputs.fins.shape[-1:] != (fins,):
         raise ConfigError(f"fins of shape {tuple(inputs.fins.shape)}: the vehicle has {fins} fins")
-    leading = {"eta0": eta0.shape[:-1], "nu0": nu0.shape[:-1], "commands": command.shape[:-2],
-               "times": times.shape[:-1]}
-    for name, tensor, sizes in (("fins", inputs.fins, 2), ("voltage", inputs.voltage, 1),
-                                ("altitude", inputs.altitude, 1)):
+    leading = {
+        "eta0": eta0.shape[:-1],
+        "nu0": nu0.shape[:-1],
+        "commands": command.shape[:-2],
+        "times": times.shape[:-1],
+    }
+    for name, tensor, sizes in (
+        ("fins", inputs.fins, 2),
+        ("voltage", inputs.voltage, 1),
+        ("altitude", inputs.altitude, 1),
+    ):
         if tensor is not None:
             if tensor.dim() < sizes or tensor.shape[-sizes] != times.shape[-1]:
                 raise ConfigError(
@@ -195,8 +207,9 @@ TABLEAUS = {
 }
 
 
-def _fixed(model: GreyBox, state: tuple, inputs: Inputs, times: Tensor, drive: Any, substeps: int, tableau: tuple
-           ) -> tuple[Tensor, Tensor]:
+def _fixed(
+    model: GreyBox, state: tuple, inputs: Inputs, times: Tensor, drive: Any, substeps: int, tableau: tuple
+) -> tuple[Tensor, Tensor]:
     # One tensor for the whole state: what costs here is the number of operations, not their size.
     y = torch.cat(state, dim=-1)
     prepared = None if model.time_varying else model.prepare()
@@ -209,11 +222,14 @@ def _fixed(model: GreyBox, state: tuple, inputs: Inputs, times: Tensor, drive: A
     def rate(y: Tensor, thrust: Tensor, row: Inputs, time: Tensor) -> Tensor:
         position, quaternion, nu = y.split((3, 4, 6), dim=-1)
         rotation = quat_to_matrix(quaternion)
-        return torch.cat([
-            matvec(rotation, nu[..., :3]),
-            quat_derivative(quaternion, nu[..., 3:]),
-            model.nu_dot(position, rotation, nu, thrust, row, time, prepared),
-        ], dim=-1)
+        return torch.cat(
+            [
+                matvec(rotation, nu[..., :3]),
+                quat_derivative(quaternion, nu[..., 3:]),
+                model.nu_dot(position, rotation, nu, thrust, row, time, prepared),
+            ],
+            dim=-1,
+        )
 
     out = [y]
     for k, h in enumerate(steps):
@@ -241,15 +257,22 @@ def _fixed(model: GreyBox, state: tuple, inputs: Inputs, times: Tensor, drive: A
 
 def _checked(model: GreyBox, run: Trajectory, inputs: Inputs) -> Trajectory:
     with torch.no_grad():
-        sound = torch.isfinite(run.nu).all(-1) & torch.isfinite(run.eta).all(-1) & (run.nu.abs().amax(-1) < LIMIT)
+        sound = (
+            torch.isfinite(run.nu).all(-1) & torch.isfinite(run.eta).all(-1) & (run.nu.abs().amax(-1) < LIMIT)
+        )
         if bool(sound.all()):
             return run
         count = run.nu.shape[-2]
         flat = sound.reshape(-1, count)
-        eta, nu = run.eta.detach().reshape(-1, count, 7).clone(), run.nu.detach().reshape(-1, count, 6).clone()
+        eta, nu = (
+            run.eta.detach().reshape(-1, count, 7).clone(),
+            run.nu.detach().reshape(-1, count, 6).clone(),
+        )
         times = run.times.expand(sound.shape).reshape(-1, count)
         thrust = run.thrust.reshape(-1, count, run.thrust.shape[-1])
-        command = inputs.command.expand(*sound.shape, inputs.command.shape[-1]).reshape(-1, count, model.actuators.size)
+        command = inputs.command.expand(*sound.shape, inputs.command.shape[-1]).reshape(
+            -1, count, model.actuators.size
+        )
         found = []
         for index in torch.nonzero(~flat.all(-1)).squeeze(-1).tolist():
             last = int(torch.nonzero(~flat[index])[0]) - 1
@@ -261,19 +284,37 @@ def _checked(model: GreyBox, run: Trajectory, inputs: Inputs) -> Trajectory:
                 continue
             extra = inputs.rows(last, last + 1)
             terms = model.wrenches(
-                eta[index, last, :3], quat_to_matrix(eta[index, last, 3:]), nu[index, last], thrust[index, last],
-                Inputs(command[index, last],
-                       *(None if x is None else x.expand(*sound.shape[:-1], *x.shape[len(x.shape) - d:])
-                         .reshape(flat.shape[0], *x.shape[len(x.shape) - d:])[index].squeeze(0)
-                         for x, d in ((extra.fins, 2), (extra.voltage, 1), (extra.altitude, 1)))),
+                eta[index, last, :3],
+                quat_to_matrix(eta[index, last, 3:]),
+                nu[index, last],
+                thrust[index, last],
+                Inputs(
+                    command[index, last],
+                    *(
+                        None
+                        if x is None
+                        else x.expand(*sound.shape[:-1], *x.shape[len(x.shape) - d :])
+                        .reshape(flat.shape[0], *x.shape[len(x.shape) - d :])[index]
+                        .squeeze(0)
+                        for x, d in ((extra.fins, 2), (extra.voltage, 1), (extra.altitude, 1))
+                    ),
+                ),
                 times[index, last],
             )
             term = max(terms, key=lambda n: float(torch.nan_to_num(terms[n], nan=math.inf).abs().max()))
             moment = float(times[index, last])
-            found.append(Divergence(index, moment, term,
-                                    f"trajectory {index} diverged after {moment:g} s; the largest term was: {term}"))
-            eta[index, last + 1:], nu[index, last + 1:] = eta[index, last], nu[index, last]
-        return Trajectory(run.times, eta.reshape(run.eta.shape), nu.reshape(run.nu.shape), run.thrust, tuple(found))
+            found.append(
+                Divergence(
+                    index,
+                    moment,
+                    term,
+                    f"trajectory {index} diverged after {moment:g} s; the largest term was: {term}",
+                )
+            )
+            eta[index, last + 1 :], nu[index, last + 1 :] = eta[index, last], nu[index, last]
+        return Trajectory(
+            run.times, eta.reshape(run.eta.shape), nu.reshape(run.nu.shape), run.thrust, tuple(found)
+        )
 
 
 __all__ = ["LIMIT", "TABLEAUS", "Divergence", "Trajectory", "rollout", "steps_per_interval"]

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from auvnn.config import dump_yaml, read_yaml
+from auvnn.config import dump_yaml, parse_yaml
 from auvnn.effects import effect_class
 from auvnn.errors import ModelError
 from auvnn.models.grey_box import GreyBox
-from auvnn.storage import read_folder, tensors_from_bytes, tensors_to_bytes, write_folder
+from auvnn.storage import folder_exists, read_folder, tensors_from_bytes, tensors_to_bytes, write_folder
 from auvnn.vehicle import Vehicle, load_vehicle
 
 MODEL, WEIGHTS = "model.yaml", "weights.safetensors"
@@ -36,12 +36,13 @@ def load(source: str | Path, actuation: str | None = None) -> GreyBox:
         ConfigError: an unknown name.
     """
     path = Path(source)
-    if not path.is_dir():
+    if not folder_exists(path):
         return from_vehicle(load_vehicle(str(source)), actuation)
-    if not (path / MODEL).exists():
-        raise ModelError(f"{path} holds no {MODEL}: give a saved model's folder, a YAML file or a built-in name")
     files = read_folder(path)
-    data: dict[str, Any] = read_yaml(path / MODEL)
+    if MODEL not in files:
+        raise ModelError(f"{path} holds no {MODEL}: give a saved model's folder, a YAML file or a built-in name")
+    # Parsed from the bytes whose hash was checked, not from the file, which may have changed since.
+    data: dict[str, Any] = parse_yaml(files[MODEL].decode("utf-8"), str(path / MODEL))
     networks = data.pop(SUBNETWORKS, None)
     saved_actuation = data.pop("actuation", None)
     vehicle = Vehicle.from_dict(data, where=str(path / MODEL))

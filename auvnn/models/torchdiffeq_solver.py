@@ -53,10 +53,13 @@ def solve(
         ConfigError: unknown method or option, times that differ by trajectory, or a budget that ran out.
     """
     if method not in (*ADAPTIVE, *FIXED):
-        raise ConfigError(f"torchdiffeq has no method '{method}' for this. There are: "
-                          f"{', '.join((*ADAPTIVE, *FIXED))}")
+        raise ConfigError(
+            f"torchdiffeq has no method '{method}' for this. There are: {', '.join((*ADAPTIVE, *FIXED))}"
+        )
     if times.dim() != 1:
-        raise ConfigError("torchdiffeq takes one time axis for all trajectories: use solver=rk4 for uneven ones")
+        raise ConfigError(
+            "torchdiffeq takes one time axis for all trajectories: use solver=rk4 for uneven ones"
+        )
     for name, value in tolerances.items():
         if name not in ("rtol", "atol"):
             raise ConfigError(f"solver torchdiffeq:{method} has no option '{name}'. There are: rtol, atol")
@@ -82,23 +85,34 @@ def solve(
         begin, end = times[k], times[k + 1]
         entered, wanted, row, spent = thrust, demands[k], rows[k], 0
 
-        def rate(t: Tensor, y: Tensor, begin: Tensor = begin, entered: Tensor = entered,
-                 wanted: Tensor = wanted, row: Inputs = row) -> Tensor:
+        def rate(
+            t: Tensor,
+            y: Tensor,
+            begin: Tensor = begin,
+            entered: Tensor = entered,
+            wanted: Tensor = wanted,
+            row: Inputs = row,
+        ) -> Tensor:
             nonlocal lost, spent
             spent += 1
             if spent > MAX_EVALUATIONS:
-                raise ConfigError(f"torchdiffeq {method} gave up at t = {float(begin):g} s after "
-                                  f"{MAX_EVALUATIONS} evaluations: loosen rtol and atol, or use solver=rk4")
+                raise ConfigError(
+                    f"torchdiffeq {method} gave up at t = {float(begin):g} s after "
+                    f"{MAX_EVALUATIONS} evaluations: loosen rtol and atol, or use solver=rk4"
+                )
             now = wanted
             if lagging:
                 now = lagging[0].respond(entered, wanted, (t - begin).to(y)).end
             rotation = quat_to_matrix(y[..., 3:7] / torch.linalg.norm(y[..., 3:7], dim=-1, keepdim=True))
             nu = y[..., 7:]
-            change = torch.cat([
-                (rotation @ nu[..., :3].unsqueeze(-1)).squeeze(-1),
-                quat_derivative(y[..., 3:7], nu[..., 3:]),
-                model.nu_dot(y[..., :3], rotation, nu, now, row, t.to(y).expand(nu.shape[:-1]), prepared),
-            ], dim=-1)
+            change = torch.cat(
+                [
+                    (rotation @ nu[..., :3].unsqueeze(-1)).squeeze(-1),
+                    quat_derivative(y[..., 3:7], nu[..., 3:]),
+                    model.nu_dot(y[..., :3], rotation, nu, now, row, t.to(y).expand(nu.shape[:-1]), prepared),
+                ],
+                dim=-1,
+            )
             # A lost trajectory would make adaptive methods shrink the step of all for ever: it is held.
             lost = lost | ~torch.isfinite(change).all(-1) | (nu.abs().amax(-1) > LIMIT)
             return torch.where(lost.unsqueeze(-1), torch.zeros_like(change), change)

@@ -64,15 +64,30 @@ def cases(options: Mapping[str, Any]) -> list[Case]:
             EFFECTS.get(name)
     out = []
     for vehicle, hidden, size, noise, excitation, repeat in itertools.product(
-        several("vehicles"), effects, several("sizes"), several("noises"), several("excitations"),
+        several("vehicles"),
+        effects,
+        several("sizes"),
+        several("noises"),
+        several("excitations"),
         range(int(options["repeats"])),
     ):
         if hidden == NOTHING and size != several("sizes")[0]:
             continue
         seed = int(options["seed"]) + repeat
-        out.append(Case(vehicle, hidden, size if hidden != NOTHING else "none", noise, excitation,
-                        str(options["coefficients"]), seed, int(options["runs"]), float(options["duration"]),
-                        float(options["rate"])))
+        out.append(
+            Case(
+                vehicle,
+                hidden,
+                size if hidden != NOTHING else "none",
+                noise,
+                excitation,
+                str(options["coefficients"]),
+                seed,
+                int(options["runs"]),
+                float(options["duration"]),
+                float(options["rate"]),
+            )
+        )
     return out
 
 
@@ -90,17 +105,37 @@ def run_case(case: Case) -> dict[str, Any]:
     began = time.monotonic()
     try:
         model = load(case.vehicle)
-        how = {"excitation": case.excitation, "noise": case.noise, "seed": case.seed, "runs": case.runs,
-               "duration": case.duration, "rate": case.rate}
+        how = {
+            "excitation": case.excitation,
+            "noise": case.noise,
+            "seed": case.seed,
+            "runs": case.runs,
+            "duration": case.duration,
+            "rate": case.rate,
+        }
         hidden = {} if case.hidden == NOTHING else {case.hidden: sized(model, case.hidden, case.size, **how)}
         step = STEP_WITHOUT_NOISE if case.noise == "none" else STEP_WITH_NOISE
         made = simulate(model, hidden=hidden, coefficients=case.coefficients, max_step=step, **how)
         found = diagnose(model, made.log)
     except AuvnnError as problem:
-        return {**row, "verdict": "fault", "missing": [], "fault": str(problem), "seconds": time.monotonic() - began}
-    row.update(verdict=found.verdict, missing=found.missing, p_value=found.global_p_value,
-               steps=[s["verdict"] for s in found.steps], fault=None, seconds=time.monotonic() - began,
-               truth=hidden, ranking=[c["effect"] for c in found.candidates[:3]], parameters={})
+        return {
+            **row,
+            "verdict": "fault",
+            "missing": [],
+            "fault": str(problem),
+            "seconds": time.monotonic() - began,
+        }
+    row.update(
+        verdict=found.verdict,
+        missing=found.missing,
+        p_value=found.global_p_value,
+        steps=[s["verdict"] for s in found.steps],
+        fault=None,
+        seconds=time.monotonic() - began,
+        truth=hidden,
+        ranking=[c["effect"] for c in found.candidates[:3]],
+        parameters={},
+    )
     for candidate in found.candidates:
         if candidate["effect"] == case.hidden:
             row["parameters"] = candidate["parameters"]
@@ -121,8 +156,10 @@ def _errors(row: Mapping[str, Any]) -> dict[str, dict[str, float]]:
         if found is None or found["value"] is None:
             continue
         gap = found["value"] - value
-        out[name] = {"relative": abs(gap) / size,
-                     "z": gap / found["std"] if found["std"] and np.isfinite(found["std"]) else float("nan")}
+        out[name] = {
+            "relative": abs(gap) / size,
+            "z": gap / found["std"] if found["std"] and np.isfinite(found["std"]) else float("nan"),
+        }
     return out
 
 
@@ -162,8 +199,15 @@ class Benchmark(Answer):
 
     def to_dict(self) -> dict[str, Any]:
         """Return `benchmark.json`."""
-        return plain({"schema": "auvnn/benchmark/1", "options": self.options, "metrics": self.metrics,
-                      "table": self.table, "rows": self.rows})
+        return plain(
+            {
+                "schema": "auvnn/benchmark/1",
+                "options": self.options,
+                "metrics": self.metrics,
+                "table": self.table,
+                "rows": self.rows,
+            }
+        )
 
 
 def summarise(rows: Sequence[Mapping[str, Any]], options: Mapping[str, Any]) -> Benchmark:
@@ -172,11 +216,22 @@ def summarise(rows: Sequence[Mapping[str, Any]], options: Mapping[str, Any]) -> 
     null = [r for r in rows if r["hidden"] == NOTHING]
     given = [n for r in rows if r["verdict"] == "named" for n in r["missing"]]
     false = [n for r in rows for n in false_names(r)]
-    zs = [e["z"] for r in hidden if named_first(r) for e in r["errors"].values() if np.isfinite(e["z"] or np.nan)]
-    relative = [max((e["relative"] for e in r["errors"].values()), default=np.nan) for r in hidden if named_first(r)]
+    zs = [
+        e["z"]
+        for r in hidden
+        if named_first(r)
+        for e in r["errors"].values()
+        if np.isfinite(e["z"] or np.nan)
+    ]
+    relative = [
+        max((e["relative"] for e in r["errors"].values()), default=np.nan) for r in hidden if named_first(r)
+    ]
     metrics = {
-        "logs": len(rows), "logs_with_effect": len(hidden), "logs_with_nothing": len(null),
-        "named_first_share": _share(map(named_first, hidden)), "named_or_in_group_share": _share(map(in_group, hidden)),
+        "logs": len(rows),
+        "logs_with_effect": len(hidden),
+        "logs_with_nothing": len(null),
+        "named_first_share": _share(map(named_first, hidden)),
+        "named_or_in_group_share": _share(map(in_group, hidden)),
         "adequate_with_nothing": sum(r["verdict"] == "adequate" for r in null),
         "false_alarms_with_nothing": sum(r["verdict"] != "adequate" for r in null),
         "false_discovery_share": len(false) / len(given) if given else 0.0,
@@ -187,17 +242,33 @@ def summarise(rows: Sequence[Mapping[str, Any]], options: Mapping[str, Any]) -> 
     }
     table = []
     keys = ("vehicle", "hidden", "size", "noise", "excitation")
-    for key, group in itertools.groupby(sorted(rows, key=lambda r: [r[k] for k in keys]), lambda r: [r[k] for k in keys]):
+    for key, group in itertools.groupby(
+        sorted(rows, key=lambda r: [r[k] for k in keys]), lambda r: [r[k] for k in keys]
+    ):
         members = list(group)
         verdicts: dict[str, int] = {}
         for r in members:
             label = "+".join(r["missing"]) if r["verdict"] == "named" else r["verdict"]
             verdicts[label] = verdicts.get(label, 0) + 1
-        errors = [max((e["relative"] for e in r["errors"].values()), default=np.nan) for r in members
-                  if named_first(r)] if key[1] != NOTHING else []
-        table.append({**dict(zip(keys, key, strict=True)), "logs": len(members),
-                      "named_first": sum(map(named_first, members)), "in_group": sum(map(in_group, members)),
-                      "answers": verdicts, "worst_relative_error": float(np.max(errors)) if errors else None})
+        errors = (
+            [
+                max((e["relative"] for e in r["errors"].values()), default=np.nan)
+                for r in members
+                if named_first(r)
+            ]
+            if key[1] != NOTHING
+            else []
+        )
+        table.append(
+            {
+                **dict(zip(keys, key, strict=True)),
+                "logs": len(members),
+                "named_first": sum(map(named_first, members)),
+                "in_group": sum(map(in_group, members)),
+                "answers": verdicts,
+                "worst_relative_error": float(np.max(errors)) if errors else None,
+            }
+        )
     return Benchmark(list(map(dict, rows)), dict(options), metrics, table)
 
 
@@ -219,8 +290,10 @@ def benchmark(options: Mapping[str, Any], progress: Callable[[str], None] | None
     for done, row in enumerate(_all(todo, int(options.get("workers") or os.cpu_count() or 1)), start=1):
         rows.append(row)
         if progress is not None:
-            progress(f"{done} of {len(todo)}: {row['hidden']} {row['size']} seed {row['seed']}: {row['verdict']} "
-                     f"{'+'.join(row['missing'])}")
+            progress(
+                f"{done} of {len(todo)}: {row['hidden']} {row['size']} seed {row['seed']}: {row['verdict']} "
+                f"{'+'.join(row['missing'])}"
+            )
     order = {case: k for k, case in enumerate(todo)}
     rows.sort(key=lambda r: order[Case(**{k: r[k] for k in Case.__dataclass_fields__})])
     return summarise(rows, options)

@@ -36,16 +36,29 @@ class Demo(Answer):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what was hidden, what was found, and the error on the way."""
-        found = {c["effect"]: c["parameters"] for c in self.diagnosis.candidates
-                 if c["effect"] in self.diagnosis.missing}
+        found = {
+            c["effect"]: c["parameters"]
+            for c in self.diagnosis.candidates
+            if c["effect"] in self.diagnosis.missing
+        }
         errors = {step["step"]: step["error"] for step in self.improvement.waterfall}
-        return plain({
-            "schema": "auvnn/demo/1", "hidden": self.truth["hidden"], "verdict": self.diagnosis.verdict,
-            "missing": self.diagnosis.missing, "parameters": found, "story": self.story,
-            "metrics": {"error_as_given": errors.get("as given"), "error_after": self.improvement.waterfall[-2]["error"],
-                        "error_true_model": self.true_error, "error_noise_floor": errors.get("noise floor"),
-                        "seconds": self.seconds},
-        })
+        return plain(
+            {
+                "schema": "auvnn/demo/1",
+                "hidden": self.truth["hidden"],
+                "verdict": self.diagnosis.verdict,
+                "missing": self.diagnosis.missing,
+                "parameters": found,
+                "story": self.story,
+                "metrics": {
+                    "error_as_given": errors.get("as given"),
+                    "error_after": self.improvement.waterfall[-2]["error"],
+                    "error_true_model": self.true_error,
+                    "error_noise_floor": errors.get("noise floor"),
+                    "seconds": self.seconds,
+                },
+            }
+        )
 
 
 def run_demo(out: Path, seed: int = 0, say: Callable[[str], None] = print) -> Demo:
@@ -73,17 +86,23 @@ def run_demo(out: Path, seed: int = 0, say: Callable[[str], None] = print) -> De
         lines.append(line)
         say(line)
 
-    tell(f"made      {RUNS} runs of {DURATION:g} s of {VEHICLE} in a current that its model does not know; realistic "
-         "noise, no accelerations; the last run is held out")
+    tell(
+        f"made      {RUNS} runs of {DURATION:g} s of {VEHICLE} in a current that its model does not know; realistic "
+        "noise, no accelerations; the last run is held out"
+    )
     quality = log.quality()
     quality.write(out / "check")
-    tell(f"check     {log.samples} samples at {1 / log.runs[0].dt:.3g} Hz; "
-         f"{len(quality.to_dict()['findings'])} findings (check/report.html)")
+    tell(
+        f"check     {log.samples} samples at {1 / log.runs[0].dt:.3g} Hz; "
+        f"{len(quality.to_dict()['findings'])} findings (check/report.html)"
+    )
     comparison = compare(model, test)
     comparison.write(out / "compare")
     five = comparison.rollout["5"]
-    tell(f"compare   free running for 5 s is off by {five['total']:.2f} standard deviations of the motion "
-         f"(holding the speed: {five['persistence']:.2f})")
+    tell(
+        f"compare   free running for 5 s is off by {five['total']:.2f} standard deviations of the motion "
+        f"(holding the speed: {five['persistence']:.2f})"
+    )
     if comparison.failures:
         worst = comparison.failures[0]
         tell(f"where     most of it in {worst['where']} ({worst['share']:.0%} of the residual)")
@@ -98,14 +117,20 @@ def run_demo(out: Path, seed: int = 0, say: Callable[[str], None] = print) -> De
     true_error = table(made.plant, test, scale, ("5",))[0]["5"]["total"]
     falls = {step["step"]: step["error"] for step in improvement.waterfall}
     refitted, after = falls["coefficients refitted"], improvement.waterfall[-2]["error"]
-    tell(f"add       held-out error: {falls['as given']:.3f} as given, {refitted:.3f} with its coefficients refitted, "
-         f"{after:.3f} with {', '.join(improvement.effects)}")
-    tell(f"floor     {true_error:.3f} is what the true model gives on the same data; noise alone leaves "
-         f"{falls['noise floor']:.3f}; the gain of {number(improvement.gain['value'], improvement.gain['std'], '1')} is "
-         f"{'accepted' if improvement.accepted else 'not accepted'}")
+    tell(
+        f"add       held-out error: {falls['as given']:.3f} as given, {refitted:.3f} with its coefficients refitted, "
+        f"{after:.3f} with {', '.join(improvement.effects)}"
+    )
+    tell(
+        f"floor     {true_error:.3f} is what the true model gives on the same data; noise alone leaves "
+        f"{falls['noise floor']:.3f}; the gain of {number(improvement.gain['value'], improvement.gain['std'], '1')} is "
+        f"{'accepted' if improvement.accepted else 'not accepted'}"
+    )
     hidden = made.truth["hidden"]["ocean_current"]
     tell("truth     hidden was: " + ", ".join(f"{k} {v:g} m/s" for k, v in hidden.items()))
-    answer = Demo(made.truth, quality, comparison, diagnosis, improvement, true_error, time.monotonic() - began, lines)
+    answer = Demo(
+        made.truth, quality, comparison, diagnosis, improvement, true_error, time.monotonic() - began, lines
+    )
     DRAWERS.get("demo").write(answer, out)
     say(f"report    {out / 'report.html'}")
     return answer

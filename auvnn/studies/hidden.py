@@ -87,12 +87,16 @@ def sized(
         direction = np.clip(direction / np.sqrt(np.mean(direction**2)), -1.5, 1.5)
         factors = np.exp(BEYOND[size] * uncertain[effect] * direction)
         return {p.name: float(f) for p, f in zip(described, factors, strict=True)}
-    made = simulate(model, excitation, "realistic", None, seed, runs=runs, duration=duration, rate=rate, max_step=0.025)
+    made = simulate(
+        model, excitation, "realistic", None, seed, runs=runs, duration=duration, rate=rate, max_step=0.025
+    )
     sigma = np.array([0.05, 0.05, 0.01, 0.003, 0.003, 0.008] + [0.006] * 3 + [0.003] * 3 + [np.inf] * 6)
     information = oracle_information(model, made.log, effect, sigma)
     step = direction * scale
     distance = float(np.sqrt(step @ information @ step))
     if not distance > 1e-9:
-        raise ConfigError(f"{effect} leaves no trace on {model.vehicle.name} under this excitation: choose another")
+        raise ConfigError(
+            f"{effect} leaves no trace on {model.vehicle.name} under this excitation: choose another"
+        )
     values = np.array([p.null for p in described]) + step * (SIZES[size] / distance)
     return {p.name: float(np.clip(v, p.low, p.high)) for p, v in zip(described, values, strict=True)}

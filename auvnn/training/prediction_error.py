@@ -130,15 +130,22 @@ def set_parameters(model: GreyBox, names: Sequence[str], theta: Array) -> None:
             size = len(effect.parameters_of)
             low = [p.low for p in effect.parameters_of]
             high = [p.high for p in effect.parameters_of]
-            effect.theta.copy_(torch.as_tensor(np.clip(theta[at:at + size], low, high)))
+            effect.theta.copy_(torch.as_tensor(np.clip(theta[at : at + size], low, high)))
             at += size
 
 
 def motion(windows: Windows) -> Array:
     """Return the standard deviation of each channel over the windows, (18,); zero where not measured."""
     # Twice a quaternion's vector part moves like the rotation vector where the turn is small.
-    euler_free = torch.cat([windows.eta[..., :3], 2 * windows.eta[..., 4:7], windows.nu,
-                            torch.zeros_like(windows.nu) if windows.nu_dot is None else windows.nu_dot], -1)
+    euler_free = torch.cat(
+        [
+            windows.eta[..., :3],
+            2 * windows.eta[..., 4:7],
+            windows.nu,
+            torch.zeros_like(windows.nu) if windows.nu_dot is None else windows.nu_dot,
+        ],
+        -1,
+    )
     seen = windows.mask
     count = torch.clamp(seen.sum((0, 1)), min=1)
     mean = (euler_free * seen).sum((0, 1)) / count
@@ -169,7 +176,7 @@ def reduce(windows: Windows, responses: Iterable[Response], sigma: Array) -> tup
     begin = 0
     for answer in responses:
         count, length = answer.error.shape[:2]
-        mask = windows.mask[begin:begin + count] * (weight > 0)
+        mask = windows.mask[begin : begin + count] * (weight > 0)
         begin += count
         error = (answer.error * weight).reshape(count, length * 18, 1)
         slopes = (answer.parameters * weight[:, None]).reshape(count, length * 18, -1)
@@ -185,12 +192,28 @@ def reduce(windows: Windows, responses: Iterable[Response], sigma: Array) -> tup
         remaining = torch.where(mask > 0, remaining, torch.zeros_like(remaining))
         pair = mask[:, 1:] * mask[:, :-1]
         step = (remaining[:, 1:] - remaining[:, :-1]) * pair
-        parts.append([x.numpy() for x in (
-            sums[:, 1:, 1:], sums[:, 1:, 0], sums[:, 0, 0], (remaining**2).sum(1), mask.sum(1), (step**2).sum(1),
-            pair.sum(1), solved[..., 0], solved[..., 1:])])
+        parts.append(
+            [
+                x.numpy()
+                for x in (
+                    sums[:, 1:, 1:],
+                    sums[:, 1:, 0],
+                    sums[:, 0, 0],
+                    (remaining**2).sum(1),
+                    mask.sum(1),
+                    (step**2).sum(1),
+                    pair.sum(1),
+                    solved[..., 0],
+                    solved[..., 1:],
+                )
+            ]
+        )
     joined = [np.concatenate(p) for p in zip(*parts, strict=True)]
-    return (Statistics(*joined[:7], windows.run.astype(np.int64), windows.first.astype(np.int64)),
-            joined[7], joined[8])
+    return (
+        Statistics(*joined[:7], windows.run.astype(np.int64), windows.first.astype(np.int64)),
+        joined[7],
+        joined[8],
+    )
 
 
 def _weights(sigma: Array) -> Tensor:
@@ -264,7 +287,10 @@ def fit(
         normal = hessian / scale[:, None] / scale
         now = _cost(here, sigma) + penalty(theta)
         for _attempt in range(8):
-            step = np.linalg.lstsq(normal + damping * np.eye(len(theta)), gradient / scale, rcond=1e-13)[0] / scale
+            step = (
+                np.linalg.lstsq(normal + damping * np.eye(len(theta)), gradient / scale, rcond=1e-13)[0]
+                / scale
+            )
             set_parameters(model, names, theta + step)
             reached = parameters_of(model, names)
             change = a - np.einsum("bij,j->bi", slopes, reached - theta)

@@ -57,8 +57,17 @@ class _Point(nn.Module):
         super().__init__()
         self.model = model
 
-    def forward(self, what: str, position: Tensor, quaternion: Tensor, turn: Tensor, nu: Tensor, thrust: Tensor,
-                time: Tensor, inputs: Inputs) -> Tensor:
+    def forward(
+        self,
+        what: str,
+        position: Tensor,
+        quaternion: Tensor,
+        turn: Tensor,
+        nu: Tensor,
+        thrust: Tensor,
+        time: Tensor,
+        inputs: Inputs,
+    ) -> Tensor:
         rotation = quat_to_matrix(quaternion)
         # First order in `turn` is all that a derivative at zero needs.
         rotation = rotation + rotation @ skew(turn)
@@ -83,8 +92,13 @@ class _Thrust(nn.Module):
 
     def forward(self, windows: Windows, substeps: int) -> tuple[Tensor, Tensor]:
         model = self.model
-        drive = model.actuators.drive(windows.inputs.command, windows.times,
-                                      model.using("command") + model.using("respond"), substeps, windows.warmup)
+        drive = model.actuators.drive(
+            windows.inputs.command,
+            windows.times,
+            model.using("command") + model.using("respond"),
+            substeps,
+            windows.warmup,
+        )
         mean = torch.stack([sum(parts[1:], parts[0]) / len(parts) for parts in drive.mean], dim=-2)
         return mean, torch.stack(drive.start, dim=-2)
 
@@ -107,13 +121,22 @@ def _error(model: GreyBox, windows: Windows, eta: Tensor, nu: Tensor) -> Tensor:
     rate = None
     if windows.nu_dot is not None:
         _, thrust = _Thrust(model)(windows, _substeps(windows))
-        rate = model.nu_dot(eta[..., :3], quat_to_matrix(eta[..., 3:]), nu, thrust, windows.inputs.rows(windows.warmup),
-                            windows.times[:, windows.warmup:])
+        rate = model.nu_dot(
+            eta[..., :3],
+            quat_to_matrix(eta[..., 3:]),
+            nu,
+            thrust,
+            windows.inputs.rows(windows.warmup),
+            windows.times[:, windows.warmup :],
+        )
     seen = model.sense(Sensed(eta[..., :3], eta[..., 3:], nu, rate))
     angle = quat_to_rotvec(quat_multiply(quat_conjugate(seen.quaternion), windows.eta[..., 3:]))
     parts = [windows.eta[..., :3] - seen.position, angle, windows.nu - seen.nu]
-    parts.append(torch.zeros_like(nu) if seen.nu_dot is None or windows.nu_dot is None
-                 else windows.nu_dot - seen.nu_dot)
+    parts.append(
+        torch.zeros_like(nu)
+        if seen.nu_dot is None or windows.nu_dot is None
+        else windows.nu_dot - seen.nu_dot
+    )
     error = torch.cat(parts, dim=-1)
     return torch.where(windows.mask > 0, error, torch.zeros_like(error))
 
@@ -122,7 +145,9 @@ def _substeps(windows: Windows) -> int:
     return steps_per_interval(windows.times, MAX_STEP)
 
 
-def respond(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str], chunk: int = 2048) -> Response:
+def respond(
+    model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str], chunk: int = 2048
+) -> Response:
     """Return prediction error and sensitivities of windows.
 
     Args:
@@ -140,29 +165,39 @@ def respond(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[s
     thetas = {f"model.effects.{k}.theta": model.effects[k].theta.detach() for k in order}
     sizes = [thetas[f"model.effects.{k}.theta"].shape[0] for k in order]
     total = sum(sizes)
-    times = windows.times[:, windows.warmup:]
+    times = windows.times[:, windows.warmup :]
     inputs = windows.inputs.rows(windows.warmup)
     steps = times[:, 1:] - times[:, :-1]
 
     mean, start, mean_slope, start_slope = _thrusts(model, windows, thetas, sizes)
     middle = torch.nn.functional.normalize(eta[:, :-1, 3:] + eta[:, 1:, 3:], dim=-1)
-    points = (0.5 * (eta[:, :-1, :3] + eta[:, 1:, :3]), middle, 0.5 * (nu[:, :-1] + nu[:, 1:]),
-              mean[:, :-1], times[:, :-1] + 0.5 * steps, inputs.rows(0, length - 1))
+    points = (
+        0.5 * (eta[:, :-1, :3] + eta[:, 1:, :3]),
+        middle,
+        0.5 * (nu[:, :-1] + nu[:, 1:]),
+        mean[:, :-1],
+        times[:, :-1] + 0.5 * steps,
+        inputs.rows(0, length - 1),
+    )
     rate = _differentiate(_Point(model), "rate", points, thetas, chunk)
     jac_state = torch.cat(rate[:3], dim=-1)
     jac_theta = torch.cat(rate[4:], dim=-1) if total else jac_state.new_zeros(*jac_state.shape[:-1], 0)
     if mean_slope is not None:
         jac_theta = jac_theta + rate[3] @ mean_slope[:, :-1].flatten(0, 1)
 
-    sensitivity = _propagate(jac_state, jac_theta, points[1].flatten(0, 1), points[2].flatten(0, 1),
-                             steps.flatten(), count, length)
-    state, parameters = _outputs(model, windows, eta, nu, start, start_slope, times, inputs, thetas, sensitivity, chunk)
+    sensitivity = _propagate(
+        jac_state, jac_theta, points[1].flatten(0, 1), points[2].flatten(0, 1), steps.flatten(), count, length
+    )
+    state, parameters = _outputs(
+        model, windows, eta, nu, start, start_slope, times, inputs, thetas, sensitivity, chunk
+    )
     seen = windows.mask.unsqueeze(-1)
     return Response(error, state * seen, parameters * seen)
 
 
-def _thrusts(model: GreyBox, windows: Windows, thetas: dict[str, Tensor], sizes: list[int]
-             ) -> tuple[Tensor, Tensor, Tensor | None, Tensor | None]:
+def _thrusts(
+    model: GreyBox, windows: Windows, thetas: dict[str, Tensor], sizes: list[int]
+) -> tuple[Tensor, Tensor, Tensor | None, Tensor | None]:
     """Return mean and starting thrust (B, L, n) and how they change with the parameters, (B, L, n, P)."""
     module, substeps = _Thrust(model), _substeps(windows)
     with torch.no_grad():
@@ -171,29 +206,51 @@ def _thrusts(model: GreyBox, windows: Windows, thetas: dict[str, Tensor], sizes:
     keys = [k for k in thetas if id(model.effects[int(k.split(".")[2])]) in acting]
     if not keys:
         return mean, start, None, None
-    slopes = jacfwd(lambda some: functional_call(module, some, (windows, substeps)))({k: thetas[k] for k in keys})
+    slopes = jacfwd(lambda some: functional_call(module, some, (windows, substeps)))(
+        {k: thetas[k] for k in keys}
+    )
     filled = []
     for which in slopes:
-        parts = [which[k] if k in which else mean.new_zeros(*mean.shape, size)
-                 for k, size in zip(thetas, sizes, strict=True)]
+        parts = [
+            which[k] if k in which else mean.new_zeros(*mean.shape, size)
+            for k, size in zip(thetas, sizes, strict=True)
+        ]
         filled.append(torch.cat(parts, dim=-1).detach())
     return mean, start, filled[0], filled[1]
 
 
-def _differentiate(module: nn.Module, what: str, points: tuple, thetas: dict[str, Tensor], chunk: int) -> list[Tensor]:
+def _differentiate(
+    module: nn.Module, what: str, points: tuple, thetas: dict[str, Tensor], chunk: int
+) -> list[Tensor]:
     """Return derivatives of a function of a point by position, turn, velocity, thrust and each theta, (N, out, in)."""
     position, quaternion, nu, thrust, time, inputs = points
     inputs, axes = _flat(inputs)
 
-    def one(p: Tensor, turn: Tensor, v: Tensor, f: Tensor, theta: dict[str, Tensor], q: Tensor, t: Tensor,
-            extra: Inputs) -> Tensor:
+    def one(
+        p: Tensor,
+        turn: Tensor,
+        v: Tensor,
+        f: Tensor,
+        theta: dict[str, Tensor],
+        q: Tensor,
+        t: Tensor,
+        extra: Inputs,
+    ) -> Tensor:
         return functional_call(module, theta, (what, p, q, turn, v, f, t, extra))
 
     slope = jacrev(one, argnums=(0, 1, 2, 3, 4))
     many = vmap(slope, in_dims=(0, None, 0, 0, None, 0, 0, axes), chunk_size=chunk)
     turn = torch.zeros(3, dtype=nu.dtype, device=nu.device)
-    by = many(position.flatten(0, 1), turn, nu.flatten(0, 1), thrust.flatten(0, 1), thetas,
-              quaternion.flatten(0, 1), time.flatten(), inputs)
+    by = many(
+        position.flatten(0, 1),
+        turn,
+        nu.flatten(0, 1),
+        thrust.flatten(0, 1),
+        thetas,
+        quaternion.flatten(0, 1),
+        time.flatten(),
+        inputs,
+    )
     return [*(x.detach() for x in by[:4]), *(by[4][k].detach() for k in thetas)]
 
 
@@ -205,8 +262,15 @@ def _flatten_inputs(i: Inputs) -> tuple[list, None]:
 torch.utils._pytree.register_pytree_node(Inputs, _flatten_inputs, lambda children, _: Inputs(*children))
 
 
-def _propagate(jac_state: Tensor, jac_theta: Tensor, quaternion: Tensor, nu: Tensor, steps: Tensor, count: int,
-               length: int) -> Tensor:
+def _propagate(
+    jac_state: Tensor,
+    jac_theta: Tensor,
+    quaternion: Tensor,
+    nu: Tensor,
+    steps: Tensor,
+    count: int,
+    length: int,
+) -> Tensor:
     """Return the change of the state with initial state and parameters, (B, L, 12, 12 + P)."""
     points, size = jac_state.shape[0], jac_theta.shape[-1]
     rotation = quat_to_matrix(quaternion)
@@ -233,9 +297,19 @@ def _propagate(jac_state: Tensor, jac_theta: Tensor, quaternion: Tensor, nu: Ten
     return torch.stack(rows, dim=1)
 
 
-def _outputs(model: GreyBox, windows: Windows, eta: Tensor, nu: Tensor, start: Tensor, start_slope: Tensor | None,
-             times: Tensor, inputs: Inputs, thetas: dict[str, Tensor], sensitivity: Tensor, chunk: int
-             ) -> tuple[Tensor, Tensor]:
+def _outputs(
+    model: GreyBox,
+    windows: Windows,
+    eta: Tensor,
+    nu: Tensor,
+    start: Tensor,
+    start_slope: Tensor | None,
+    times: Tensor,
+    inputs: Inputs,
+    thetas: dict[str, Tensor],
+    sensitivity: Tensor,
+    chunk: int,
+) -> tuple[Tensor, Tensor]:
     """Return the change of the 18 outputs with initial state, (B, L, 18, 12), and parameters, (B, L, 18, P)."""
     measured_rate = windows.nu_dot is not None
     if not measured_rate and not model.using("sense"):

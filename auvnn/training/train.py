@@ -35,6 +35,8 @@ from auvnn.training.problem import DampingProblem
 
 Array = NDArray[np.float64]
 AXES = ("X", "Y", "Z", "K", "M", "N")
+# Share of a single run that decides when to stop; of several runs it is the last.
+STOPPING = 0.2
 
 
 @dataclass
@@ -58,8 +60,21 @@ class Training(Answer):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
-        names = ("log", "test", "scheme", "damping", "seed", "derivative", "metrics", "history", "stopped", "warnings")
-        return plain({"schema": "auvnn/training/1", "model": self.name, **{n: getattr(self, n) for n in names}})
+        names = (
+            "log",
+            "test",
+            "scheme",
+            "damping",
+            "seed",
+            "derivative",
+            "metrics",
+            "history",
+            "stopped",
+            "warnings",
+        )
+        return plain(
+            {"schema": "auvnn/training/1", "model": self.name, **{n: getattr(self, n) for n in names}}
+        )
 
 
 class _Recorder(nn.Module):
@@ -115,7 +130,8 @@ def train(
 ) -> Training:
     """Train damping subnetworks beside what a model states.
 
-    Subnetworks that the model has already are replaced. Held-out data decide when to stop and are never fitted.
+    Subnetworks that the model has already are replaced. A part of the log decides when to stop; the test log
+    decides nothing and is only judged on.
 
     Args:
         model: the model; it is not changed.
@@ -139,12 +155,15 @@ def train(
         leakage(log, test)
         held_words = f"{test.name} is held out"
     how = choose_derivative(log, derivative)
-    nu, target, run = targets(model, log, how)
-    nu_test, target_test, _ = targets(model, test, how)
+    # What decides when to stop is a part of the log itself: the test log is for judging alone.
+    fitted, stopping, stop_words = log.split(STOPPING)
+    nu, target, run = targets(model, fitted, how)
+    nu_stop, target_stop, _ = targets(model, stopping, how)
     held = int(run.max()) + 1
     problem = DampingProblem(
-        torch.tensor(np.concatenate([nu, nu_test])), torch.tensor(np.concatenate([target, target_test])),
-        run=torch.tensor(np.concatenate([run, np.full(len(nu_test), held)])),
+        torch.tensor(np.concatenate([nu, nu_stop])),
+        torch.tensor(np.concatenate([target, target_stop])),
+        run=torch.tensor(np.concatenate([run, np.full(len(nu_stop), held)])),
     )
     bank = DampingBank.from_description(damping, seed)
 
@@ -152,8 +171,16 @@ def train(
         if progress is not None and record.iteration % 10 == 0:
             progress(f"iteration {record.iteration}: worst relative error {record.worst:.3g}")
 
-    fit = fit_damping(bank, problem, scheme=scheme, held_out=[held], seed=seed, callback=told,
-                      checkpoint_folder=checkpoint, resume=resume)
+    fit = fit_damping(
+        bank,
+        problem,
+        scheme=scheme,
+        held_out=[held],
+        seed=seed,
+        callback=told,
+        checkpoint_folder=checkpoint,
+        resume=resume,
+    )
     bank.requires_grad_(True)
     trained = GreyBox(model.vehicle, model.copied_effects(), bank, model.actuation)
     before, after = scores(one_step(model, test, how)), scores(one_step(trained, test, how))
@@ -163,21 +190,35 @@ def train(
         warnings.append(f"held out, one step ahead, {', '.join(worse)} got worse by the training")
     dt = float(np.median([r.dt for r in log.runs]))
     return Training(
-        model.vehicle.name, log.name, test.name, fit.scheme, bank.describe(), seed,
-        _metrics(fit, before, after, len(nu), len(nu_test)), _history(fit), fit.stopped_because,
-        {**how.describe(dt), "held_out": held_words}, trained, warnings, _curves(trained, nu),
+        model.vehicle.name,
+        log.name,
+        test.name,
+        fit.scheme,
+        bank.describe(),
+        seed,
+        _metrics(fit, before, after, len(nu), len(nu_stop)),
+        _history(fit),
+        fit.stopped_because,
+        {**how.describe(dt), "held_out": held_words, "stopping": stop_words},
+        trained,
+        warnings,
+        _curves(trained, nu),
     )
 
 
 def _metrics(fit: Fit, before: dict, after: dict, samples: int, held: int) -> dict[str, Any]:
     units = ("N", "N", "N", "N_m", "N_m", "N_m")
-    found: dict[str, Any] = {"samples_fitted": samples, "samples_held_out": held, "iterations": fit.iterations,
-                             "seconds": fit.seconds}
+    found: dict[str, Any] = {
+        "samples_fitted": samples,
+        "samples_for_stopping": held,
+        "iterations": fit.iterations,
+        "seconds": fit.seconds,
+    }
     for k, (axis, unit) in enumerate(zip(AXES, units, strict=True)):
         found[f"rmse_{axis}_{unit}"] = fit.rmse[k]
         found[f"relative_rmse_{axis}"] = fit.relative_rmse[k]
         if fit.held_out_rmse is not None:
-            found[f"held_out_rmse_{axis}_{unit}"] = fit.held_out_rmse[k]
+            found[f"stopping_rmse_{axis}_{unit}"] = fit.held_out_rmse[k]
     for name in after:
         found[f"held_out_r2_{name}_before"] = before[name]["r2"]
         found[f"held_out_r2_{name}_after"] = after[name]["r2"]
@@ -191,8 +232,14 @@ def _history(fit: Fit) -> dict[str, Any]:
         return [float(np.sqrt(np.nanmean(np.square(row)))) for row in rows]
 
     data = fit.history.to_dict()
-    return {"iteration": data["iteration"], "train": joined(data["train"]), "held_out": joined(data["held_out"]),
-            "by_axis": data, "step": "iteration", "error": "error over the target's spread (1)"}
+    return {
+        "iteration": data["iteration"],
+        "train": joined(data["train"]),
+        "held_out": joined(data["held_out"]),
+        "by_axis": data,
+        "step": "iteration",
+        "error": "error over the target's spread (1)",
+    }
 
 
 def _curves(model: GreyBox, nu: Array) -> list[dict[str, Any]]:

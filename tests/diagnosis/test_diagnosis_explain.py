@@ -22,6 +22,7 @@ from auvnn.diagnosis.explain import (
     weigh,
 )
 from auvnn.diagnosis.nuisance import lay_out, priors, scales, stated
+from auvnn.logs import Log, Run
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
 from auvnn.training.prediction_error import Fitted
@@ -45,8 +46,8 @@ def fitted(world, errors, effects):
     everything[columns] = theta
     sums = world.statistics(errors, everything).columns(columns)
     sigma = np.where(np.arange(18) == 6, 1.0, np.inf)
-    fit = Fitted(world.layout.model, tuple(names), theta, torch.zeros(60, 13), sigma, sums, held, 0.0, True, 1)
-    return Explanation(tuple(effects), fit, tuple(names), 0.0, np.zeros(60), np.full(60, 20.0)), columns
+    fit = Fitted(world.layout.model, tuple(names), theta, torch.zeros(len(errors), 13), sigma, sums, held, 0.0, True, 1)
+    return Explanation(tuple(effects), fit, tuple(names), 0.0, np.zeros(len(errors)), np.full(len(errors), 20.0)), columns
 
 
 def drawn(world, seed, **changed):
@@ -78,11 +79,14 @@ def test_nothing_to_fit_leaves_the_error_as_it_is(world):
 
 
 def test_folds_are_runs_or_stretches_of_the_only_run():
-    model = GreyBox(small_vehicle())
-    three = cut_windows(make_log(model, runs=3, duration=6.0), 1.0)
+    def still(number, duration):
+        t = np.arange(0, duration + 0.05, 0.1)
+        return Run(number, t, np.tile([1.0, 0, 0, 0], (len(t), 1)), np.zeros((len(t), 6)), wrench=np.zeros((len(t), 6)))
+
+    three = cut_windows(Log.from_runs([still(n, 6.0) for n in range(3)]), 1.0)
     fold = folds(three)
     assert len(set(fold)) == 3 and all(len(set(fold[three.run == r])) == 1 for r in (0, 1, 2))
-    one = cut_windows(make_log(model, runs=1, duration=12.0), 1.0)
+    one = cut_windows(Log.from_runs([still(0, 12.0)]), 1.0)
     fold = folds(one)
     assert list(np.unique(fold)) == list(range(FOLDS)) and (np.diff(fold) >= 0).all()
     assert np.bincount(fold).min() >= 2
@@ -90,9 +94,10 @@ def test_folds_are_runs_or_stretches_of_the_only_run():
     assert np.bincount(folds(many)).max() <= 3
 
 
-@pytest.mark.parametrize("effects", [[], ["ocean_current"], ["added_mass"]])
-def test_the_evidence_is_the_marginal_likelihood_of_a_linear_world(world, effects):
+@pytest.mark.parametrize("effects", [["ocean_current"], ["added_mass"]])
+def test_the_evidence_is_the_marginal_likelihood_of_a_linear_world(effects):
     """One constant is common to all explanations, so it is their differences that are compared."""
+    world = World.random(layout(), windows=30, samples=10, strength=12.0)
     errors = drawn(world, 2, ocean_current=np.array([0.05, 0.0, 0.05]))
 
     def exact(asked):
@@ -171,7 +176,7 @@ def test_a_layout_leaves_out_groups_that_the_vehicle_does_not_have_and_keeps_wha
 def test_an_explanation_of_a_real_log_equals_a_refit_without_each_run():
     """The only test here that runs a model: linear prediction of what is left out against fits without it."""
     model = GreyBox(small_vehicle(uncertainty=0.0))
-    log = make_log(model.with_effects({"net_buoyancy": {"force": 4.0}}), runs=3, duration=8.0, noise=1.0)
+    log = make_log(model.with_effects({"net_buoyancy": {"force": 4.0}}), runs=3, duration=6.0, noise=1.0)
     windows = cut_windows(log, 2.0)
     at = lay_out(model, ["net_buoyancy"])
     found = explain(at, windows, [], ["net_buoyancy"])

@@ -135,7 +135,7 @@ def test_a_model_with_a_lever_arm_and_a_lag_explains_its_own_log(accelerations):
 
 
 def test_scores_are_the_usual_ones(moving):
-    model, log = moving
+    _, log = moving
     part = one_step(GreyBox(small_vehicle(mass=60.0, buoyancy=588.6)), log, choose_derivative(log))
     measured = np.concatenate([p.measured for p in part])
     predicted = np.concatenate([p.model for p in part])
@@ -196,9 +196,9 @@ def test_the_window_is_nine_samples_or_a_fifth_of_a_second_either_side():
 
 
 def test_options_of_the_derivative_are_refused_where_they_make_no_sense(stepped):
-    with pytest.raises(ConfigError, match="derivative option.*'halfwidth'.*Did you mean 'half_width'"):
+    with pytest.raises(ConfigError, match=r"derivative option.*'halfwidth'.*Did you mean 'half_width'"):
         choose_derivative(stepped, {"halfwidth": 3})
-    with pytest.raises(ConfigError, match="derivative method.*'savgol'"):
+    with pytest.raises(ConfigError, match=r"derivative method.*'savgol'"):
         choose_derivative(stepped, {"method": "savgol"})
     with pytest.raises(InputError, match=r"no columns du \.\.\. dr.*local_polynomial"):
         choose_derivative(stepped, {"method": "measured"})

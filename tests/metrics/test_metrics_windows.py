@@ -147,7 +147,7 @@ def test_uneven_stamps_still_give_windows_of_the_horizon():
 
 def test_nothing_to_cut_is_said():
     t = np.arange(0, 3.0, 0.1)
-    with pytest.raises(InputError, match="no stretch of .* is 5 s long without a gap: choose a shorter horizon"):
+    with pytest.raises(InputError, match=r"no stretch of .* is 5 s long without a gap: choose a shorter horizon"):
         cut_windows(log_of(plain_run(t)), 5.0)
     with pytest.raises(InputError, match=r"run 0 has no thruster_1"):
         cut_windows(log_of(plain_run(t)), 1.0, kind="thrusters")

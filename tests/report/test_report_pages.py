@@ -376,7 +376,7 @@ def test_unknown_numbers_are_dashes(kind):
     assert not re.search(r"\bnan\b|\bNone\b", page.text)
 
 
-@pytest.mark.parametrize("kind", ["diagnosis", "improvement", "demo"])
+@pytest.mark.parametrize("kind", ["diagnosis", "demo"])
 def test_a_page_and_its_figures_are_written_and_equal_twice(tmp_path, small_figures, kind):
     answer = make(kind, 60)
     for name in ("one", "two"):

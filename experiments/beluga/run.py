@@ -1,0 +1,98 @@
+"""The loop on a real vehicle: check, compare, diagnose, add, step by step, with `random-2` held out throughout.
+
+    python experiments/beluga/run.py DATA [OUT] [SECONDS]
+
+DATA is the folder with Beluga's six CSV files, OUT where the answers go, SECONDS how much of each run is fitted.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+from glitches import without_glitches
+
+from auvnn.answers import plain
+from auvnn.diagnosis import add, compare, diagnose
+from auvnn.logs import Log
+from auvnn.metrics.one_step import choose_derivative, one_step, scores
+from auvnn.metrics.rollouts import scale_of, table
+from auvnn.models import load
+
+HERE = Path(__file__).parent
+FITTED = ("surge-1", "sway-1", "heave-1", "yaw-1", "random-1")
+HELD_OUT = "random-2"
+STEPS = ("thruster_gain", "cg_offset", "net_buoyancy", "thruster_lag", "velocity_lever_arm", "constant_force")
+FILTER = {"method": "local_polynomial", "half_width": 4, "order": 2}
+
+
+def read(data: Path, names: tuple[str, ...], mapping: str) -> Log:
+    """Return runs of Beluga, one file each."""
+    return Log.read([data / f"{n}.csv" for n in names], HERE / mapping)
+
+
+def judge(words: str, model, test: Log) -> dict:
+    """Print and return held-out R2 one step ahead and the free-running error at 1, 2 and 5 s."""
+    one = scores(one_step(model, test, choose_derivative(test, FILTER)))
+    rolled = table(model, test, scale_of(test), ("1", "2", "5"))[0]
+    r2 = {k: one[k]["r2"] for k in one}
+    print(f"{words:<28} R2 " + " ".join(f"{v:6.2f}" for v in r2.values()), flush=True)
+    for horizon, row in rolled.items():
+        channels = " ".join(f"{row[c]['nrmse'] if row[c]['nrmse'] is not None else np.nan:6.2f}" for c in "uvwpqr")
+        print(f"{'':<22}{horizon:>3} s    {channels}  total {row['total']:.3f}  persistence "
+              f"{row['persistence']:.3f}", flush=True)
+    return {"r2": r2, "rollout": {h: {"total": row["total"], "persistence": row["persistence"],
+                                      **{c: row[c]["nrmse"] for c in "uvwpqr"}} for h, row in rolled.items()}}
+
+
+def main() -> None:
+    """Go the whole way and write `result.json`."""
+    torch.set_num_threads(1)
+    data = Path(sys.argv[1])
+    out = Path(sys.argv[2] if len(sys.argv) > 2 else "outputs/beluga")
+    seconds = float(sys.argv[3]) if len(sys.argv) > 3 else np.inf
+    began, result = time.monotonic(), {}
+
+    raw = read(data, FITTED, "mapping-raw.yaml")
+    quality = raw.quality()
+    result["reversed"] = [n for n, k in quality.kinematics.items() if k.scale is not None and k.scale < 0]
+    print("check, signs as logged: reversed against the attitude's derivative:", ", ".join(result["reversed"]))
+
+    log, doubtful = without_glitches(read(data, FITTED, "mapping.yaml"))
+    test, _ = without_glitches(read(data, (HELD_OUT,), "mapping.yaml"))
+    print("poses that contradict the velocities, left out (attitude, position) by run:", doubtful)
+    log = Log.from_runs([r.cut(slice(0, int(np.searchsorted(r.t, r.t[0] + seconds)))) for r in log.runs], name="beluga")
+    model = load(HERE / "beluga.yaml", actuation="thrusters")
+
+    result["as given"] = judge("as given", model, test)
+    compare(model, test, derivative=FILTER).write(out / "compare")
+    found = diagnose(model, log, max_effects=3, progress=lambda w: print("   ", w, flush=True))
+    found.write(out / "diagnose")
+    for line in found.story:
+        print("diagnose:", line, flush=True)
+    result["diagnosis"] = {"verdict": found.verdict, "missing": found.missing, "steps": found.steps,
+                           "ranking": [{k: c[k] for k in ("effect", "p_value", "explained", "cv_before", "cv_after",
+                                                          "parameters")} for c in found.candidates]}
+    done: list[str] = []
+    for effect in STEPS:
+        answer = add(model, log, [*done, effect], test=test, derivative=FILTER)
+        if not done:
+            result["coefficients refitted"] = judge("coefficients refitted", answer.refitted_model, test)
+        words = f"+ {effect}"
+        result[words] = judge(words, answer.model, test)
+        result[words]["gain"], result[words]["accepted"] = answer.gain, answer.accepted
+        result[words]["parameters"], result[words]["coefficients"] = answer.parameters, answer.coefficients
+        print(f"{'':<28} over the refitted model: gain {answer.gain['value']:.3f} +- {answer.gain['std']:.3f}", flush=True)
+        answer.write(out / f"add-{len(done) + 1}-{effect}")
+        done.append(effect)
+        result["seconds"] = time.monotonic() - began
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "result.json").write_text(json.dumps(plain(result), indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
