@@ -63,6 +63,7 @@ def make_log(
     command: np.ndarray | None = None,
     first: int = 0,
     max_step: float = 0.03,
+    stir: float = 0.05,
 ) -> Log:
     """Return a log of a model driven by sums of sines.
 
@@ -79,6 +80,7 @@ def make_log(
         command: (N, n) instead of sines.
         first: number of the first run.
         max_step: of the integration, s.
+        stir: spread of the first velocities, m/s and rad/s.
     """
     generators = [np.random.default_rng([seed, number]) for number in range(first, first + runs)]
     times, commands, starts = [], [], []
@@ -94,7 +96,7 @@ def make_log(
         heading = random.uniform(-np.pi, np.pi)
         times.append(t)
         commands.append(held)
-        starts.append([0.0, 0.0, 5.0, np.cos(heading / 2), 0.0, 0.0, np.sin(heading / 2), *0.05 * random.normal(size=6)])
+        starts.append([0.0, 0.0, 5.0, np.cos(heading / 2), 0.0, 0.0, np.sin(heading / 2), *stir * random.normal(size=6)])
     t, held, start = (torch.tensor(np.stack(x)) for x in (times, commands, starts))
     with torch.no_grad():
         run = model.rollout(start[:, :7], start[:, 7:], held, t, max_step=max_step)

@@ -134,8 +134,9 @@ def weigh(layout: Layout, explanation: Explanation, factor: float) -> Explanatio
         if name in uncertain and name not in explanation.effects:
             size = uncertain[name] * np.maximum(np.abs(mean), 1e-3)
         prior.append(np.broadcast_to(size, mean.shape))
-    size = np.concatenate(prior)
-    away = (fitted.theta - np.concatenate(means)) / size
+    # With nothing uncertain and nothing asked for, there is nothing to weigh but the data.
+    size = np.concatenate([np.zeros(0), *prior])
+    away = (fitted.theta - np.concatenate([np.zeros(0), *means])) / size
     data = float(fitted.statistics.cost.sum()) / factor
     information = fitted.statistics.hessian.sum(0) * size[:, None] * size / factor
     volume = np.linalg.slogdet(information + np.eye(len(size)))[1]

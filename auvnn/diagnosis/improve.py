@@ -153,10 +153,9 @@ def add(
         test.name,
         names,
         accepted,
-        *(
-            {"one_step": results[s]["one_step"], "rollout": results[s]["rollout"]}
-            for s in ("as given", "coefficients refitted", last)
-        ),
+        results["as given"],
+        results["coefficients refitted"],
+        results[last],
         {"value": gain, "std": std},
         waterfall,
         _values(layout, best, names),

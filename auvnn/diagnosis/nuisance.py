@@ -70,7 +70,7 @@ def lay_out(model: GreyBox, candidates: Sequence[str]) -> Layout:
         effects.append(effect_class(name).build(model.vehicle, model.actuation))
     full = model.rebuilt(effects)
     columns, means, at = {}, {}, 0
-    for effect in full.effects:
+    for effect in full.members:
         size = len(effect.parameters_of)
         columns[str(effect.name)] = np.arange(at, at + size)
         means[str(effect.name)] = effect.theta.detach().numpy().copy()

@@ -74,7 +74,7 @@ def project(
     return by_window, gradient, 0.5 * (information + information.T)
 
 
-def inflation(by_window: Array, information: Array, run: Array) -> float:
+def inflation(by_window: Array, information: Array, run: NDArray[np.int64]) -> float:
     """Return how much more the scores vary from window to window than white noise would have it, at least one.
 
     Neighbouring windows of a run count with Bartlett's weight of one half.

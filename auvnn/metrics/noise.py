@@ -28,7 +28,7 @@ def attitude_noise(run: Run) -> Array:
     turns = 2 * multiply(conjugate(run.quaternion[:-1]), run.quaternion[1:])
     turns = turns[:, 1:] * np.where(turns[:, :1] < 0, -1.0, 1.0)
     angle = np.concatenate([np.zeros((1, 3)), np.cumsum(np.nan_to_num(turns), axis=0)])
-    return white(run, np.where(np.isfinite(run.quaternion).all(1)[:, None], angle, np.nan))
+    return white(run, np.where(np.isfinite(run.quaternion).all(1, keepdims=True), angle, np.nan))
 
 
 def noisier(run: Run, repeat: int = 0) -> Run:

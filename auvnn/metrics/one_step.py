@@ -177,7 +177,7 @@ class _Replay:
         self.model = model
         self.good = known & np.isfinite(run.quaternion).all(1) & np.isfinite(run.nu).all(1)
         self.inputs = Inputs(
-            torch.tensor(np.where(known[:, None], command, 0.0)),
+            torch.tensor(np.where(np.expand_dims(known, 1), command, 0.0)),
             tensor(run.fins),
             tensor(run.voltage),
             tensor(run.altitude),
@@ -200,7 +200,7 @@ class _Replay:
             )
             seen = self.model.sense(Sensed(at.position, at.quaternion, at.nu, rate)).nu_dot
         assert seen is not None
-        return np.where(self.good[:, None], seen.numpy(), np.nan)
+        return np.where(np.expand_dims(self.good, 1), seen.numpy(), np.nan)
 
 
 def one_step(model: GreyBox, log: Log, derivative: Derivative) -> list[OneStep]:

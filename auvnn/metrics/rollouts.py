@@ -106,7 +106,7 @@ def roll(model: GreyBox, log: Log, horizon: str, scale: Scale) -> Rolled | None:
         (error**2 * mask).sum(1),
         (stay**2 * mask).sum(1),
         mask.sum(1),
-        diverged,
+        np.asarray(diverged),
     )
 
 

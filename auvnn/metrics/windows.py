@@ -151,11 +151,11 @@ def cut_windows(
         if command is None:
             wanted = "thruster_1 ..." if kind == "thrusters" else "tau_X ... tau_N"
             raise InputError(f"run {run.number} has no {wanted}: the model is driven by {kind}")
-        known = np.isfinite(command).all(axis=1)
+        known = np.asarray(np.isfinite(command).all(axis=1))
         if run.fins is not None:
             known &= np.isfinite(run.fins).all(axis=1)
         for part in stretches(run.t, known, None, 2):
-            span = run.t[part.stop - 1] - run.t[part.start] if np.isinf(horizon) else horizon
+            span = float(run.t[part.stop - 1] - run.t[part.start]) if np.isinf(horizon) else horizon
             pieces += [
                 (run, command, a, b, part.start)
                 for a, b in _starts(run, part, span, stride or span, partial or bool(np.isinf(horizon)))
@@ -203,26 +203,29 @@ def cut_windows(
     mask &= (np.arange(rows)[None, :] < length[:, None])[..., None]
     filled = np.where(seen, measured, 0.0)
     filled[..., 3] = np.where(attitude[..., 0], filled[..., 3], 1.0)
-    double = {"dtype": torch.float64}
     fins, voltage, altitude = optional("fins"), optional("voltage"), optional("altitude")
     inputs = Inputs(
-        torch.tensor(gather(lambda _, command: command), **double),
-        *(None if x is None else torch.tensor(x, **double) for x in (fins, voltage, altitude)),
+        _double(gather(lambda _, command: command)),
+        *(None if x is None else _double(x) for x in (fins, voltage, altitude)),
     )
-    eta = torch.tensor(filled[..., :7], **double)
+    eta = _double(filled[..., :7])
     has_rate = bool(mask[..., ACCELERATION].any())
     return Windows(
         np.array([run.number for run, *_ in pieces]),
         np.array([a for _, _, a, *_ in pieces]),
-        torch.tensor(times, **double),
+        _double(times),
         eta,
-        torch.tensor(filled[..., 7:13], **double),
-        torch.tensor(filled[..., 13:], **double) if has_rate else None,
+        _double(filled[..., 7:13]),
+        _double(filled[..., 13:]) if has_rate else None,
         inputs,
-        torch.tensor(mask, **double),
+        _double(mask),
         length,
         before,
     )
+
+
+def _double(values: np.ndarray) -> Tensor:
+    return torch.tensor(values, dtype=torch.float64)
 
 
 def _spikes(run: Run, _: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -27,6 +28,10 @@ class Drive:
     mean: list[list[Tensor]]
     slope: list[list[Tensor]] | None
     start: list[Tensor]
+
+
+def _double(values: Any) -> Tensor:
+    return torch.tensor(values, dtype=torch.float64)
 
 
 class Actuators(nn.Module):
@@ -55,24 +60,22 @@ class Actuators(nn.Module):
                 f"{vehicle.name} has no thrusters in its model file: log tau_X ... tau_N instead"
             )
         self.actuation = actuation
-        double = {"dtype": torch.float64}
         if actuation == "wrench":
-            self.register_buffer("allocation", torch.eye(6, **double))
+            self.register_buffer("allocation", torch.eye(6, dtype=torch.float64))
             return
         units = vehicle.thrusters
-        positions = torch.tensor([list(u.position) for u in units], **double)
-        directions = torch.tensor([list(u.direction) for u in units], **double)
+        positions = _double([list(u.position) for u in units])
+        directions = _double([list(u.direction) for u in units])
         self.register_buffer("allocation", allocation_matrix(positions, directions))
-        self.register_buffer("max_forward", torch.tensor([float(u.max_forward) for u in units], **double))
-        self.register_buffer("max_reverse", torch.tensor([float(u.max_reverse) for u in units], **double))
+        self.register_buffer("max_forward", _double([float(u.max_forward) for u in units]))
+        self.register_buffer("max_reverse", _double([float(u.max_reverse) for u in units]))
         self.tables: list[int] = []
         for index, unit in enumerate(units):
-            if unit.curve != "quadratic":
+            curve = unit.curve
+            if not isinstance(curve, str):
                 self.tables.append(index)
-                self.register_buffer(
-                    f"table_command_{index}", torch.tensor(list(unit.curve.command), **double)
-                )
-                self.register_buffer(f"table_thrust_{index}", torch.tensor(list(unit.curve.thrust), **double))
+                self.register_buffer(f"table_command_{index}", _double(list(curve.command)))
+                self.register_buffer(f"table_thrust_{index}", _double(list(curve.thrust)))
 
     @property
     def size(self) -> int:

@@ -28,6 +28,7 @@ from auvnn.physics.restoring import restoring_force
 from auvnn.vehicle import Vehicle
 
 if TYPE_CHECKING:
+    from auvnn.damping.bank import DampingBank
     from auvnn.models.rollout import Trajectory
 
 
@@ -72,7 +73,7 @@ class GreyBox(nn.Module):
         self,
         vehicle: Vehicle,
         effects: Iterable[Effect] = (),
-        damping: nn.Module | None = None,
+        damping: DampingBank | None = None,
         actuation: str | None = None,
     ) -> None:
         """Turn the vehicle's numbers into buffers."""
@@ -136,9 +137,14 @@ class GreyBox(nn.Module):
         return self._by_hook[hook]
 
     @property
+    def members(self) -> list[Effect]:
+        """The effects, in order of action."""
+        return [e for e in self.effects if isinstance(e, Effect)]
+
+    @property
     def effect_names(self) -> list[str]:
         """Names of the effects, in order of action."""
-        return [str(e.name) for e in self.effects]
+        return [str(e.name) for e in self.members]
 
     def effect(self, name: str) -> Effect:
         """Return an effect by name.
@@ -146,7 +152,7 @@ class GreyBox(nn.Module):
         Raises:
             ConfigError: the model has no such effect.
         """
-        for effect in self.effects:
+        for effect in self.members:
             if effect.name == name:
                 return effect
         raise ConfigError(
@@ -259,10 +265,10 @@ class GreyBox(nn.Module):
     ) -> Tensor:
         """Return the acceleration from the thrust that acts now; see `forward` for shapes and units."""
         terms, prepared = self._terms(position, rotation, nu, thrust, inputs, time, prepared)
-        total = None
-        for term in terms.values():
-            total = term if total is None else total + term
-        return matvec(prepared.inverse, total)
+        first, *others = terms.values()
+        for term in others:
+            first = first + term
+        return matvec(prepared.inverse, first)
 
     def wrenches(
         self, position: Tensor, rotation: Tensor, nu: Tensor, thrust: Tensor, inputs: Inputs, time: Tensor
@@ -327,7 +333,7 @@ class GreyBox(nn.Module):
             terms["linear damping"] = -matvec(body.linear, nu_r)
         if body.quadratic is not None:
             terms["quadratic damping"] = -matvec(body.quadratic, nu_r.abs() * nu_r)
-        if body.element_linear is not None:
+        if body.element_linear is not None and body.element_quadratic is not None:
             to_parts = self._known("element_transform").flatten(0, 1)
             own = matvec(to_parts, nu_r)
             law = body.element_linear.flatten(-2) + body.element_quadratic.flatten(-2) * own.abs()
@@ -341,7 +347,10 @@ class GreyBox(nn.Module):
             terms["fins"] = fin_wrench(
                 nu_r,
                 angles,
-                *(self._known(f"fin_{n}") for n in ("frame", "area", "lift_slope", "stall")),
+                self._known("fin_frame"),
+                self._known("fin_area"),
+                self._known("fin_lift_slope"),
+                self._known("fin_stall"),
                 float(self.vehicle.water_density),
             )
         for effect in self.using("wrench"):

@@ -40,7 +40,9 @@ def load(source: str | Path, actuation: str | None = None) -> GreyBox:
         return from_vehicle(load_vehicle(str(source)), actuation)
     files = read_folder(path)
     if MODEL not in files:
-        raise ModelError(f"{path} holds no {MODEL}: give a saved model's folder, a YAML file or a built-in name")
+        raise ModelError(
+            f"{path} holds no {MODEL}: give a saved model's folder, a YAML file or a built-in name"
+        )
     # Parsed from the bytes whose hash was checked, not from the file, which may have changed since.
     data: dict[str, Any] = parse_yaml(files[MODEL].decode("utf-8"), str(path / MODEL))
     networks = data.pop(SUBNETWORKS, None)

@@ -118,12 +118,14 @@ def solve(
             return torch.where(lost.unsqueeze(-1), torch.zeros_like(change), change)
 
         try:
-            y = odeint(rate, y, torch.stack([begin, end]), method=method, rtol=rtol, atol=atol)[-1]
+            run = odeint(rate, y, torch.stack([begin, end]), method=method, rtol=rtol, atol=atol)
         except AssertionError as problem:
             raise ConfigError(
                 f"torchdiffeq {method} gave up at t = {float(begin):g} s ({problem or 'step too small'}): "
                 "loosen rtol and atol, or use solver=rk4"
             ) from None
+        assert isinstance(run, Tensor)
+        y = run[-1]
         quaternion = y[..., 3:7] / torch.linalg.norm(y[..., 3:7], dim=-1, keepdim=True)
         y = torch.cat([y[..., :3], quaternion, y[..., 7:]], dim=-1)
         out.append(torch.where(lost.unsqueeze(-1), torch.full_like(y, torch.nan), y))

@@ -209,11 +209,9 @@ def reduce(windows: Windows, responses: Iterable[Response], sigma: Array) -> tup
             ]
         )
     joined = [np.concatenate(p) for p in zip(*parts, strict=True)]
-    return (
-        Statistics(*joined[:7], windows.run.astype(np.int64), windows.first.astype(np.int64)),
-        joined[7],
-        joined[8],
-    )
+    hessian, slope, cost, channel, count, rough, pairs, change, follow = joined
+    run, first = windows.run.astype(np.int64), windows.first.astype(np.int64)
+    return Statistics(hessian, slope, cost, channel, count, rough, pairs, run, first), change, follow
 
 
 def _weights(sigma: Array) -> Tensor:

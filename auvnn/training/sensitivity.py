@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 from torch.func import functional_call, jacfwd, jacrev, vmap
+from torch.utils._pytree import register_pytree_node
 
 from auvnn.effects import Sensed
 from auvnn.metrics.free_run import MAX_STEP, predict
@@ -106,7 +107,8 @@ class _Thrust(nn.Module):
 def _flat(inputs: Inputs) -> tuple[Inputs, Inputs]:
     """Return inputs with (B, L) joined, and the axes over which `vmap` runs."""
     fields = (inputs.command, inputs.fins, inputs.voltage, inputs.altitude)
-    joined = Inputs(*(None if x is None else x.flatten(0, 1) for x in fields))
+    flat = [None if x is None else x.flatten(0, 1) for x in fields[1:]]
+    joined = Inputs(inputs.command.flatten(0, 1), *flat)
     return joined, Inputs(*(None if x is None else 0 for x in fields))  # type: ignore[arg-type]
 
 
@@ -161,8 +163,8 @@ def respond(
         eta, nu = predict(model, windows, initial)
         error = _error(model, windows, eta, nu)
     count, length = nu.shape[:2]
-    order = [next(k for k, e in enumerate(model.effects) if e.name == name) for name in names]
-    thetas = {f"model.effects.{k}.theta": model.effects[k].theta.detach() for k in order}
+    order = [model.effect_names.index(name) for name in names]
+    thetas = {f"model.effects.{k}.theta": model.members[k].theta.detach() for k in order}
     sizes = [thetas[f"model.effects.{k}.theta"].shape[0] for k in order]
     total = sum(sizes)
     times = windows.times[:, windows.warmup :]
@@ -203,7 +205,7 @@ def _thrusts(
     with torch.no_grad():
         mean, start = module(windows, substeps)
     acting = {id(e) for hook in ("command", "respond") for e in model.using(hook)}
-    keys = [k for k in thetas if id(model.effects[int(k.split(".")[2])]) in acting]
+    keys = [k for k in thetas if id(model.members[int(k.split(".")[2])]) in acting]
     if not keys:
         return mean, start, None, None
     slopes = jacfwd(lambda some: functional_call(module, some, (windows, substeps)))(
@@ -259,7 +261,7 @@ def _flatten_inputs(i: Inputs) -> tuple[list, None]:
 
 
 # `vmap` must see the tensors inside.
-torch.utils._pytree.register_pytree_node(Inputs, _flatten_inputs, lambda children, _: Inputs(*children))
+register_pytree_node(Inputs, _flatten_inputs, lambda children, _: Inputs(*children))
 
 
 def _propagate(

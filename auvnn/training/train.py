@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 import torch
@@ -99,7 +99,7 @@ def targets(model: GreyBox, log: Log, derivative: Derivative) -> tuple[Array, Ar
         nu (N, 6) through the water; target (N, 6), NaN where a sample is missing; run (N,).
     """
     recorder = _Recorder()
-    bare = GreyBox(model.vehicle, model.copied_effects(), recorder, model.actuation)
+    bare = GreyBox(model.vehicle, model.copied_effects(), cast(DampingBank, recorder), model.actuation)
     velocities, wrenches, numbers = [], [], []
     for run in log.runs:
         measured, predicted = accelerations(bare, run, derivative)

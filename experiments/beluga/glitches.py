@@ -25,7 +25,9 @@ def held(pose: np.ndarray) -> np.ndarray:
     return mask
 
 
-def contradicted(t: np.ndarray, moved: np.ndarray, speed: np.ndarray, rows: np.ndarray, room: float) -> np.ndarray:
+def contradicted(
+    t: np.ndarray, moved: np.ndarray, speed: np.ndarray, rows: np.ndarray, room: float
+) -> np.ndarray:
     """Return a mask (N,) of short stretches between two jumps.
 
     Args:
@@ -46,7 +48,9 @@ def contradicted(t: np.ndarray, moved: np.ndarray, speed: np.ndarray, rows: np.n
 
 def doubtful(run: Run) -> tuple[np.ndarray, np.ndarray]:
     """Return masks (N,) of attitudes and of positions that contradict the velocities."""
-    speed, rate = (np.nan_to_num(np.linalg.norm(run.nu[:, part], axis=1)) for part in (slice(0, 3), slice(3, 6)))
+    speed, rate = (
+        np.nan_to_num(np.linalg.norm(run.nu[:, part], axis=1)) for part in (slice(0, 3), slice(3, 6))
+    )
     masks = []
     for pose, size, room in ((run.quaternion, rate, TURN), (run.position, speed, STEP)):
         mask = held(pose)
@@ -66,7 +70,12 @@ def without_glitches(log: Log) -> tuple[Log, list[tuple[int, int]]]:
     runs, counts = [], []
     for run in log.runs:
         turned, moved = doubtful(run)
-        runs.append(replace(run, quaternion=np.where(turned[:, None], np.nan, run.quaternion),
-                            position=np.where(moved[:, None], np.nan, run.position)))
+        runs.append(
+            replace(
+                run,
+                quaternion=np.where(turned[:, None], np.nan, run.quaternion),
+                position=np.where(moved[:, None], np.nan, run.position),
+            )
+        )
         counts.append((int(turned.sum()), int(moved.sum())))
     return replace(log, runs=tuple(runs)), counts

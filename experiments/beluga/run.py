@@ -42,11 +42,25 @@ def judge(words: str, model, test: Log) -> dict:
     r2 = {k: one[k]["r2"] for k in one}
     print(f"{words:<28} R2 " + " ".join(f"{v:6.2f}" for v in r2.values()), flush=True)
     for horizon, row in rolled.items():
-        channels = " ".join(f"{row[c]['nrmse'] if row[c]['nrmse'] is not None else np.nan:6.2f}" for c in "uvwpqr")
-        print(f"{'':<22}{horizon:>3} s    {channels}  total {row['total']:.3f}  persistence "
-              f"{row['persistence']:.3f}", flush=True)
-    return {"r2": r2, "rollout": {h: {"total": row["total"], "persistence": row["persistence"],
-                                      **{c: row[c]["nrmse"] for c in "uvwpqr"}} for h, row in rolled.items()}}
+        channels = " ".join(
+            f"{row[c]['nrmse'] if row[c]['nrmse'] is not None else np.nan:6.2f}" for c in "uvwpqr"
+        )
+        print(
+            f"{'':<22}{horizon:>3} s    {channels}  total {row['total']:.3f}  persistence "
+            f"{row['persistence']:.3f}",
+            flush=True,
+        )
+    return {
+        "r2": r2,
+        "rollout": {
+            h: {
+                "total": row["total"],
+                "persistence": row["persistence"],
+                **{c: row[c]["nrmse"] for c in "uvwpqr"},
+            }
+            for h, row in rolled.items()
+        },
+    }
 
 
 def main() -> None:
@@ -60,12 +74,16 @@ def main() -> None:
     raw = read(data, FITTED, "mapping-raw.yaml")
     quality = raw.quality()
     result["reversed"] = [n for n, k in quality.kinematics.items() if k.scale is not None and k.scale < 0]
-    print("check, signs as logged: reversed against the attitude's derivative:", ", ".join(result["reversed"]))
+    print(
+        "check, signs as logged: reversed against the attitude's derivative:", ", ".join(result["reversed"])
+    )
 
     log, doubtful = without_glitches(read(data, FITTED, "mapping.yaml"))
     test, _ = without_glitches(read(data, (HELD_OUT,), "mapping.yaml"))
     print("poses that contradict the velocities, left out (attitude, position) by run:", doubtful)
-    log = Log.from_runs([r.cut(slice(0, int(np.searchsorted(r.t, r.t[0] + seconds)))) for r in log.runs], name="beluga")
+    log = Log.from_runs(
+        [r.cut(slice(0, int(np.searchsorted(r.t, r.t[0] + seconds)))) for r in log.runs], name="beluga"
+    )
     model = load(HERE / "beluga.yaml", actuation="thrusters")
 
     result["as given"] = judge("as given", model, test)
@@ -74,9 +92,15 @@ def main() -> None:
     found.write(out / "diagnose")
     for line in found.story:
         print("diagnose:", line, flush=True)
-    result["diagnosis"] = {"verdict": found.verdict, "missing": found.missing, "steps": found.steps,
-                           "ranking": [{k: c[k] for k in ("effect", "p_value", "explained", "cv_before", "cv_after",
-                                                          "parameters")} for c in found.candidates]}
+    result["diagnosis"] = {
+        "verdict": found.verdict,
+        "missing": found.missing,
+        "steps": found.steps,
+        "ranking": [
+            {k: c[k] for k in ("effect", "p_value", "explained", "cv_before", "cv_after", "parameters")}
+            for c in found.candidates
+        ],
+    }
     done: list[str] = []
     for effect in STEPS:
         answer = add(model, log, [*done, effect], test=test, derivative=FILTER)
@@ -86,7 +110,10 @@ def main() -> None:
         result[words] = judge(words, answer.model, test)
         result[words]["gain"], result[words]["accepted"] = answer.gain, answer.accepted
         result[words]["parameters"], result[words]["coefficients"] = answer.parameters, answer.coefficients
-        print(f"{'':<28} over the refitted model: gain {answer.gain['value']:.3f} +- {answer.gain['std']:.3f}", flush=True)
+        print(
+            f"{'':<28} over the refitted model: gain {answer.gain['value']:.3f} +- {answer.gain['std']:.3f}",
+            flush=True,
+        )
         answer.write(out / f"add-{len(done) + 1}-{effect}")
         done.append(effect)
         result["seconds"] = time.monotonic() - began

@@ -264,7 +264,7 @@ def _wrong_table(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
         seed = finite(r.get("seed"))
         out.append([
             text(r, "hidden"), ": ".join(filter(None, words)),
-            ", ".join(map(str, ranking)) if isinstance(ranking, (list, tuple)) else "–",
+            ", ".join(map(str, ranking)) if isinstance(ranking, (list, tuple)) and ranking else "–",
             *(text(r, k, "–") for k in ("size", "noise", "excitation", "vehicle")),
             "–" if seed is None else str(round(seed)), p_value(r.get("p_value")),
         ])  # fmt: skip

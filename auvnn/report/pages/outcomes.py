@@ -24,14 +24,15 @@ def rows_of(view: View) -> list[Row]:
 
 
 def text(row: Row, key: str, unknown: str = "?") -> str:
-    """Return one entry as text."""
-    return str(row.get(key) or unknown)
+    """Return one entry that is a text."""
+    value = row.get(key)
+    return value if isinstance(value, str) and value else unknown
 
 
 def names(row: Row) -> list[str]:
     """Return the effects that were named, or that a declared group holds."""
     found = row.get("missing")
-    return [str(m) for m in found] if isinstance(found, (list, tuple)) else []
+    return [m for m in found if isinstance(m, str)] if isinstance(found, (list, tuple)) else []
 
 
 def answer(row: Row) -> str:
@@ -69,7 +70,7 @@ def with_nothing(rows: Sequence[Row]) -> list[Row]:
 
 def values(rows: Sequence[Row], key: str) -> list[str]:
     """Return the texts that an entry takes, each once, in their order."""
-    return list(dict.fromkeys(str(r[key]) for r in rows if r.get(key) is not None))
+    return list(dict.fromkeys(r[key] for r in rows if text(r, key, "")))
 
 
 def numbers(rows: Sequence[Row], key: str) -> list[float]:
