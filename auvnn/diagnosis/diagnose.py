@@ -262,11 +262,13 @@ class _Search:
         self, scores: dict[str, Score], at: Layout, base: list[str], chosen: list[str], current: Explanation
     ) -> tuple[str, Explanation | None, list[Explanation]]:
         """Refit the leading effects and return the verdict, the best, and all that were refitted."""
-        leading = sorted((s for s in scores.values() if s.degrees), key=lambda s: -s.evidence)[:LEADERS]
+        significant = [s for s in scores.values() if s.degrees and s.p_value < ALPHA]
+        leading = sorted(significant, key=lambda s: -s.evidence)[:LEADERS]
         top = leading[0].evidence if leading else 0.0
-        leading = [
-            s for s in leading if s.p_value < ALPHA and s.evidence > min(top - REACH, REACH_SHARE * top)
-        ]
+        leading = [s for s in leading if s.evidence > min(top - REACH, REACH_SHARE * top)]
+        # Evidence counts an effect of many parameters low while it is small; a test that is clear even among
+        # all the others lets it be judged by what it does on runs left out.
+        clear = {s.effect for s in significant if s.p_value < ALPHA / len(scores)}
         tried = []
         for candidate in leading:
             self.say(f"fitting {candidate.effect}")
@@ -300,7 +302,8 @@ class _Search:
         paying = [
             e
             for e in tried
-            if e.evidence > current.evidence and self._pays(e, self._without(e, base, current))
+            if (e.evidence > current.evidence or e.effects[-1] in clear)
+            and self._pays(e, self._without(e, base, current))
         ]
         if not paying:
             return "unknown", None, tried

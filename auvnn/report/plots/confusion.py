@@ -18,8 +18,8 @@ from auvnn.report.words import label
 OUTCOMES = ("ambiguous", "unknown", "adequate", "fault")
 RIGHT = {"nothing": "adequate"}
 GAP = 0.35  # cells, between names and outcomes
-# White to ink, ever darker, so that a grey print keeps the order.
-SHADES = ["#ffffff", "#c9dcec", style.BAR, style.AFTER.color, "#00305c"]
+# Ever darker, so that a grey print keeps the order, yet not so dark that the frame is lost.
+SHADES = ["#ffffff", "#c9dcec", style.BAR, style.AFTER.color]
 # As many rows or columns as the numbers in the cells stay legible for.
 MOST = 40
 
