@@ -1,6 +1,6 @@
 """The loop on a real vehicle: check, compare, diagnose, add, step by step, with `random-2` held out throughout.
 
-    python experiments/beluga/run.py DATA [OUT] [SECONDS]
+    python experiments/beluga/run.py DATA [OUT] [SECONDS] [--no-diagnosis]
 
 DATA is the folder with Beluga's six CSV files, OUT where the answers go, SECONDS how much of each run is fitted.
 """
@@ -63,6 +63,24 @@ def judge(words: str, model, test: Log) -> dict:
     }
 
 
+def name_what_is_missing(model, log: Log, out: Path, result: dict) -> None:
+    """Diagnose by cross-validation over the fitted runs, and keep the answer."""
+    found = diagnose(model, log, max_effects=3, progress=lambda w: print("   ", w, flush=True))
+    found.write(out / "diagnose")
+    for line in found.story:
+        print("diagnose:", line, flush=True)
+    result["diagnosis"] = {
+        "verdict": found.verdict,
+        "missing": found.missing,
+        "steps": found.steps,
+        "ranking": [
+            {k: c[k] for k in ("effect", "p_value", "explained", "cv_before", "cv_after", "parameters")}
+            for c in found.candidates
+        ],
+    }
+    save(out, result)
+
+
 def main() -> None:
     """Go the whole way and write `result.json`."""
     torch.set_num_threads(1)
@@ -88,37 +106,33 @@ def main() -> None:
 
     result["as given"] = judge("as given", model, test)
     compare(model, test, derivative=FILTER).write(out / "compare")
-    found = diagnose(model, log, max_effects=3, progress=lambda w: print("   ", w, flush=True))
-    found.write(out / "diagnose")
-    for line in found.story:
-        print("diagnose:", line, flush=True)
-    result["diagnosis"] = {
-        "verdict": found.verdict,
-        "missing": found.missing,
-        "steps": found.steps,
-        "ranking": [
-            {k: c[k] for k in ("effect", "p_value", "explained", "cv_before", "cv_after", "parameters")}
-            for c in found.candidates
-        ],
-    }
-    done: list[str] = []
-    for effect in STEPS:
-        answer = add(model, log, [*done, effect], test=test, derivative=FILTER)
-        if not done:
+    if "--no-diagnosis" not in sys.argv:
+        name_what_is_missing(model, log, out, result)
+    for number, effect in enumerate(STEPS, start=1):
+        answer = add(model, log, effect, test=test, derivative=FILTER)
+        if number == 1:
             result["coefficients refitted"] = judge("coefficients refitted", answer.refitted_model, test)
         words = f"+ {effect}"
         result[words] = judge(words, answer.model, test)
-        result[words]["gain"], result[words]["accepted"] = answer.gain, answer.accepted
-        result[words]["parameters"], result[words]["coefficients"] = answer.parameters, answer.coefficients
+        result[words].update(gain=answer.gain, accepted=answer.accepted, parameters=answer.parameters)
         print(
-            f"{'':<28} over the refitted model: gain {answer.gain['value']:.3f} +- {answer.gain['std']:.3f}",
+            f"{'':<28} over the same model refitted without it: {answer.gain['value']:.3f} +- "
+            f"{answer.gain['std']:.3f}, {'kept' if answer.accepted else 'not kept'}",
             flush=True,
         )
-        answer.write(out / f"add-{len(done) + 1}-{effect}")
-        done.append(effect)
+        answer.write(out / f"add-{number}-{effect}")
+        if answer.accepted:
+            # The next effect has to pay on top of what this one explains.
+            model = answer.model
         result["seconds"] = time.monotonic() - began
-        out.mkdir(parents=True, exist_ok=True)
-        (out / "result.json").write_text(json.dumps(plain(result), indent=1), encoding="utf-8")
+        save(out, result)
+    model.save(out / "model", overwrite=True)
+
+
+def save(out: Path, result: dict) -> None:
+    """Write what is known so far."""
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "result.json").write_text(json.dumps(plain(result), indent=1), encoding="utf-8")
 
 
 if __name__ == "__main__":

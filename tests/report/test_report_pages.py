@@ -309,7 +309,7 @@ def assert_survives(kind, answer, case):
 
 
 @pytest.mark.parametrize("kind", KINDS[:-1])
-@pytest.mark.parametrize("junk", JUNK, ids=repr)
+@pytest.mark.parametrize("junk", JUNK, ids=lambda value: type(value).__name__)
 def test_an_answer_of_nothing_but_junk_still_gives_a_page(unseen, kind, junk):
     answer = make(kind, 60, 1)
     for name in everything_else(kind):
