@@ -116,9 +116,21 @@ def _has(log: Log, channel: str) -> bool:
     return all(channel in run.channels for run in log.runs)
 
 
-def windows_for(model: GreyBox, log: Log) -> Windows:
-    """Cut a log for fitting: windows of 5 s, or shorter where that leaves fewer than twelve."""
-    horizon = float(np.clip(log.duration / 12, 1.0, HORIZON))
+def windows_for(model: GreyBox, log: Log, window: float | None = None) -> Windows:
+    """Cut a log for fitting: windows of 5 s, or shorter where that leaves fewer than twelve.
+
+    Args:
+        model: says which commands drive it.
+        log: the log.
+        window: another length, s. Where disturbances rather than sensors limit the prediction, short windows
+            tell more: errors that a disturbance leaves grow with time, those of a sensor do not.
+
+    Raises:
+        ConfigError: a length that is not positive.
+    """
+    if window is not None and not 0 < window < 1e4:
+        raise ConfigError(f"window={window} must be a number of seconds above zero")
+    horizon = float(np.clip(log.duration / 12, 1.0, HORIZON)) if window is None else float(window)
     return cut_windows(log, horizon, warmup=WARMUP, kind=model.actuation, partial=True)
 
 
@@ -128,6 +140,7 @@ def diagnose(
     effects: str | Sequence[str] | None = None,
     *,
     max_effects: int = 4,
+    window: float | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """Say which physical effects a model lacks, by a log.
@@ -141,6 +154,7 @@ def diagnose(
         log: measurements; cross-validated over its runs. A test log has no place here.
         effects: names to consider; the whole catalogue by default.
         max_effects: look for at most this many.
+        window: length of the windows of free running that are fitted, s; by default 5.
         progress: told in words what is being done.
 
     Raises:
@@ -151,7 +165,7 @@ def diagnose(
     if max_effects < 1:
         raise ConfigError(f"max_effects={max_effects} must be at least 1")
     usable, needs = candidates_for(model, log, effects)
-    windows = windows_for(model, log)
+    windows = windows_for(model, log, window)
     if len(windows) < 4:
         raise InputError(f"{log.name} gives only {len(windows)} windows of free running: record a longer log")
     layout = lay_out(model, usable)

@@ -88,6 +88,7 @@ def add(
     *,
     test: Log | None = None,
     derivative: dict[str, Any] | None = None,
+    window: float | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Improvement:
     """Add effects, fit them jointly with the uncertain coefficients on `log`, and judge on held-out data.
@@ -98,6 +99,7 @@ def add(
         effects: names.
         test: what to judge on; by default the last run of `log`, or the last 30 % of a single one.
         derivative: how accelerations are obtained where they were not measured.
+        window: length of the windows of free running that are fitted, s; by default 5.
         progress: told in words what is being done.
 
     Raises:
@@ -112,7 +114,7 @@ def add(
         log, test, held_out = log.split()
     else:
         leakage(log, test)
-    windows = windows_for(model, log)
+    windows = windows_for(model, log, window)
     layout = lay_out(model, names)
     base = [n for n in layout.names if n not in names or n in layout.nuisance]
     say("refitting the uncertain coefficients alone")

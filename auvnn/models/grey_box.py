@@ -39,6 +39,10 @@ def _tensor(value: Any) -> Tensor:
     return torch.tensor(np.array(value, dtype=np.float64))
 
 
+# The terms of the equation of motion that resist motion through the water.
+DRAG_TERMS = ("linear damping", "quadratic damping", "damping elements", "damping subnetworks")
+
+
 @dataclass(frozen=True)
 class Prepared:
     """What of the equations does not change with the state: body and inertia matrices, (..., 6, 6)."""

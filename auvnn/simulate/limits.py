@@ -9,6 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.models import GreyBox, Inputs
+from auvnn.models.grey_box import DRAG_TERMS
 from auvnn.simulate.allocation import Allocation
 from auvnn.simulate.cruise import Cruise, cruise
 from auvnn.vehicle import Vehicle
@@ -95,7 +96,7 @@ def drag_at(model: GreyBox, nu: Array) -> Array:
         terms = model.wrenches(still, level, moving, nothing.command, nothing, time)
         total = torch.zeros_like(moving)
         for name, term in terms.items():
-            if name.startswith("damping"):
+            if name in DRAG_TERMS:
                 total = total - term
         return total.numpy()
 

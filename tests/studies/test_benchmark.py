@@ -46,7 +46,7 @@ def row(
 
 # Ten logs with an effect and five with nothing; what they should count as stands beside each.
 ROWS = [
-    row("ocean_current", "named", "ocean_current", errors=[(0.02, 0.5), (0.01, -1.0)]),  # right
+    row("ocean_current", "named", "ocean_current", errors=[(0.02, 0.5), (0.01, -3.0)]),  # right
     row("ocean_current", "named", "ocean_current", errors=[(0.05, 2.5), (0.03, -0.1)]),  # right
     row("ocean_current", "named", "ocean_current", "cg_offset", errors=[(0.04, 1.0)]),  # one name too many
     row("ocean_current", "named", "constant_force", errors=[(0.9, 9.0)]),  # wrong name
@@ -105,8 +105,8 @@ def test_rates_are_those_counted_by_hand():
         "logs": 15, "logs_with_effect": 10, "logs_with_nothing": 5, "named_first_share": 3 / 10,
         "named_or_in_group_share": 4 / 10, "adequate_with_nothing": 3, "false_alarms_with_nothing": 2,
         "faults": 1,
-        # Five z of logs that were named first: 0.5, -1.0, 2.5, -0.1, 1.0.
-        "coverage_95_share": 4 / 5, "worst_relative_error": 0.05, "median_seconds": 10.0,
+        # Five z of logs that were named first: 0.5, -3.0, 2.5, -0.1, 1.0.
+        "coverage_95_share": 3 / 5, "worst_relative_error": 0.05, "median_seconds": 10.0,
     }  # fmt: skip
     assert {k: metrics[k] for k in expected} == pytest.approx(expected)
 
