@@ -175,6 +175,7 @@ def test_the_page_counts_as_the_study_does():
 
     more = {"errors": {"x": {"relative": 0.5, "z": 3.0}}}
     some = [*rows(), row("cg_offset", "named"), row("cg_offset", "named", "cg_offset", "thruster_lag", **more)]
+    some.append(row("cg_offset", "ambiguous", "thruster_lag", "ocean_current"))
     hidden = outcomes.with_effect(some)
     assert [outcomes.right(r) for r in hidden] == [named_first(r) for r in hidden]
     assert [outcomes.right(r) or outcomes.in_group(r) for r in hidden] == [in_group(r) for r in hidden]
@@ -182,6 +183,19 @@ def test_the_page_counts_as_the_study_does():
     z = outcomes.errors(some, "z")
     assert np.mean(np.abs(z) < 1.96) == answer.metrics["coverage_95_share"]
     assert outcomes.errors(some, "relative").max() == answer.metrics["worst_relative_error"]
+
+
+def test_the_figures_hold_the_counts():
+    figures = PAGE.figures(fake())
+    shown = [t.get_text() for t in figures["recovery"].axes[0].texts]
+    # Medium, then large: of all, of the current, of the offset's ten logs eight are large, of the lag.
+    assert shown == ["16 of 22", "8 of 8", "10 of 10", "0 of 2", "8 of 8", "6 of 10"]
+    ax = figures["confusion"].axes[0]
+    assert [t.get_text() for t in ax.get_xticklabels()] == [*EFFECTS, *OUTCOMES]
+    assert [t.get_text() for t in ax.get_yticklabels()] == [*EFFECTS, "nothing"]
+    lines = [[shown for (_, at), shown in cells(ax).items() if at == y] for y in ax.get_yticks()]
+    assert lines == [["10", "10"], ["8", "1", "1", "10"], ["2", "6", "1", "1", "10"], ["1", "3", "4"]]
+    assert "48 of 48" in figures["coverage"].axes[0].get_title("left")
 
 
 def test_a_benchmark_is_written_with_its_figures(tmp_path):
