@@ -115,7 +115,7 @@ def test_it_says_what_was_counted():
     assert "Most often missed is thruster_lag, 4 of 10: the answer was ocean_current (2) and adequate (1)." in said
     assert "With nothing hidden, 3 of 4 logs are found adequate (75 %" in said
     # 24 right ones and two wrong.
-    assert "Of 26 names that were given, 8 % are wrong." in said
+    assert "Wrong names: 8 % of the 26 that were given." in said
     assert "For 48 of 48 parameters (100 %) the 95 % interval holds the true value" in said
     assert "relative to the effect's size the largest error is 3 % with noise realistic." in said
     assert "1 log ended in a fault instead of an answer." in said
@@ -135,7 +135,7 @@ def test_exact_coefficients_are_a_caveat():
 
 
 def test_without_metrics_wrong_names_are_counted_from_the_rows():
-    assert "Of 26 names that were given, 8 % are wrong." in text(fake(metrics=None))
+    assert "Wrong names: 8 % of the 26 that were given." in text(fake(metrics=None))
 
 
 def test_every_log_that_was_not_answered_right_is_listed():
@@ -157,8 +157,12 @@ def test_a_name_too_many_is_not_right():
 def test_the_tables_hold_the_counts():
     said = text(fake())
     assert "rov95 realistic multisine 30 24 (80 %) 25 (83 %) 3 % 4 3 (75 %) 1" in said
-    assert "cg_offset large realistic multisine cg_offset 8, unknown 1, ambiguous 1 10 8 9 3 %" in said
-    assert "nothing none realistic multisine adequate 3, unknown 1 4 – – –" in said
+    assert "cg_offset large cg_offset 8, unknown 1, ambiguous 1 10 8 9 3 %" in said
+    assert "nothing none adequate 3, unknown 1 4 – – –" in said
+    table = [*fake().table, {**fake().table[0], "noise": "none", "vehicle": "rov90"}]
+    said = text(fake(table=table))
+    assert "hidden size vehicle noise answers logs" in said
+    assert "cg_offset large rov90 none cg_offset 8" in said
 
 
 def test_several_conditions_get_a_figure_each():

@@ -114,7 +114,7 @@ class BenchmarkPage(Page):
                 "effect's size.",
                 words=3,
             ),
-            Table("By what was hidden", *_case_table(view), words=5),
+            _case_table(view),
             Table("Logs that were not answered right", *_wrong_table(rows), caption, words=7),
             Table("Metrics", ["name", "value"], metrics),
         ]
@@ -194,7 +194,7 @@ def _wrong_words(rows: Sequence[Row], metrics: Mapping[str, Any]) -> str:
         return "No effect is named in any log."
     if share is None:
         share = sum(name != hidden for hidden, name in given) / len(given)
-    return f"Of {plural(len(given), 'name')} that were given, {percent(share)} are wrong."
+    return f"Wrong names: {percent(share)} of the {count(len(given))} that were given."
 
 
 def _interval_words(hidden: Sequence[Row]) -> list[str]:
@@ -230,11 +230,13 @@ def _of(k: int, n: int) -> str:
     return f"{count(k)} ({percent(k / n)})" if n else "–"
 
 
-def _case_table(view: View) -> tuple[list[str], list[list[str]]]:
-    head = ["hidden", "size", "noise", "manoeuvre", "answers", "logs", "named first", "or in a group",
-            "largest error"]  # fmt: skip
+def _case_table(view: View) -> Table:
     entries = [e for e in view.items("table") if isinstance(e, Mapping)]
-    several = len({text(e, "vehicle") for e in entries}) > 1
+    shown = {"vehicle": "vehicle", "noise": "noise", "excitation": "manoeuvre"}
+    # What is the same for all of them stands in the table above.
+    shown = {k: words for k, words in shown.items() if len({text(e, k) for e in entries}) > 1}
+    head = ["hidden", "size", *shown.values(), "answers"]
+    counted = ["logs", "named first", "or in a group", "largest error"]
     out = []
     for e in entries:
         answers = e.get("answers")
@@ -242,13 +244,12 @@ def _case_table(view: View) -> tuple[list[str], list[list[str]]]:
         pairs.sort(key=lambda pair: -(finite(pair[1]) or 0))
         named = [count(e.get(k)) for k in ("named_first", "in_group")]
         out.append([
-            text(e, "hidden") + (f" ({text(e, 'vehicle')})" if several else ""),
-            *(text(e, k, "–") for k in ("size", "noise", "excitation")),
+            text(e, "hidden"), *(text(e, k, "–") for k in ("size", *shown)),
             ", ".join(f"{name} {count(n)}" for name, n in pairs), count(e.get("logs")),
             *(named if e.get("hidden") != NOTHING else ["–", "–"]),
             percent(e.get("worst_relative_error")),
         ])  # fmt: skip
-    return head, out
+    return Table("By what was hidden", [*head, *counted], out, words=len(head))
 
 
 def _wrong_table(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:

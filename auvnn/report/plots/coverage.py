@@ -38,7 +38,7 @@ def coverage(z: ArrayLike) -> Figure:
     values = np.asarray(z, dtype=float).ravel()
     values = np.sort(values[np.isfinite(values)])
     if values.size < FEWEST:
-        raise NoData(f"{values.size} parameters with a standard error are too few, {FEWEST} are the least")
+        raise NoData(f"too few parameters were estimated ({values.size} of the {FEWEST} that are needed)")
     # Two more than the farthest of so many true ones; what lies beyond is drawn at the edge.
     farthest = np.ceil(ndtri(1 - 0.5 / values.size)) + 2
     edge = float(np.clip(np.ceil(np.abs(values).max()), 3, max(farthest, 3)))
