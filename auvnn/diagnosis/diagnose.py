@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.answers import Answer
+from auvnn.diagnosis.advise import advise
 from auvnn.diagnosis.explain import Explanation, explain, standard_errors, weigh
 from auvnn.diagnosis.nuisance import Layout, lay_out, stated
 from auvnn.diagnosis.score import Score, inflation, score, similarity
@@ -141,6 +142,7 @@ def diagnose(
     *,
     max_effects: int = 4,
     window: float | None = None,
+    advice: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """Say which physical effects a model lacks, by a log.
@@ -155,6 +157,7 @@ def diagnose(
         effects: names to consider; the whole catalogue by default.
         max_effects: look for at most this many.
         window: length of the windows of free running that are fitted, s; by default 5.
+        advice: for an ambiguous answer, also work out which manoeuvre would tell the candidates apart.
         progress: told in words what is being done.
 
     Raises:
@@ -169,7 +172,7 @@ def diagnose(
     if len(windows) < 4:
         raise InputError(f"{log.name} gives only {len(windows)} windows of free running: record a longer log")
     layout = lay_out(model, usable)
-    search = _Search(layout, windows, usable, say)
+    search = _Search(layout, windows, usable, say, advice)
     return search.run(model, log, needs, max_effects)
 
 
@@ -177,9 +180,17 @@ class _Search:
     """One diagnosis under way."""
 
     def __init__(
-        self, layout: Layout, windows: Windows, usable: list[str], say: Callable[[str], None]
+        self,
+        layout: Layout,
+        windows: Windows,
+        usable: list[str],
+        say: Callable[[str], None],
+        advice: bool = True,
     ) -> None:
         self.layout, self.windows, self.usable, self.say = layout, windows, usable, say
+        self.advice = advice
+        # The explanations between which the log cannot decide.
+        self.rivals: list[Explanation] = []
         self.base = [n for n in layout.names if n not in usable or n in layout.nuisance]
         self.floor = TRUST * motion(windows) + 1e-9
         self.silent: list[str] = []
@@ -257,7 +268,7 @@ class _Search:
             order,
             0.0 if verdict == "adequate" else unexplained,
             depends,
-            None,
+            self._next(model),
             self._warnings(model, log),
             {
                 "method": f"none: free-running windows of {self._length():g} s with estimated initial states",
@@ -267,6 +278,11 @@ class _Search:
             similar,
             current,
         )
+
+    def _next(self, model: GreyBox) -> dict[str, Any] | None:
+        if not (self.advice and len(self.rivals) > 1):
+            return None
+        return advise(model, self.layout, self.rivals, (HORIZON, WARMUP), self.say).to_dict()
 
     def _length(self) -> float:
         times = self.windows.times[:, self.windows.warmup :]
@@ -324,6 +340,7 @@ class _Search:
         best = paying[0]
         rivals = [e for e in paying[1:] if best.evidence - e.evidence < ODDS]
         if rivals:
+            self.rivals = [best, *rivals]
             names = tuple(e.effects[-1] for e in [best, *rivals])
             return "ambiguous", replace(best, effects=(*chosen, *names)), tried
         # The weights follow the errors that the winner leaves.

@@ -58,13 +58,16 @@ def left_out(statistics: Statistics, theta: Array, held: Priors, fold: NDArray[n
     The fit is linear about the fit on everything, from the windows' own sums: no run is simulated again.
     """
     cost = np.empty(len(fold))
+    free = held.inside(theta)
     for f in np.unique(fold):
         keep = fold != f
         if not keep.any():
             keep = fold == f
         hessian = statistics.hessian[keep].sum(0) + np.diag(held.precision)
         gradient = statistics.slope[keep].sum(0) - held.precision * (theta - held.mean)
-        step = np.linalg.lstsq(hessian, gradient, rcond=1e-12)[0] if len(theta) else theta
+        step = np.zeros(len(theta))
+        if free.any():
+            step[free] = np.linalg.lstsq(hessian[np.ix_(free, free)], gradient[free], rcond=1e-12)[0]
         out = ~keep if (~keep).any() else keep
         cost[out] = (
             statistics.cost[out]

@@ -19,6 +19,9 @@ GROUPS = ("added_mass", "linear_damping", "quadratic_damping", "inertia")
 # An effect that is already part of the model was fitted or stated: it may move by its plausible scale.
 # A candidate is all but free, so that its prior neither pulls the estimate nor leaves it without bound.
 FREE = 10.0
+# What is merely uncertain stays within this many of its stated standard deviations. Without that limit a stated
+# coefficient takes on absurd values to imitate what is missing, and the missing effect finds nothing left to explain.
+REACH = 4.0
 # A parameter whose standard error the log brings down by less than this share of its prior's is not determined.
 DETERMINED = 0.99
 
@@ -87,17 +90,18 @@ def priors(layout: Layout, names: Sequence[str], free: Sequence[str] = ()) -> Pr
         free: those of them that are asked for: their stated uncertainty is left out.
     """
     uncertain = stated(layout.model)
-    mean, precision = [], []
+    mean, precision, reach = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
     for name in names:
         stated_values = layout.means[name]
         mean.append(stated_values)
         if name in uncertain and name not in free:
-            precision.append((uncertain[name] * np.maximum(np.abs(stated_values), 1e-3)) ** -2)
+            spread = uncertain[name] * np.maximum(np.abs(stated_values), 1e-3)
+            precision.append(spread**-2)
+            reach.append(REACH * spread)
         else:
             precision.append((FREE * scales(layout, name)) ** -2)
-    return Priors(
-        np.concatenate(mean) if mean else np.zeros(0), np.concatenate(precision) if mean else np.zeros(0)
-    )
+            reach.append(np.full(len(stated_values), np.inf))
+    return Priors(np.concatenate(mean), np.concatenate(precision), np.concatenate(reach))
 
 
 def scales(layout: Layout, name: str) -> Array:

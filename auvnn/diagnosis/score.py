@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from auvnn.diagnosis.nuisance import DETERMINED, FREE, Layout, priors, scales, stated
-from auvnn.training.prediction_error import Statistics, parameters_of
+from auvnn.training.prediction_error import Priors, Statistics, parameters_of
 
 Array = NDArray[np.float64]
 # Shares of a parameter's information below this are rounding.
@@ -66,6 +66,10 @@ def project(
     total = statistics.hessian.sum(0)
     held = priors(layout, others, free)
     theta = parameters_of(layout.model, others)
+    # What is at the end of its reach cannot move further to take the candidate's share.
+    movable = held.inside(theta)
+    f, theta = f[movable], theta[movable]
+    held = Priors(held.mean[movable], held.precision[movable])
     inner = total[np.ix_(f, f)] + np.diag(held.precision)
     carry = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
     by_window = statistics.slope[:, c] - statistics.slope[:, f] @ carry.T

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
 from small_logs import NOISE, make_log, small_vehicle
 
 from auvnn.logs import Log, Run
@@ -20,6 +20,7 @@ from auvnn.training.prediction_error import (
     Fitted,
     Priors,
     Statistics,
+    bounded_step,
     fit,
     parameters_of,
     reduce,
@@ -283,3 +284,18 @@ def test_a_lag_that_would_be_negative_ends_at_zero():
                  progress=told.append).theta[0] for x in (late, ahead)]
     assert found[0] == 0.0 and found[1] == pytest.approx(0.1, abs=0.03)
     assert told and told[0].startswith("step 1: error ")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_bounded_step_is_the_constrained_minimum(seed):
+    """Against scipy's bounded least squares, whose algorithm is another one."""
+    random = np.random.default_rng(seed)
+    a, b = random.normal(size=(12, 5)), random.normal(size=12)
+    low, high = -random.uniform(0.01, 0.3, 5), random.uniform(0.01, 0.3, 5)
+    step = bounded_step(a.T @ a, a.T @ b, low, high)
+    best = lsq_linear(a, b, (low, high))
+    assert (step >= low).all() and (step <= high).all() and (np.isclose(step, low) | np.isclose(step, high)).any()
+    # Putting offenders at their ends once and for all is not always the optimum, but hardly ever far from it.
+    assert np.sum((a @ step - b) ** 2) <= 2 * best.cost * 1.02
+    wide = bounded_step(a.T @ a, a.T @ b, np.full(5, -9.0), np.full(5, 9.0))
+    assert wide == pytest.approx(np.linalg.lstsq(a, b, rcond=None)[0])

@@ -7,20 +7,15 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import torch
 
-from auvnn.models import GreyBox, Inputs
-from auvnn.simulate.cruise import over_ground
+from auvnn.models import GreyBox
 from auvnn.simulate.excitations.base import Array, Excitation, Plan, require
+from auvnn.simulate.excitations.sizing import driven
 from auvnn.simulate.excitations.starts import random_starts
-from auvnn.simulate.limits import Limits, limits_of
+from auvnn.simulate.limits import limits_of
 
 # Of several sets of random phases the one with the lowest peak is taken: more power for the same peak.
 PHASE_SETS = 8
-# Trial runs on the nominal model choose the size: of everything, and of roll and pitch (or fins) beside it.
-EFFORTS = (0.1, 0.13, 0.18, 0.24, 0.32, 0.42, 0.56, 0.75, 1.0)
-TILTS = (0.02, 0.06, 0.12, 0.25, 0.5, 1.0)
-TRIAL_STEP, TRIAL_TIME = 0.1, 80.0
 
 
 @dataclass(frozen=True)
@@ -63,12 +58,11 @@ class Multisine(Excitation):
         if limits.steady is not None:
             # Under way a little lift makes for much depth, and without it pitch is hardly excited.
             depth, most = max(depth, 20.0 * model.vehicle.length), 1.5 * most
-        eta0, nu0 = random_starts(generators, depth, 0.15, limits.steady)
+        starts = random_starts(generators, depth, 0.15, limits.steady)
         signals = [self._drawn(float(t[-1]), 6 + limits.fins, g) for g in generators]
-        effort, tilt = self._sizes(model, limits, t, eta0, nu0, signals, most)
-        unit = np.stack([s(t) for s in signals])
-        command, fins = limits.drive(unit, effort[:, None, None], tilt[:, None, None])
-        return Plan(eta0, nu0, command, fins, under_way=limits.steady is not None)
+        return driven(
+            model, limits, t, starts, lambda at: np.stack([s(at) for s in signals]), self.effort, most
+        )
 
     def _drawn(self, duration: float, count: int, generator: np.random.Generator) -> _Signals:
         low = max(self.low, min(1.0 / duration, 0.5 * self.high))
@@ -83,36 +77,6 @@ class Multisine(Excitation):
         chosen = phases[best, np.arange(count)]
         return _Signals(frequency, chosen, peak[best, np.arange(count)])
 
-    def _sizes(
-        self,
-        model: GreyBox,
-        limits: Limits,
-        t: Array,
-        eta0: Array,
-        nu0: Array,
-        signals: list[_Signals],
-        most: float,
-    ) -> tuple[Array, Array]:
-        """Return effort and tilt by run, each the best of the grid."""
-        times = np.arange(0.0, min(TRIAL_TIME, float(t[-1])) + 1e-9, TRIAL_STEP)
-        unit = np.stack([s(times) for s in signals])
-        # Slow, the fins would have no hold on the water.
-        efforts = EFFORTS if limits.steady is None else EFFORTS[-1:]
-        pairs = np.array([(e, a) for e in efforts for a in TILTS])
-        effort, tilt = self.effort * pairs[:, 0, None, None, None], pairs[:, 1, None, None, None]
-        command, fins = limits.drive(unit[None], effort, tilt)
-        shape = (len(pairs), len(signals))
-        inputs = Inputs(
-            _tensor(command), None if fins is None else _tensor(fins), limits.voltage(shape, times)
-        )
-        eta, nu = _tensor(np.broadcast_to(eta0, (*shape, 7))), _tensor(np.broadcast_to(nu0, (*shape, 6)))
-        if limits.steady is not None:
-            nu = over_ground(model, eta, nu)
-        run = model.rollout(eta, nu, inputs, _tensor(times), max_step=TRIAL_STEP, check=False)
-        score = _score(run.eta.numpy(), run.nu.numpy(), most)
-        best = score.argmax(axis=0)
-        return pairs[best, 0] * self.effort, pairs[best, 1]
-
 
 class _Signals:
     """One multisine per degree of freedom, each divided by its peak."""
@@ -125,22 +89,3 @@ class _Signals:
         angle = 2.0 * np.pi * self.frequency[:, :, None] * t + self.phase[:, :, None]
         weight = self.frequency[:, :, None] ** -0.5
         return ((weight * np.sin(angle)).sum(axis=1) / self.peak[:, None]).T
-
-
-def _score(eta: Array, nu: Array, tilt: float) -> Array:
-    """Return how well each trial (S, R) excites; those out of bounds count by how far they are out."""
-    w, x, y, z = np.moveaxis(eta[..., 3:], -1, 0)
-    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-        pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1, 1))
-        leaning = np.maximum(np.abs(roll), np.abs(pitch)).max(axis=-1) / tilt
-        depth = eta[..., 0, 2]
-        rising = (depth - eta[..., 2].min(axis=-1)) / np.maximum(depth - 1.0, 0.5)
-        over = np.maximum(np.maximum(leaning, rising) - 1.0, 0.0)
-        score = np.log(nu.std(axis=-2) + 1e-3).sum(axis=-1)
-    score = np.where(over > 0, -1e3 - over, score)
-    return np.where(np.isfinite(nu).all(axis=(-1, -2)) & np.isfinite(over), score, -np.inf)
-
-
-def _tensor(array: Array) -> torch.Tensor:
-    return torch.tensor(np.ascontiguousarray(array))
