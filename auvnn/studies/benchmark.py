@@ -116,7 +116,7 @@ def run_case(case: Case) -> dict[str, Any]:
         hidden = {} if case.hidden == NOTHING else {case.hidden: sized(model, case.hidden, case.size, **how)}
         step = STEP_WITHOUT_NOISE if case.noise == "none" else STEP_WITH_NOISE
         made = simulate(model, hidden=hidden, coefficients=case.coefficients, max_step=step, **how)
-        found = diagnose(model, made.log)
+        found = diagnose(model, made.log, advice=False)
     except AuvnnError as problem:
         return {
             **row,
