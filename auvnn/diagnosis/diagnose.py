@@ -126,10 +126,18 @@ def windows_for(model: GreyBox, log: Log, window: float | None = None) -> Window
             tell more: errors that a disturbance leaves grow with time, those of a sensor do not.
 
     Raises:
-        ConfigError: a length that is not positive.
+        ConfigError: a length that is no positive number.
+        InputError: no run is as long.
     """
-    if window is not None and not 0 < window < 1e4:
-        raise ConfigError(f"window={window} must be a number of seconds above zero")
+    if window is not None:
+        if isinstance(window, bool) or not isinstance(window, (int, float)) or not 0 < window < np.inf:
+            raise ConfigError(f"window={window} must be a number of seconds above zero")
+        longest = max(run.duration for run in log.runs)
+        if window > longest:
+            raise InputError(
+                f"window={window:g} s is longer than every run of {log.name} (the longest has {longest:.4g} s): "
+                "choose a shorter window, or record longer runs"
+            )
     horizon = float(np.clip(log.duration / 12, 1.0, HORIZON)) if window is None else float(window)
     return cut_windows(log, horizon, warmup=WARMUP, kind=model.actuation, partial=True)
 
@@ -167,7 +175,8 @@ def diagnose(
     usable, needs = candidates_for(model, log, effects)
     windows = windows_for(model, log, window)
     if len(windows) < 4:
-        raise InputError(f"{log.name} gives only {len(windows)} windows of free running: record a longer log")
+        cure = "record a longer log" if window is None else "choose a shorter window, or record a longer log"
+        raise InputError(f"{log.name} gives only {len(windows)} windows of free running: {cure}")
     layout = lay_out(model, usable)
     search = _Search(layout, windows, usable, say)
     return search.run(model, log, needs, max_effects)
