@@ -12,7 +12,7 @@ def _run(job: Job) -> Answering:
     effects = None if job["effects"] is None else job.names("effects")
     diagnosis = diagnose(
         job.model(log), log, effects,
-        max_effects=job["max_effects"], window=job["window"], progress=job.say.progress,
+        max_effects=job["max_effects"], window=job["window"], force=job["force"], progress=job.say.progress,
     )  # fmt: skip
     diagnosis.write(job.folder)
     data = diagnosis.to_dict()

@@ -149,6 +149,7 @@ def diagnose(
     *,
     max_effects: int = 4,
     window: float | None = None,
+    force: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """Say which physical effects a model lacks, by a log.
@@ -163,16 +164,18 @@ def diagnose(
         effects: names to consider; the whole catalogue by default.
         max_effects: look for at most this many.
         window: length of the windows of free running that are fitted, s; by default 5.
+        force: go on with a log that contradicts itself: signs, units, axes.
         progress: told in words what is being done.
 
     Raises:
         ConfigError: an unknown effect.
-        InputError: the log has too little that can be used.
+        InputError: the log has too little that can be used, or contradicts itself.
     """
     say = progress or (lambda words: None)
     if max_effects < 1:
         raise ConfigError(f"max_effects={max_effects} must be at least 1")
     usable, needs = candidates_for(model, log, effects)
+    log.quality().refuse_contradictions(force)
     windows = windows_for(model, log, window)
     if len(windows) < 4:
         cure = "record a longer log" if window is None else "choose a shorter window, or record a longer log"
@@ -447,7 +450,7 @@ class _Search:
             )
 
     def _warnings(self, model: GreyBox, log: Log) -> list[str]:
-        found = list(model.vehicle.warnings)
+        found = [*model.vehicle.warnings, *log.quality().reservations]
         if len(log.runs) < 2:
             found.append("the log holds one run: what is left out in turn are stretches of it")
         if self.silent:
