@@ -13,7 +13,6 @@ from stand_ins import write_two
 from auvnn.cli import check
 from auvnn.cli.job import Job, Verb
 
-
 __all__ = ["auvnn", "refused", "stand_in"]
 
 
