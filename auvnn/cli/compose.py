@@ -182,10 +182,10 @@ class Composer:
         Raises:
             ConfigError: an option is missing, or of another kind than its default.
         """
-        missing = sorted(OmegaConf.missing_keys(config))
-        if missing:
-            raise ConfigError(f"{missing[0]}= is needed; auvnn {self.verb} --help shows how")
         try:
+            missing = sorted(OmegaConf.missing_keys(config))
+            if missing:
+                raise ConfigError(f"{missing[0]}= is needed; auvnn {self.verb} --help shows how")
             plain = OmegaConf.to_container(config, resolve=True)
         except OmegaConfBaseException as error:
             raise ConfigError(one_line(error)) from None

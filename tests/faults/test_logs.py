@@ -179,7 +179,7 @@ def test_row_46_another_frame_than_declared(noted, refused):
     for verb, more in (("diagnose", []), ("add", ["effect=ocean_current"]), ("train", [])):
         line = refused(verb, "model=four.yaml", "log=log.csv", *more)
         assert "opposite sign" in line and "mend with scale: -1 in the mapping" in line and "force=true" in line
-    assert noted("log.csv", {"frame": {"body": "FLU"}, "columns": {}}) != found
+    assert noted("log.csv", {"columns": {n: {"from": n, "scale": -1} for n in FLU}}, level="error") == ""
     up = frame(RUN).with_columns(-pl.col("z").alias("z")).drop("x", "y")
     assert "above the surface if z points down; frame: {world: ENU}" in noted(put(up), level="warning")
 
@@ -198,7 +198,7 @@ def test_row_47_quaternions_that_are_no_rotation(noted, refused):
     read = Log.read("log.csv").runs[0].quaternion
     assert np.flatnonzero(np.isnan(read).any(1)).tolist() == [200, 300, 400]
     np.testing.assert_allclose(np.linalg.norm(read[np.isfinite(read).all(1)], axis=1), 1.0, atol=1e-12)
-    small = frame(RUN).with_columns(0.3 * pl.col(n) for n in names)
+    small = frame(RUN).with_columns(pl.col(n) * 0.3 for n in names)
     assert "typical norm is 0.3, not 1" in refused("check", f"log={put(small)}")
     turned = frame(RUN).rename(dict(zip(names, ("qx", "qy", "qz", "qw"), strict=True)))
     found = noted(put(turned), level="error")

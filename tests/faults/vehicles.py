@@ -36,7 +36,7 @@ def four(**changes: Any) -> dict[str, Any]:
     return {key: value for key, value in data.items() if value is not None}
 
 
-def put(name: str = "four.yaml", **changes: Any) -> str:
+def put(file: str = "four.yaml", **changes: Any) -> str:
     """Write the vehicle's file here and return its name."""
-    write_yaml(Path(name), four(**changes))
-    return name
+    write_yaml(Path(file), four(**changes))
+    return file
