@@ -7,7 +7,7 @@ from pathlib import Path
 
 import polars as pl
 
-from auvnn.errors import InputError
+from auvnn.errors import InputError, one_line
 from auvnn.logs.readers.base import Reader, Table, Text
 from auvnn.logs.readers.dialect import Plain, settle
 from auvnn.logs.readers.frame import numbers_from_text, to_table
@@ -51,7 +51,7 @@ class CsvReader(Reader):
         try:
             frame, text = _parse(plain, where)
         except pl.exceptions.PolarsError as problem:
-            words = " ".join(str(problem).split("\n")[0].split())[:200]
+            words = one_line(str(problem).split("\n")[0], 200)
             raise InputError(f"{where}: is no table of numbers: {words}") from None
         table = to_table(frame, where, text)
         table.repairs[:0] = plain.repairs

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import polars as pl
 
-from auvnn.errors import InputError
+from auvnn.errors import InputError, one_line
 from auvnn.logs.readers import parquet_pages
 from auvnn.logs.readers.base import Reader, Table, Text
 from auvnn.logs.readers.frame import clean_names, to_table
@@ -59,15 +59,11 @@ class ParquetReader(Reader):
         except InputError:
             raise
         except (pl.exceptions.PolarsError, OSError, ValueError, OverflowError, MemoryError) as problem:
-            raise InputError(f"{where}: is a damaged Parquet file: {_one_line(problem)}") from None
+            raise InputError(f"{where}: is a damaged Parquet file: {one_line(problem, 200)}") from None
         except BaseException as problem:
             # On some damage polars' Rust core panics, which is no Exception and must not end the program.
             if type(problem).__name__ != "PanicException":
                 raise
-            raise InputError(f"{where}: is a damaged Parquet file: {_one_line(problem)}") from None
+            raise InputError(f"{where}: is a damaged Parquet file: {one_line(problem, 200)}") from None
         table.repairs[:0] = notes
         return table
-
-
-def _one_line(problem: BaseException) -> str:
-    return " ".join(str(problem).split())[:200]
