@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from auvnn.catalogue import Catalogue
+from auvnn.errors import InputError, one_line
 
 # Names, not imports: an answer stands below the floor that draws it.
 DRAWERS = Catalogue(
@@ -48,6 +49,28 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return plain(value.tolist())
     return str(value)
+
+
+def read_start(path: Path, most: int, folder: str) -> bytes:
+    """Return the first bytes of a file that a user named.
+
+    Args:
+        path: the file.
+        most: how many bytes.
+        folder: what to say of a folder in its place.
+
+    Raises:
+        InputError: it is not there, is a folder, or cannot be read.
+    """
+    try:
+        with path.open("rb") as stream:
+            return stream.read(most)
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file; check the path") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: {folder}") from None
+    except (OSError, ValueError) as problem:
+        raise InputError(f"{path}: cannot be read ({one_line(problem, 300)})") from None
 
 
 def write_text(path: Path, text: str) -> Path:

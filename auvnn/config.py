@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from auvnn.answers import write_text
-from auvnn.errors import ConfigError, InputError
+from auvnn.answers import read_start, write_text
+from auvnn.errors import ConfigError, InputError, one_line
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 32
@@ -107,15 +107,7 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
         ConfigError: it is YAML, but says something that a data file must not say.
     """
     path = Path(path)
-    try:
-        with path.open("rb") as stream:
-            raw = stream.read(MAX_BYTES + 1)
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file; check the path") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder, not a YAML file; name the file in it") from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read ({_one_line(error)})") from None
+    raw = read_start(path, MAX_BYTES + 1, "is a folder, not a YAML file; name the file in it")
     if len(raw) > MAX_BYTES:
         raise InputError(f"{path}: is larger than {MAX_BYTES} bytes; ours hold a few kilobytes")
     try:
@@ -132,13 +124,13 @@ def parse_yaml(text: str, where: str) -> dict[str, Any]:
         # The loader derives from a safe one and constructs nothing but plain data.
         data = yaml.load(text, Loader=_Loader)
     except yaml.YAMLError as error:
-        raise InputError(f"{where}: is not plain YAML: {_one_line(error)}") from None
+        raise InputError(f"{where}: is not plain YAML: {one_line(error, 300)}") from None
     except ConfigError as error:
         raise ConfigError(f"{where}: {error}") from None
     except InputError:
         raise
     except (ValueError, RecursionError, OverflowError) as error:
-        raise InputError(f"{where}: holds a value that cannot be read: {_one_line(error)}") from None
+        raise InputError(f"{where}: holds a value that cannot be read: {one_line(error, 300)}") from None
     if data is None:
         raise InputError(f"{where}: is empty; it must hold `key: value` lines")
     if not isinstance(data, dict):
@@ -231,7 +223,3 @@ def _plain(value: Any, where: str) -> Any:
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     raise ConfigError(f"{where}: a {type(value).__name__} cannot be written as YAML; use plain data")
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())[:300]

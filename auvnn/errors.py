@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 
+def one_line(text: object, limit: int = 600) -> str:
+    """Return a text, or what an error says, as one line for a person."""
+    line = " ".join(str(text).split())
+    return line if len(line) <= limit else line[: limit - 3] + "..."
+
+
 class AuvnnError(ValueError):
     """Something in what the user gave cannot be used; the message is one line for a person."""
 

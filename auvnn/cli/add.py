@@ -11,7 +11,10 @@ def _run(job: Job) -> Answering:
 
     effects, log, test = job.names("effect"), job.log(), job.held_out()
     model, say = job.model(log), job.say
-    better = add(model, log, effects, test=test, derivative=job["derivative"], progress=say.progress)
+    better = add(
+        model, log, effects,
+        test=test, derivative=job["derivative"], window=job["window"], force=job["force"], progress=say.progress,
+    )  # fmt: skip
     better.model.save(job.folder / "model")
     better.write(job.folder)
     data = better.to_dict()

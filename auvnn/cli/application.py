@@ -24,10 +24,10 @@ from auvnn.cli.compose import Composer, mended, quoted
 from auvnn.cli.faults import OK, outcome
 from auvnn.cli.folder import created, locked, refuse_taken, written
 from auvnn.cli.job import Job, Verb, files
-from auvnn.cli.speech import Speaker, complain, one_line
+from auvnn.cli.speech import Speaker, complain
 from auvnn.cli.words import Words
 from auvnn.config import config_dir
-from auvnn.errors import ConfigError
+from auvnn.errors import ConfigError, one_line
 
 
 def run_verb(name: str, verb: Verb, arguments: list[str]) -> int:

@@ -15,9 +15,8 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from auvnn.catalogue import unknown_name
-from auvnn.cli.speech import one_line
 from auvnn.config import MAX_BYTES, config_dir
-from auvnn.errors import ConfigError
+from auvnn.errors import ConfigError, one_line
 
 _KEYED = re.compile(r"([A-Za-z_][\w./@]*)=(.*)", re.DOTALL)
 _RESOLVER = re.compile(r"\$\{\s*([A-Za-z_][\w.]*)\s*:")
@@ -182,10 +181,10 @@ class Composer:
         Raises:
             ConfigError: an option is missing, or of another kind than its default.
         """
-        missing = sorted(OmegaConf.missing_keys(config))
-        if missing:
-            raise ConfigError(f"{missing[0]}= is needed; auvnn {self.verb} --help shows how")
         try:
+            missing = sorted(OmegaConf.missing_keys(config))
+            if missing:
+                raise ConfigError(f"{missing[0]}= is needed; auvnn {self.verb} --help shows how")
             plain = OmegaConf.to_container(config, resolve=True)
         except OmegaConfBaseException as error:
             raise ConfigError(one_line(error)) from None

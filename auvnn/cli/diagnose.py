@@ -11,8 +11,9 @@ def _run(job: Job) -> Answering:
     log = job.log()
     effects = None if job["effects"] is None else job.names("effects")
     diagnosis = diagnose(
-        job.model(log), log, effects, max_effects=job["max_effects"], progress=job.say.progress
-    )
+        job.model(log), log, effects,
+        max_effects=job["max_effects"], window=job["window"], force=job["force"], progress=job.say.progress,
+    )  # fmt: skip
     diagnosis.write(job.folder)
     data = diagnosis.to_dict()
     job.warn(data["warnings"])

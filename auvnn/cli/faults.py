@@ -12,8 +12,8 @@ from pathlib import Path
 
 from auvnn.answers import write_text
 from auvnn.cli.folder import WORK
-from auvnn.cli.speech import complain, one_line
-from auvnn.errors import AuvnnError
+from auvnn.cli.speech import complain
+from auvnn.errors import AuvnnError, one_line
 
 OK, FAULT, BAD_INPUT, INTERRUPTED, UNHEARD, TERMINATED = 0, 1, 2, 130, 141, 143
 

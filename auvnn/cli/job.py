@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from auvnn.models import GreyBox
 
 
+_LARGE = 50_000_000  # bytes of a log from which on reading it takes seconds
+
+
 class Answering(Protocol):
     """What a verb returns: something that can say itself as plain data."""
 
@@ -83,7 +86,14 @@ class Job:
 
         paths = files(self.options, key)
         mapping = self.options.get("mapping")
-        log = Log.read(paths if len(paths) > 1 else paths[0], mapping and Path(mapping).expanduser())
+        for path in paths:
+            if path.stat().st_size > _LARGE:
+                self.say.progress(f"reading {path}, {path.stat().st_size / 1e6:.0f} MB")
+        log = Log.read(
+            paths if len(paths) > 1 else paths[0],
+            mapping and Path(mapping).expanduser(),
+            max_duration=self.options.get("max_duration"),
+        )
         runs = "1 run" if len(log.runs) == 1 else f"{len(log.runs)} runs"
         names = ", ".join(map(str, paths))
         extent = f"{runs}, {log.samples} samples over {log.duration:.4g} s, driven by {log.kind}"

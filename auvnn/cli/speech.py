@@ -6,11 +6,7 @@ import json
 import sys
 from typing import Any, TextIO
 
-
-def one_line(text: object, limit: int = 600) -> str:
-    """Return a text as one line for a person."""
-    line = " ".join(str(text).split())
-    return line if len(line) <= limit else line[: limit - 3] + "..."
+from auvnn.errors import one_line
 
 
 class Speaker:

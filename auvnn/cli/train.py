@@ -17,7 +17,7 @@ def _run(job: Job) -> Answering:
     try:
         training = train(
             model, log, job["scheme"], job["damping"], test=test, seed=job["seed"],
-            derivative=job["derivative"], checkpoint=job.checkpoint, resume=job["resume"] or False,
+            derivative=job["derivative"], checkpoint=job.checkpoint, resume=job["resume"] or False, force=job["force"],
             progress=job.say.progress,
         )  # fmt: skip
     except KeyboardInterrupt as end:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
@@ -96,6 +97,13 @@ def true_or_false(value: Any, what: str) -> bool:
     if not isinstance(value, bool):
         raise ConfigError(f"{what} is {value!r}: give true or false")
     return value
+
+
+def redraw(generator: torch.Generator, *weights: tuple[Tensor, int]) -> None:
+    """Draw weights in place, evenly from +-1/sqrt(inputs of the unit), which stands beside each."""
+    with torch.no_grad():
+        for tensor, inputs in weights:
+            tensor.copy_(draw(tensor.shape, 1.0 / math.sqrt(inputs), generator, tensor))
 
 
 def draw(shape: Sequence[int], bound: float, generator: torch.Generator, like: Tensor) -> Tensor:

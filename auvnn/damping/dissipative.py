@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from auvnn.damping.base import DampingForm, draw, positive_int
+from auvnn.damping.base import DampingForm, positive_int, redraw
 
 
 class Dissipative(DampingForm):
@@ -47,13 +47,8 @@ class Dissipative(DampingForm):
 
     def reset(self, generator: torch.Generator) -> None:
         """Draw the network's weights evenly from +-1/sqrt(inputs); start near d_i = nu_i."""
+        redraw(generator, (self.hidden_weight, 6), (self.hidden_bias, 6), (self.output_weight, self.hidden))
         with torch.no_grad():
-            for tensor, fan_in in (
-                (self.hidden_weight, 6),
-                (self.hidden_bias, 6),
-                (self.output_weight, self.hidden),
-            ):
-                tensor.copy_(draw(tensor.shape, 1.0 / math.sqrt(fan_in), generator, tensor))
             self.speed_weight.zero_()
             self.output_bias.fill_(math.log(math.e - 1.0))  # softplus of this is one
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,7 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from auvnn.damping.base import DampingForm, draw, positive_int, true_or_false
+from auvnn.damping.base import DampingForm, positive_int, redraw, true_or_false
 from auvnn.errors import ConfigError
 
 INPUTS = ("absolute", "quadratic")
@@ -65,13 +64,8 @@ class MLP(DampingForm):
 
     def reset(self, generator: torch.Generator) -> None:
         """Draw all weights evenly from +-1/sqrt(number of inputs of the unit)."""
+        redraw(generator, (self.hidden_weight, 12), (self.hidden_bias, 12), (self.output_weight, self.hidden))
         with torch.no_grad():
-            for tensor, fan_in in (
-                (self.hidden_weight, 12),
-                (self.hidden_bias, 12),
-                (self.output_weight, self.hidden),
-            ):
-                tensor.copy_(draw(tensor.shape, 1.0 / math.sqrt(fan_in), generator, tensor))
             if self.output_bias is not None:
                 self.output_bias.zero_()
 

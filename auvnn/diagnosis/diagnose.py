@@ -127,10 +127,18 @@ def windows_for(model: GreyBox, log: Log, window: float | None = None) -> Window
             tell more: errors that a disturbance leaves grow with time, those of a sensor do not.
 
     Raises:
-        ConfigError: a length that is not positive.
+        ConfigError: a length that is no positive number.
+        InputError: no run is as long.
     """
-    if window is not None and not 0 < window < 1e4:
-        raise ConfigError(f"window={window} must be a number of seconds above zero")
+    if window is not None:
+        if isinstance(window, bool) or not isinstance(window, (int, float)) or not 0 < window < np.inf:
+            raise ConfigError(f"window={window} must be a number of seconds above zero")
+        longest = max(run.duration for run in log.runs)
+        if window > longest:
+            raise InputError(
+                f"window={window:g} s is longer than every run of {log.name} (the longest has {longest:.4g} s): "
+                "choose a shorter window, or record longer runs"
+            )
     horizon = float(np.clip(log.duration / 12, 1.0, HORIZON)) if window is None else float(window)
     return cut_windows(log, horizon, warmup=WARMUP, kind=model.actuation, partial=True)
 
@@ -143,6 +151,7 @@ def diagnose(
     max_effects: int = 4,
     window: float | None = None,
     advice: bool = True,
+    force: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """Say which physical effects a model lacks, by a log.
@@ -158,19 +167,22 @@ def diagnose(
         max_effects: look for at most this many.
         window: length of the windows of free running that are fitted, s; by default 5.
         advice: for an ambiguous answer, also work out which manoeuvre would tell the candidates apart.
+        force: go on with a log that contradicts itself: signs, units, axes.
         progress: told in words what is being done.
 
     Raises:
         ConfigError: an unknown effect.
-        InputError: the log has too little that can be used.
+        InputError: the log has too little that can be used, or contradicts itself.
     """
     say = progress or (lambda words: None)
     if max_effects < 1:
         raise ConfigError(f"max_effects={max_effects} must be at least 1")
     usable, needs = candidates_for(model, log, effects)
+    log.quality().refuse_contradictions(force)
     windows = windows_for(model, log, window)
     if len(windows) < 4:
-        raise InputError(f"{log.name} gives only {len(windows)} windows of free running: record a longer log")
+        cure = "record a longer log" if window is None else "choose a shorter window, or record a longer log"
+        raise InputError(f"{log.name} gives only {len(windows)} windows of free running: {cure}")
     layout = lay_out(model, usable)
     search = _Search(layout, windows, usable, say, advice)
     return search.run(model, log, needs, max_effects)
@@ -455,7 +467,7 @@ class _Search:
             )
 
     def _warnings(self, model: GreyBox, log: Log) -> list[str]:
-        found = list(model.vehicle.warnings)
+        found = [*model.vehicle.warnings, *log.quality().reservations]
         if len(log.runs) < 2:
             found.append("the log holds one run: what is left out in turn are stretches of it")
         if self.silent:

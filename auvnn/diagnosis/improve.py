@@ -89,6 +89,7 @@ def add(
     test: Log | None = None,
     derivative: dict[str, Any] | None = None,
     window: float | None = None,
+    force: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Improvement:
     """Add effects, fit them jointly with the uncertain coefficients on `log`, and judge on held-out data.
@@ -100,11 +101,12 @@ def add(
         test: what to judge on; by default the last run of `log`, or the last 30 % of a single one.
         derivative: how accelerations are obtained where they were not measured.
         window: length of the windows of free running that are fitted, s; by default 5.
+        force: go on with a log that contradicts itself: signs, units, axes.
         progress: told in words what is being done.
 
     Raises:
         ConfigError: an unknown effect, one that is there already, or one named twice.
-        InputError: the same data on both sides, or `log` says nothing about an effect.
+        InputError: the same data on both sides, `log` says nothing about an effect, or contradicts itself.
     """
     say = progress or (lambda words: None)
     names = [effects] if isinstance(effects, str) else list(effects)
@@ -114,6 +116,8 @@ def add(
         log, test, held_out = log.split()
     else:
         leakage(log, test)
+        test.quality().refuse_contradictions(force)
+    log.quality().refuse_contradictions(force)
     windows = windows_for(model, log, window)
     layout = lay_out(model, names)
     base = [n for n in layout.names if n not in names or n in layout.nuisance]
@@ -146,7 +150,7 @@ def add(
     accepted = bool(np.isfinite(gain) and gain > std)
     waterfall = [{"step": s, "error": results[s]["rollout"][key]["total"]} for s, _ in models]
     waterfall.append({"step": "noise floor", "error": noise_floor(final, rolled[last][key], test, scale)})
-    warnings = [*silent, *_warnings(layout, best, accepted, gain, std)]
+    warnings = [*log.quality().reservations, *silent, *_warnings(layout, best, accepted, gain, std)]
     if key != "5":
         warnings.append(f"no held-out stretch is 5 s long: gain and waterfall are for horizon {key}")
     return Improvement(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
-from auvnn.effects.base import AXES, Effect, Parameter
+from auvnn.effects.base import AXES, Body, Effect, Moment, Parameter, axis_scale
 
 
 class AxisFactors(Effect):
@@ -17,3 +17,23 @@ class AxisFactors(Effect):
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
         """Return one factor per degree of freedom."""
         return tuple(Parameter(axis, "1", 1.0, 1.0, 0.01, 20.0) for axis in AXES)
+
+
+class DampingFactors(AxisFactors):
+    """Factors on one kind of damping, of the matrix and of displaced elements along their own axes.
+
+    D <- S D S with S = diag(sqrt(f)).
+    """
+
+    damping: ClassVar[
+        str
+    ]  # the field of `Body` that holds the matrix; `element_` before it, that of the elements
+
+    def body(self, body: Body, moment: Moment | None) -> Body:
+        """Scale the damping."""
+        elements = f"element_{self.damping}"
+        for field, factor in ((self.damping, axis_scale(self.theta)), (elements, self.theta)):
+            nominal = getattr(body, field)
+            if nominal is not None:
+                body = body.but(**{field: nominal * factor.to(nominal)})
+        return body

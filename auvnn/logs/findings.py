@@ -139,8 +139,8 @@ def _signals(log: Log, channels: dict[str, Channel]) -> list[Finding]:
         found.append(Finding(level, "missing", f"samples missing: {shares}; they are left out, not filled"))
     spikes = {n: c.spikes for n, c in channels.items() if c.spikes}
     if spikes:
-        counts = ", ".join(f"{n} {count}" for n, count in spikes.items())
-        what = f"single samples that leave their neighbours: {counts}; kept, and offered as run.outliers"
+        shares = ", ".join(f"{n} {k} ({100 * k / log.samples:.2g} %)" for n, k in spikes.items())
+        what = f"single samples that leave their neighbours: {shares}; fits and scores leave them out"
         found.append(Finding("warning", "spikes", what))
     voltage = [run.voltage[np.isfinite(run.voltage)] for run in log.runs if run.voltage is not None]
     voltage = [v for v in voltage if len(v)]

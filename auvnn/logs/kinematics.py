@@ -29,13 +29,17 @@ _HALF_WINDOW = 0.4  # s; wide enough to quiet the derivative, narrow enough for 
 _CLEAR = 0.7  # correlation from which the slope is believed
 _NONE = 0.4  # correlation below which two moving signals have nothing to do with each other
 _SCALE_TOLERANCE = 0.2
+_SIGN = (0.6, 1.6)  # scales, apart from the sign, up to which a turned sign is the plain reading
 _MOVES = 3.0  # standard deviations of its noise by which a channel must move to count
 _SHARE = 0.2  # of the liveliest run's motion: quieter runs say nothing about signs
 _MIN_SAMPLES = 30
 _LONG = 60_000  # samples; of longer runs evenly spread blocks tell as much
 _BLOCKS, _BLOCK = 12, 5_000
 _LAG = 1.0  # s searched to either side
-_ANGULAR_UNITS = ((180.0 / np.pi, "degrees per second, or the angles were radians and read as degrees"),)
+_ANGULAR_UNITS = (
+    (180.0 / np.pi, "degrees per second, or the angles were radians and read as degrees"),
+    (np.pi / 180.0, "radians per second that were read as degrees, or the angles were degrees"),
+)
 _LINEAR_UNITS = ((1000.0, "mm/s"), (100.0, "cm/s"), (1.943844, "knots"), (3.28084, "feet per second"))
 
 
@@ -199,9 +203,14 @@ def _judge(
             if abs(abs(scale) / factor - 1.0) < _SCALE_TOLERANCE:
                 cure = f"mend with scale: {np.sign(scale) / factor:.6g} in the mapping"
                 if source == "attitude":
-                    cure = "mend with rates: deg (or angles: rad) in the mapping"
+                    turned = ("deg", "rad") if factor > 1.0 else ("rad", "deg")
+                    cure = "mend with rates: {} (or angles: {}) in the mapping".format(*turned)
                 verdict = f"{name} is {abs(scale):.3g} times {of}{sign}: in {unit}; {cure}"
                 return Agreement(**facts, verdict=verdict, level="error", cure=cure)
+        if scale < 0.0 and source == "position" and not _SIGN[0] < -scale < _SIGN[1]:
+            cure = "check the sensor's place and mounting: away from the origin it may see the turn instead"
+            verdict = f"{name} runs against {of} in {share}, {-scale:.2f} times as large; {cure}"
+            return Agreement(**facts, verdict=verdict, level="warning", cure=cure)
         if scale < 0.0:
             cure = "mend with scale: -1 in the mapping"
             verdict = f"{name} has the opposite sign of {of} in {share}: scale {scale:.2f}; {cure}"

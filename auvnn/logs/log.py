@@ -63,12 +63,20 @@ class Log:
             object.__setattr__(self, "sha256", self._content_hash())
 
     @classmethod
-    def read(cls, path: str | Path | Sequence[str | Path], mapping: Any = None) -> Log:
+    def read(
+        cls,
+        path: str | Path | Sequence[str | Path],
+        mapping: Any = None,
+        *,
+        max_duration: float | None = None,
+    ) -> Log:
         """Read a log from one file or several.
 
         Args:
             path: a CSV or Parquet file, or a list of files; rows of different files are never joined.
             mapping: a mapping file's path, its content as a dict, or None for canonical columns.
+            max_duration: of each file, s; what is recorded later is left out. A file larger than the memory can
+                be read so.
 
         Raises:
             InputError: a file cannot be read or its content must not be trusted.
@@ -76,7 +84,7 @@ class Log:
         """
         from auvnn.logs.reading import read
 
-        return cls(**vars(read(path, mapping)))
+        return cls(**vars(read(path, mapping, max_duration)))
 
     @classmethod
     def from_runs(cls, runs: Iterable[Run], name: str = "log", repairs: Iterable[Repair] = ()) -> Log:

@@ -66,11 +66,37 @@ class Quality(Answer):
         Raises:
             InputError: there is a finding of level "error"; the message names the first and its cure.
         """
-        if self.errors:
-            first = self.errors[0]
-            more = f" (and {len(self.errors) - 1} more errors)" if len(self.errors) > 1 else ""
+        self._refuse(self.errors)
+
+    @property
+    def contradictions(self) -> list[Finding]:
+        """Errors that show the log at odds with itself: signs, units, axes, the order of a quaternion."""
+        return [f for f in self.errors if f.where != "excitation"]
+
+    @property
+    def reservations(self) -> list[str]:
+        """What whoever fits or scores the log should repeat with the result: contradictions, samples left out."""
+        return [
+            f"{f.where}: {f.what}" for f in self.findings if f in self.contradictions or f.where == "spikes"
+        ]
+
+    def refuse_contradictions(self, force: bool = False) -> None:
+        """Raise where the log contradicts itself, unless that is to be tolerated.
+
+        What a log merely says too little about is no contradiction: fits name the parameters concerned.
+
+        Raises:
+            InputError: with the first contradiction and its cure.
+        """
+        if not force:
+            self._refuse(self.contradictions, "; force=true fits it all the same")
+
+    def _refuse(self, found: list[Finding], way_out: str = "") -> None:
+        if found:
+            first = found[0]
+            more = f" (and {len(found) - 1} more errors)" if len(found) > 1 else ""
             cure = f"; {first.cure}" if first.cure and first.cure not in first.what else ""
-            raise InputError(f"log '{self.log.name}': {first.where}: {first.what}{cure}{more}")
+            raise InputError(f"log '{self.log.name}': {first.where}: {first.what}{cure}{more}{way_out}")
 
     @property
     def metrics(self) -> dict[str, float]:

@@ -23,6 +23,7 @@ from auvnn.logs.channels import (
     is_canonical,
     numbered,
 )
+from auvnn.logs.head import read_table
 from auvnn.logs.mapping import Mapping
 from auvnn.logs.readers import Table, choose
 from auvnn.logs.repair import Repair
@@ -50,8 +51,10 @@ class _Collector:
     unknown: dict[str, None] = field(default_factory=dict)
 
 
-def read(path: str | Path | Sequence[str | Path], mapping: Any = None) -> Reading:
-    """Read one file or several as the runs of one log.
+def read(
+    path: str | Path | Sequence[str | Path], mapping: Any = None, max_duration: float | None = None
+) -> Reading:
+    """Read one file or several as the runs of one log, of each file the first `max_duration` seconds.
 
     Raises:
         InputError: a file cannot be read or its content must not be trusted.
@@ -70,9 +73,8 @@ def read(path: str | Path | Sequence[str | Path], mapping: Any = None) -> Readin
         before = _stamp(file)
         reader, notes = choose(file)
         collector.repairs.extend(notes)
-        table = reader.read(file)
         with np.errstate(all="ignore"):
-            table = plan.apply(table, str(file))
+            table = read_table(reader, file, plan, max_duration)
         hashes.append(_file_hash(file))
         if _stamp(file) != before:
             raise InputError(

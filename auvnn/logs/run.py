@@ -149,11 +149,23 @@ class Run:
 
     @cached_property
     def outliers(self) -> dict[str, NDArray[np.bool_]]:
-        """Masks (N,) of single-sample spikes, by channel, of velocity, position, altitude and voltage."""
+        """Masks (N,) of single-sample spikes, by channel; those of commands and attitude are not looked for."""
         from auvnn.logs.outliers import spikes
 
-        wanted = (*VELOCITY, *POSITION, *_SCALAR)
+        wanted = (*VELOCITY, *ACCELERATION, *POSITION, *_SCALAR)
         return {name: spikes(self.channels[name]) for name in wanted if name in self.channels}
+
+    @cached_property
+    def cleaned(self) -> Run:
+        """The run with single-sample spikes of velocity and acceleration read as missing; itself without any."""
+        changes: dict[str, Any] = {}
+        for block, names in (("nu", VELOCITY), ("nu_dot", ACCELERATION)):
+            values = getattr(self, block)
+            none = np.zeros(self.samples, dtype=bool)
+            mask = np.stack([self.outliers.get(name, none) for name in names], axis=1)
+            if values is not None and mask.any():
+                changes[block] = np.where(mask, np.nan, values)
+        return replace(self, **changes) if changes else self
 
     @cached_property
     def valid(self) -> NDArray[np.bool_]:

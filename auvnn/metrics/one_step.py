@@ -221,7 +221,11 @@ def one_step(model: GreyBox, log: Log, derivative: Derivative) -> list[OneStep]:
 
 
 def accelerations(model: GreyBox, run: Run, derivative: Derivative) -> tuple[Array, Array]:
-    """Return measured and predicted acceleration of a run, after the same filter, (N, 6) each."""
+    """Return measured and predicted acceleration of a run, after the same filter, (N, 6) each.
+
+    Spikes of single samples count as missing.
+    """
+    run = run.cleaned
     if derivative.method == "measured":
         assert run.nu_dot is not None
         return run.nu_dot, model_acceleration(model, run)

@@ -12,14 +12,12 @@ from numpy.typing import NDArray
 from auvnn.catalogue import unknown_name
 from auvnn.config import config_dir, read_yaml
 from auvnn.errors import ConfigError
+from auvnn.logs.channels import ACCELERATION, POSITION, VELOCITY
+from auvnn.logs.channels import EULER as ATTITUDE
 from auvnn.logs.rotation import multiply
 
 Array = NDArray[np.float64]
 
-VELOCITY = ("u", "v", "w", "p", "q", "r")
-ACCELERATION = tuple(f"d{name}" for name in VELOCITY)
-ATTITUDE = ("phi", "theta", "psi")
-POSITION = ("x", "y", "z")
 VOLTAGE = ("voltage",)
 CHANNELS = (*VELOCITY, *ACCELERATION, *ATTITUDE, *POSITION, *VOLTAGE)
 SIZES = ("standard_deviation", "relative")

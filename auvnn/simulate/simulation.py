@@ -90,6 +90,8 @@ def simulate(
         AuvnnError: the plant diverges; the message says when and by which term.
     """
     _check(seed, runs, duration, rate, coefficients, max_step)
+    if accelerations is not None and not isinstance(accelerations, bool):
+        raise ConfigError(f"accelerations = {accelerations!r}: true or false is needed, or null")
     manner = make_excitation(excitation, EXCITATIONS)
     condition = make_noise(noise)
     model = _actuated(model, actuation)

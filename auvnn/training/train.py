@@ -126,6 +126,7 @@ def train(
     derivative: Mapping[str, Any] | None = None,
     checkpoint: str | Path | None = None,
     resume: bool | Literal["force"] = False,
+    force: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Training:
     """Train damping subnetworks beside what a model states.
@@ -143,17 +144,20 @@ def train(
         derivative: how accelerations are obtained where they were not measured.
         checkpoint: folder of checkpoints, from which `resume` goes on, bit for bit.
         resume: go on from the newest checkpoint; "force" even where data or options have changed.
+        force: go on with a log that contradicts itself: signs, units, axes.
         progress: told in words every few iterations.
 
     Raises:
         ConfigError: an unknown scheme, form or option.
-        InputError: nothing to fit, or the same data on both sides.
+        InputError: nothing to fit, the same data on both sides, or a log that contradicts itself.
     """
     if test is None:
         log, test, held_words = log.split()
     else:
         leakage(log, test)
+        test.quality().refuse_contradictions(force)
         held_words = f"{test.name} is held out"
+    log.quality().refuse_contradictions(force)
     how = choose_derivative(log, derivative)
     # What decides when to stop is a part of the log itself: the test log is for judging alone.
     fitted, stopping, stop_words = log.split(STOPPING)
@@ -184,7 +188,7 @@ def train(
     bank.requires_grad_(True)
     trained = GreyBox(model.vehicle, model.copied_effects(), bank, model.actuation)
     before, after = scores(one_step(model, test, how)), scores(one_step(trained, test, how))
-    warnings = [*model.vehicle.warnings, *fit.warnings]
+    warnings = [*model.vehicle.warnings, *log.quality().reservations, *fit.warnings]
     worse = [n for n in after if after[n]["rmse"] > before[n]["rmse"] * (1 + 1e-9)]
     if worse:
         warnings.append(f"held out, one step ahead, {', '.join(worse)} got worse by the training")

@@ -6,10 +6,13 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from auvnn.cli.main import VERBS, main
 from auvnn.cli.speech import Speaker
+from auvnn.errors import InputError
+from auvnn.logs import Log
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -58,6 +61,41 @@ def test_the_same_seed_makes_the_same_log(auvnn, tmp_path):
     assert a == b != c
 
 
+def test_accelerations_are_written_where_asked_for_with_the_noise_that_the_condition_says(auvnn, tmp_path):
+    words = ["simulate", "model=rov90", "runs=1", "duration=4"]
+    more = {
+        "estimated": ["noise=realistic"],
+        "exact": ["noise=realistic", "accelerations=true"],
+        "noisy": ["noise=realistic", "accelerations=true", "+noise.standard_deviation.du=0.5"],
+        "left": ["noise=paper", "accelerations=false"],
+        "paper": ["noise=paper"],
+        "perfect": ["noise=none"],
+    }
+    runs = {}
+    for name, extra in more.items():
+        status, _, err = auvnn(*words, *extra, f"out={tmp_path / name}")
+        assert (status, err) == (0, "")
+        runs[name] = Log.read(tmp_path / name / "log.parquet").runs[0]
+        truth = json.loads((tmp_path / name / "truth.json").read_text())
+        assert truth["conditions"]["accelerations"] is (runs[name].nu_dot is not None)
+    assert runs["estimated"].nu_dot is None and runs["left"].nu_dot is None
+    np.testing.assert_array_equal(runs["exact"].nu_dot, runs["perfect"].nu_dot)
+    np.testing.assert_array_equal(runs["noisy"].nu_dot[:, 1:], runs["exact"].nu_dot[:, 1:])
+    for name, channel in (("noisy", 0), ("paper", 0)):
+        spread = (runs[name].nu_dot - runs["exact"].nu_dot)[:, channel].std()
+        assert spread == pytest.approx(0.5, rel=0.3)  # 81 draws: 8 % at one standard deviation
+
+
+def test_a_shorter_step_of_the_integrator_gives_the_same_motion_closer(auvnn, tmp_path):
+    words = ["simulate", "model=rov90", "runs=1", "duration=4", "noise=none"]
+    runs = []
+    for step in (0.05, 0.025, 0.00625):
+        assert auvnn(*words, f"max_step={step}", f"out={tmp_path / str(step)}")[0] == 0
+        runs.append(Log.read(tmp_path / str(step) / "log.parquet").runs[0].nu)
+    coarse, fine = (np.abs(nu - runs[2]).max() for nu in runs[:2])
+    assert 0.0 < fine < coarse / 8  # of fourth order: a sixteenth
+
+
 def test_hidden_effects_of_a_size(auvnn, tmp_path):
     words = ["model=rov95", "hidden=[net_buoyancy]", "size=small,large", "runs=1", "duration=10"]
     assert auvnn("simulate", *words, f"out={tmp_path / 'sizes'}", "--multirun")[0] == 0
@@ -82,6 +120,40 @@ def test_diagnose(report, made):
     assert answer["schema"] == "auvnn/diagnosis/1"
     assert answer["missing"] == ["ocean_current"]
     assert {c["effect"] for c in answer["candidates"]} == {"ocean_current", "net_buoyancy"}
+
+
+def test_windows_of_free_running_have_the_length_that_was_asked_for(report, made):
+    words = ["model=rov95", "effects=[ocean_current]", "max_effects=1", "window=2.5"]
+    answer = report("diagnose", f"log={made / 'log.parquet'}", *words)
+    assert "free-running windows of 2.5 s" in answer["derivative"]["method"]
+
+
+def test_adding_hands_the_length_of_windows_on(refused_after, made, monkeypatch):
+    def tell(*_args, window, **_options):
+        raise InputError(f"asked for {window} s")
+
+    monkeypatch.setattr("auvnn.diagnosis.add", tell)
+    words = ["model=rov95", f"log={made / 'log.parquet'}", "effect=ocean_current"]
+    assert "asked for 2.5 s" in refused_after("add", *words, "window=2.5")
+    assert "asked for None s" in refused_after("add", *words)
+
+
+@pytest.mark.parametrize("verb", ["diagnose", "add"])
+@pytest.mark.parametrize(
+    ("window", "words"),
+    [
+        ("0", "above zero"),
+        ("-2", "above zero"),
+        ("long", "above zero"),
+        ("true", "above zero"),
+        (".inf", "above zero"),
+        ("60", "longer than every run"),
+    ],
+)
+def test_impossible_windows_are_refused(refused_after, made, verb, window, words):
+    effect = "effect=ocean_current" if verb == "add" else "effects=[ocean_current]"
+    line = refused_after(verb, "model=rov95", f"log={made / 'log.parquet'}", effect, f"window={window}")
+    assert "window=" in line and words in line
 
 
 def test_add_then_remove(report, auvnn, made):
@@ -163,6 +235,20 @@ def test_unknown_effects_are_named_with_their_neighbours(refused_after, made, ve
 def test_the_log_itself_is_no_test(refused_after, made):
     log = made / "log.parquet"
     refused_after("add", "model=rov95", f"log={log}", f"test={log}", "effect=ocean_current")
+
+
+@pytest.mark.parametrize(
+    ("word", "needed"),
+    [
+        ("accelerations=yes", "true or false"),
+        ("accelerations=1", "true or false"),
+        ("max_step=0", "max_step"),
+        ("max_step=2", "max_step"),
+        ("max_step=fine", "a number"),
+    ],
+)
+def test_impossible_options_of_the_simulation_are_refused(refused_after, word, needed):
+    assert needed in refused_after("simulate", "model=rov95", word)
 
 
 def test_hidden_parameters_are_checked(refused_after):

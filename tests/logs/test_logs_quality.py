@@ -89,7 +89,7 @@ def test_spikes_are_counted_and_masked() -> None:
     log = Log.from_runs([with_nu(run, nu)])
     np.testing.assert_array_equal(np.flatnonzero(log.runs[0].outliers["u"]), at)
     assert not log.runs[0].outliers["v"].any()
-    assert "u 4;" in subjects(log)["spikes"]
+    assert "u 4 (0.5 %);" in subjects(log)["spikes"]
 
 
 @pytest.mark.parametrize("shape", ["step", "kink", "ramp", "held", "constant", "short", "missing"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from auvnn.answers import read_start
 from auvnn.catalogue import Catalogue
 from auvnn.errors import InputError
 from auvnn.logs.readers.base import Reader, Table, Text
@@ -42,15 +43,7 @@ def choose(path: Path) -> tuple[Reader, list[Repair]]:
     Raises:
         InputError: the file cannot be opened, is empty, or has no known format.
     """
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(4096)
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file; check the path") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder; name the log file in it, or a list of files") from None
-    except (OSError, ValueError) as problem:
-        raise InputError(f"{path}: cannot be read: {problem}") from None
+    head = read_start(path, 4096, "is a folder; name the log file in it, or a list of files")
     if not head:
         raise InputError(f"{path}: is empty (0 bytes); the recording or the copy failed")
     suffix = path.suffix.lower()

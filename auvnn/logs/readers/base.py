@@ -28,6 +28,10 @@ class Text:
     codes: NDArray[np.intp] | None = None
     labels: Sequence[str] = ()
 
+    def __getitem__(self, rows: slice) -> Text:
+        """Return some of the rows."""
+        return Text(self.bad, None if self.codes is None else self.codes[rows], self.labels)
+
 
 @dataclass
 class Table:
@@ -70,3 +74,11 @@ class Reader(ABC):
         Raises:
             InputError: it is damaged or holds no table; no other error may leave a reader.
         """
+
+    def read_head(self, path: Path, share: float) -> Table:
+        """Read about a share of the file from its beginning; a format that cannot do so reads all of it.
+
+        Raises:
+            InputError: as `read`.
+        """
+        return self.read(path)

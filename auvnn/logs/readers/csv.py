@@ -7,7 +7,7 @@ from pathlib import Path
 
 import polars as pl
 
-from auvnn.errors import InputError
+from auvnn.errors import InputError, one_line
 from auvnn.logs.readers.base import Reader, Table, Text
 from auvnn.logs.readers.dialect import Plain, settle
 from auvnn.logs.readers.frame import numbers_from_text, to_table
@@ -36,21 +36,36 @@ class CsvReader(Reader):
         Raises:
             InputError: it has no header, no rows, a number too large, or is damaged.
         """
+        return self.read_head(path, 1.0)
+
+    def read_head(self, path: Path, share: float) -> Table:
+        """Read a share of the bytes, up to the last whole line of them."""
         where = str(path)
         try:
+            size = int(share * path.stat().st_size)
             # The text, its copy with one kind of line end, and the numbers live at the same time.
-            refuse_more_than_memory(3 * path.stat().st_size, where)
-            plain = settle(path.read_bytes(), where)
+            refuse_more_than_memory(3 * size, where)
+            plain = settle(_beginning(path, size) if share < 1.0 else path.read_bytes(), where)
         except OSError as problem:
             raise InputError(f"{where}: cannot be read: {problem}") from None
         try:
             frame, text = _parse(plain, where)
         except pl.exceptions.PolarsError as problem:
-            words = " ".join(str(problem).split("\n")[0].split())[:200]
+            words = one_line(str(problem).split("\n")[0], 200)
             raise InputError(f"{where}: is no table of numbers: {words}") from None
         table = to_table(frame, where, text)
         table.repairs[:0] = plain.repairs
         return table
+
+
+def _beginning(path: Path, size: int) -> bytes:
+    """Return the whole lines in the first `size` bytes; all of a file whose lines are not bytes (UTF-16)."""
+    with path.open("rb") as stream:
+        data = stream.read(size)
+        if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+            return data + stream.read()
+    end = max(data.rfind(b"\n"), data.rfind(b"\r"))
+    return data if end < 0 else data[:end] + b"\n"
 
 
 def _parse(plain: Plain, where: str) -> tuple[pl.DataFrame, dict[str, Text]]:

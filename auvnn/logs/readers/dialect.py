@@ -47,6 +47,11 @@ def settle(data: bytes, where: str) -> Plain:
     repairs: list[Repair] = []
     data = _utf8(data, where, repairs)
     data = _line_feeds(data, where, repairs)
+    if not data.endswith(b"\n"):
+        # Many programs end their files so; a copy that was cut inside the last number looks the same.
+        repairs.append(
+            Repair("the last row has no line end: complete, unless the copy was cut", where, 1, "info")
+        )
     header, body, first_line, separator = _header(data, where, repairs)
     separator = separator or _separator(header, where)
     names = _names(header, separator, where, repairs)
@@ -74,6 +79,7 @@ def _utf8(data: bytes, where: str, repairs: list[Repair]) -> bytes:
         repairs.append(Repair("read as UTF-16 text", where, 1, "info"))
     elif data.startswith(b"\xef\xbb\xbf"):
         data = data[3:]
+        repairs.append(Repair("byte order mark at the start left out", where, 1, "info"))
     zeros = data.count(b"\0")
     if zeros:
         raise InputError(
@@ -151,6 +157,8 @@ def _names(header: str, separator: str, where: str, repairs: list[Repair]) -> li
         # What pandas writes when asked to keep its index: it says nothing about the vehicle.
         names[0] = ""
         repairs.append(Repair("first column without a name (a row index) left out", where, 1, "info"))
+    if len(names) > 1 and names[-1] == "":
+        repairs.append(Repair("separator at the end of the header ignored", where, 1, "info"))
     if "" in names[1:-1]:
         position = names.index("", 1) + 1
         raise InputError(f"{where}: column {position} has no name; name it in the header line")

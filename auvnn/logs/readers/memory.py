@@ -33,5 +33,5 @@ def refuse_more_than_memory(needed: int, where: str) -> None:
     if free is not None and needed > 0.8 * free:
         raise InputError(
             f"{where}: reading needs about {needed / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are free: "
-            "split the log into runs, or export fewer columns or a lower rate"
+            "read its beginning alone with max_duration=, split the log into runs, or export fewer columns"
         )

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import polars as pl
 
-from auvnn.errors import InputError
+from auvnn.errors import InputError, one_line
 from auvnn.logs.readers import parquet_pages
 from auvnn.logs.readers.base import Reader, Table, Text
 from auvnn.logs.readers.frame import clean_names, to_table
 from auvnn.logs.readers.memory import refuse_more_than_memory
+from auvnn.logs.repair import Repair
 from auvnn.logs.writing import HASH_KEY, frame_hash
 
 
@@ -30,34 +31,39 @@ class ParquetReader(Reader):
         Raises:
             InputError: it is cut short, damaged, too large or has no rows.
         """
+        return self.read_head(path, 1.0)
+
+    def read_head(self, path: Path, share: float) -> Table:
+        """Read a share of the rows; the hash of the whole is checked only where all of it is read."""
         where = str(path)
         contents = parquet_pages.check(path)
         if contents.rows == 0 or not contents.flat:
             raise InputError(f"{where}: has no rows")
-        refuse_more_than_memory(contents.bytes + 8 * contents.rows * len(contents.flat), where)
+        names, notes = clean_names(contents.flat, where)
+        rows = max(1, int(share * contents.rows))
+        refuse_more_than_memory(int(share * contents.bytes) + 8 * rows * len(contents.flat), where)
         try:
-            frame = pl.read_parquet(path, columns=contents.flat)
-            stored = pl.read_parquet_metadata(path).get(HASH_KEY)
+            frame = pl.read_parquet(path, columns=contents.flat, n_rows=rows)
+            stored = pl.read_parquet_metadata(path).get(HASH_KEY) if rows == contents.rows else None
             if stored is not None and stored != frame_hash(frame):
                 raise InputError(
                     f"{where}: the numbers differ from those that were written: damaged; copy it again"
                 )
-            names, notes = clean_names(frame.columns, where)
             frame.columns = names
+            if "" in names:
+                frame = frame.drop("")
+                cure = "name it in the program that writes the file"
+                notes.append(Repair("column without a name left out", where, 1, "warning", cure))
             text = {name: Text("it holds lists or records") for name in contents.nested}
             table = to_table(frame, where, text)
         except InputError:
             raise
         except (pl.exceptions.PolarsError, OSError, ValueError, OverflowError, MemoryError) as problem:
-            raise InputError(f"{where}: is a damaged Parquet file: {_one_line(problem)}") from None
+            raise InputError(f"{where}: is a damaged Parquet file: {one_line(problem, 200)}") from None
         except BaseException as problem:
             # On some damage polars' Rust core panics, which is no Exception and must not end the program.
             if type(problem).__name__ != "PanicException":
                 raise
-            raise InputError(f"{where}: is a damaged Parquet file: {_one_line(problem)}") from None
+            raise InputError(f"{where}: is a damaged Parquet file: {one_line(problem, 200)}") from None
         table.repairs[:0] = notes
         return table
-
-
-def _one_line(problem: BaseException) -> str:
-    return " ".join(str(problem).split())[:200]

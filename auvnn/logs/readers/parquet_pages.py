@@ -19,6 +19,9 @@ from auvnn.logs.readers.thrift import Cursor, Struct, ThriftError
 MAGIC = b"PAR1"
 _MAX_ROWS = 2**40
 _DATA, _DICTIONARY, _DATA_V2 = 0, 2, 3
+# By their numbers in the format; LZO is in the specification and nearly nobody reads it.
+_CODECS = {0: "none", 1: "snappy", 2: "gzip", 3: "LZO", 4: "brotli", 5: "lz4", 6: "zstd", 7: "lz4_raw"}
+_UNREADABLE = ("LZO",)
 
 
 @dataclass(frozen=True)
@@ -77,9 +80,22 @@ def _check(data: Any, size: int, where: str) -> Contents:
     total = 0
     for group in groups:
         for chunk in group[1]:
+            _refuse_codec(chunk, where)
             total += _check_chunk(data, chunk, group[3], start)
     flat, nested = _columns(meta[2])
     return Contents(rows, flat, nested, total)
+
+
+def _refuse_codec(chunk: Struct, where: str) -> None:
+    """Refuse a compression that the decoder does not know, before it calls the file damaged."""
+    meta = chunk[3]
+    codec = _CODECS.get(meta[4], f"method {meta[4]}")
+    if codec in _UNREADABLE or meta[4] not in _CODECS:
+        name = ".".join(part.decode() for part in meta[3])
+        raise InputError(
+            f"{where}: column '{name}' is compressed by {codec}, which auvnn cannot unpack: "
+            "save the file with zstd or snappy"
+        )
 
 
 def _columns(schema: list[Struct]) -> tuple[list[str], list[str]]:

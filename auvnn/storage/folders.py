@@ -9,31 +9,11 @@ import shutil
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-
-import torch
-from torch import Tensor
 
 from auvnn.errors import InputError, ModelError
+from auvnn.storage.manifest import CODE_SUFFIXES, MANIFEST, check_name, read_manifest
 
-MANIFEST = "manifest.json"
 SCHEMA = "auvnn/folder/1"
-MOST_BYTES = 2 * 1024**3
-# Only formats that cannot run code when they are read.
-SUFFIXES = (
-    ".safetensors",
-    ".json",
-    ".yaml",
-    ".yml",
-    ".md",
-    ".txt",
-    ".csv",
-    ".parquet",
-    ".html",
-    ".png",
-    ".svg",
-)
-CODE_SUFFIXES = (".pt", ".pth", ".pkl", ".pickle", ".ckpt", ".joblib", ".npy", ".npz", ".bin")
 
 
 def write_folder(
@@ -63,7 +43,7 @@ def write_folder(
     """
     path = Path(path)
     for name in files:
-        _check_name(name, path)
+        check_name(name, path)
     if MANIFEST in files:
         raise InputError(f"{path}: '{MANIFEST}' is written by itself: leave it out")
     content = {name: data.encode() if isinstance(data, str) else bytes(data) for name, data in files.items()}
@@ -122,7 +102,7 @@ def read_folder(path: str | Path, *, schema: str = SCHEMA) -> dict[str, bytes]:
         raise InputError(f"{path}: there is no such folder")
     if not path.is_dir():
         _refuse_file(path)
-    manifest = _read_manifest(path, schema)
+    manifest = read_manifest(path, schema)
     content: dict[str, bytes] = {}
     wrong: list[str] = []
     for name, entry in manifest.items():
@@ -142,91 +122,6 @@ def read_folder(path: str | Path, *, schema: str = SCHEMA) -> dict[str, bytes]:
     if wrong:
         raise ModelError(f"{path}: {'; '.join(wrong)}: restore the folder from a copy, or make it again")
     return content
-
-
-def tensors_to_bytes(tensors: Mapping[str, Tensor], *, finite: bool = True) -> bytes:
-    """Return named tensors as safetensors bytes.
-
-    Args:
-        tensors: names and tensors.
-        finite: refuse NaN and infinity.
-
-    Raises:
-        ModelError: a tensor is not finite.
-    """
-    from safetensors.torch import save
-
-    bad = [name for name, tensor in tensors.items() if finite and not _is_finite(tensor)]
-    if bad:
-        raise ModelError(
-            f"weights are NaN or infinite in {', '.join(bad)}: not saved; train again from the last good"
-        )
-    return save({name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()})
-
-
-def tensors_from_bytes(
-    data: bytes,
-    expected: Mapping[str, tuple[tuple[int, ...], torch.dtype]] | None = None,
-    *,
-    where: str = "weights",
-    finite: bool = True,
-) -> dict[str, Tensor]:
-    """Return the named tensors in safetensors bytes, after checking them.
-
-    Args:
-        data: the bytes of a safetensors file.
-        expected: name to (shape, dtype) of exactly the tensors that must be there; None takes any.
-        where: what is read, for messages.
-        finite: refuse NaN and infinity.
-
-    Raises:
-        ModelError: not safetensors, or tensors missing, extra, of another shape or dtype, or not finite; the
-            message lists every difference.
-    """
-    from safetensors import SafetensorError
-    from safetensors.torch import load
-
-    if data[:1] == b"\x80" or data[:2] == b"PK":
-        raise ModelError(
-            f"{where}: this is a pickle or a zip archive, not safetensors: auvnn does not open those"
-        )
-    try:
-        tensors = load(data)
-    except (SafetensorError, KeyError, ValueError, RuntimeError) as error:
-        raise ModelError(f"{where}: not a readable safetensors file ({error}): make it again") from error
-    wrong = [] if expected is None else _differences(tensors, expected)
-    if finite:
-        wrong += [
-            f"{name} holds NaN or infinity" for name, tensor in tensors.items() if not _is_finite(tensor)
-        ]
-    if wrong:
-        raise ModelError(f"{where}: {'; '.join(wrong)}")
-    return tensors
-
-
-def _differences(
-    tensors: Mapping[str, Tensor], expected: Mapping[str, tuple[tuple[int, ...], torch.dtype]]
-) -> list[str]:
-    wrong = [f"{name} is missing" for name in expected if name not in tensors]
-    wrong += [f"{name} is not known here" for name in tensors if name not in expected]
-    for name, (shape, dtype) in expected.items():
-        if name in tensors and tuple(tensors[name].shape) != tuple(shape):
-            wrong.append(f"{name} has shape {tuple(tensors[name].shape)} instead of {tuple(shape)}")
-        if name in tensors and tensors[name].dtype != dtype:
-            wrong.append(f"{name} is {tensors[name].dtype} instead of {dtype}")
-    return wrong
-
-
-def _is_finite(tensor: Tensor) -> bool:
-    return not tensor.is_floating_point() or bool(torch.isfinite(tensor).all())
-
-
-def _check_name(name: str, path: Path) -> None:
-    plain = name not in ("", ".", "..") and not any(c in name for c in "/\\:\0") and not name.startswith(".")
-    if not plain:
-        raise InputError(f"{path}: '{name}' is not a plain file name")
-    if Path(name).suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path}: '{name}': files in this folder end in {' '.join(SUFFIXES)}")
 
 
 def _check_target(path: Path, overwrite: bool) -> None:
@@ -250,41 +145,6 @@ def _check_target(path: Path, overwrite: bool) -> None:
         raise InputError(
             f"{path}: not replaced, because it also holds {', '.join(foreign[:5])}: move them away"
         )
-
-
-def _read_manifest(path: Path, schema: str) -> dict[str, Any]:
-    file = path / MANIFEST
-    if not file.is_file():
-        raise ModelError(
-            f"{path}: there is no {MANIFEST}: this is not a folder that auvnn saved, or not all of it"
-        )
-    if file.stat().st_size > 1_000_000:
-        raise ModelError(f"{file}: larger than a manifest can be: restore the folder from a copy")
-    try:
-        manifest = json.loads(file.read_bytes())
-        found, files = manifest["schema"], dict(manifest["files"])
-        kind, version = found.rsplit("/", 1)
-        number = int(version)
-        entries = {n: {"sha256": str(e["sha256"]), "bytes": int(e["bytes"])} for n, e in files.items()}
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise ModelError(f"{file}: damaged, it cannot be read: restore the folder from a copy") from error
-    own_kind, own_version = schema.rsplit("/", 1)
-    if kind != own_kind:
-        raise ModelError(f"{path}: holds '{found}', but '{own_kind}' is wanted here")
-    if not 1 <= number <= int(own_version):
-        raise ModelError(f"{path}: written as '{found}', this auvnn reads up to '{schema}': upgrade auvnn")
-    for name, entry in entries.items():
-        if Path(name).suffix.lower() in CODE_SUFFIXES:
-            raise ModelError(f"{path}: names '{name}', a format that can run code when it is read: refused")
-        try:
-            _check_name(name, path)
-        except InputError as error:
-            raise ModelError(str(error)) from error
-        if not 0 <= entry["bytes"] <= MOST_BYTES:
-            raise ModelError(
-                f"{path}: '{name}' claims {entry['bytes']} bytes, more than is sensible: refused"
-            )
-    return entries
 
 
 def _refuse_file(path: Path) -> None:

@@ -1,0 +1,75 @@
+"""Every row of the list of bad input has a test, and every test that the list names is there and is run."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import re
+from pathlib import Path
+
+import pytest
+from rows import ELSEWHERE, ROWS
+
+ROOT = Path(__file__).parents[2]
+NUMBERED = re.compile(r"test_row_(\d+)_\w+")
+
+
+@functools.cache
+def functions_of(file: Path) -> dict[str, ast.FunctionDef]:
+    """The test functions of a file by name."""
+    return {
+        node.name: node
+        for node in ast.parse(file.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")
+    }
+
+
+def here() -> dict[int, list[str]]:
+    """Tests of this folder, by row."""
+    found: dict[int, list[str]] = {}
+    for file in sorted(Path(__file__).parent.glob("test_*.py")):
+        for name in functions_of(file):
+            if match := NUMBERED.fullmatch(name):
+                found.setdefault(int(match[1]), []).append(name)
+    return found
+
+
+def asserts(function: ast.FunctionDef) -> bool:
+    """Whether a test can fail: it asserts, expects an error, or calls something of the kind by name."""
+    calls = {ast.unparse(n.func) for n in ast.walk(function) if isinstance(n, ast.Call)}
+    judging = {"pytest.raises", "refused", "use", "same", "noted", "assert_survives"}
+    return any(isinstance(n, ast.Assert) for n in ast.walk(function)) or any(
+        c in judging or c.startswith(("np.testing.", "torch.testing.")) for c in calls
+    )
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_every_row_has_a_test(row):
+    assert here().get(row) or ELSEWHERE.get(row), f"row {row}, {ROWS[row]}, has no test"
+
+
+def test_no_test_is_for_a_row_that_is_not_listed():
+    assert set(here()) | set(ELSEWHERE) <= set(ROWS)
+
+
+@pytest.mark.parametrize("node", sorted({node for nodes in ELSEWHERE.values() for node in nodes}))
+def test_every_test_named_is_there_and_can_fail(node):
+    file, _, name = node.partition("::")
+    assert (ROOT / file).is_file(), node
+    function = functions_of(ROOT / file).get(name)
+    assert function is not None, f"{file} has no {name}"
+    marks = " ".join(ast.unparse(d) for d in function.decorator_list if "os.name" not in ast.unparse(d))
+    assert not re.search(r"skip|xfail|mark\.long|mark\.data", marks) and asserts(function)
+
+
+def test_every_test_of_this_folder_can_fail():
+    for file in sorted(Path(__file__).parent.glob("test_*.py")):
+        for name, function in functions_of(file).items():
+            assert asserts(function), f"{file.name}::{name} asserts nothing"
+
+
+def test_the_list_is_the_one_that_was_asked_for():
+    """Files as far as they are CSV or Parquet, time, signals, options, physics and numbers, models on disk."""
+    asked = {*range(1, 8), 14, *range(19, 25), *range(26, 29), 32, 35, 37, *range(40, 48), 59}
+    asked |= {*range(63, 73), *range(79, 83), 85, *range(88, 94), *range(97, 104)}
+    assert set(ROWS) == asked

@@ -1,0 +1,15 @@
+"""A small folder on disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from stored import FILES
+
+from auvnn.storage import write_folder
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return write_folder(tmp_path / "model", FILES)
