@@ -13,6 +13,7 @@ from auvnn.answers import Answer
 from auvnn.diagnosis.advise import advise
 from auvnn.diagnosis.explain import Explanation, explain, standard_errors, weigh
 from auvnn.diagnosis.nuisance import Layout, lay_out, stated
+from auvnn.diagnosis.residual_tests import residual_tests
 from auvnn.diagnosis.score import Score, inflation, score, similarity
 from auvnn.diagnosis.unknown import depends_on
 from auvnn.effects import EFFECTS
@@ -63,6 +64,7 @@ class Diagnosis(Answer):
     global_p_value: float
     similarity: tuple[list[str], Array] = field(default_factory=lambda: ([], np.eye(0)))
     explanation: Explanation | None = None
+    residual_tests: dict[str, Any] = field(default_factory=dict)
 
     @property
     def story(self) -> list[str]:
@@ -88,6 +90,7 @@ class Diagnosis(Answer):
             "next_experiment",
             "warnings",
             "global_p_value",
+            "residual_tests",
             "story",
         )
         return plain({"schema": "auvnn/diagnosis/1", **{n: getattr(self, n) for n in names}})
@@ -289,7 +292,15 @@ class _Search:
             global_p,
             similar,
             current,
+            self._tests(first, current),
         )
+
+    def _tests(self, first: Explanation, last: Explanation) -> dict[str, Any]:
+        """Return the residual tests without what was found and with it."""
+        self.say("testing what is left for whiteness")
+        before = residual_tests(first, self.windows).to_dict()
+        after = before if last is first else residual_tests(last, self.windows).to_dict()
+        return {"before": before, "after": after}
 
     def _next(self, model: GreyBox) -> dict[str, Any] | None:
         if not (self.advice and len(self.rivals) > 1):

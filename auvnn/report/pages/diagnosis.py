@@ -13,6 +13,7 @@ from auvnn.report.pages import common
 from auvnn.report.panels import NoData
 from auvnn.report.plots.parameters import parameters
 from auvnn.report.plots.ranking import brackets, improvement, ranking
+from auvnn.report.plots.residual_tests import residual_tests
 from auvnn.report.plots.similarity import similarity
 from auvnn.report.view import View
 from auvnn.report.words import finite, listing, number, p_value, percent, plural
@@ -95,6 +96,13 @@ class DiagnosisPage(Page):
                 "How alike the marks are that two effects leave on this log: 1 means that the log cannot "
                 "tell them apart, whatever the method. Framed pairs need another experiment.",
             ),
+            Plot(
+                "residual_tests",
+                "Is what is left white?",
+                lambda: _residual_tests(view),
+                "Autocorrelation of what free running leaves, initial states estimated. Grey: where white noise of the "
+                "sensors would lie, 99 % of it, after the same estimation. What leaves the band is not noise.",
+            ),
         ]
 
     def tables(self, view: View) -> list[Table]:
@@ -131,6 +139,7 @@ class DiagnosisPage(Page):
             "p: how likely so large a gain would be if the effect were absent. cv error: on runs that were "
             "not fitted."
         )
+        tested = view.mapping("residual_tests").get("after")
         return [
             Table("Steps of the search", ["step", "verdict", "effects"], steps, words=3),
             Table("All candidates", head, rows, caption, words=2),
@@ -140,6 +149,24 @@ class DiagnosisPage(Page):
                 ["axis", *_channels(view)],
                 depends,
                 "Share of each residual that a smooth function of one measured input explains.",
+            ),
+            Table(
+                "What is left, against the commands",
+                ["velocity", "component", "correlation", "lag [s]", "in half-widths of the 99 % band"],
+                _with_commands(tested) if isinstance(tested, Mapping) else [],
+                "Largest correlation of each velocity's error with each component of the commanded wrench before it; "
+                "only what leaves its band. An actuator or inertia that is wrong shows here.",
+                folded=True,
+            ),
+            Table(
+                "What to drive next",
+                ["manoeuvre", "expected standard errors"],
+                [
+                    [str(r.get("manoeuvre")), number(r.get("standard_errors"), 2)]
+                    for r in view.mapping("next_experiment").get("ranking") or []
+                    if isinstance(r, Mapping)
+                ],
+                "By which the wrong explanation, refitted, would miss the data of the right one.",
             ),
         ]
 
@@ -255,6 +282,25 @@ def _similarity(view: View) -> Figure:
     if not isinstance(found, (list, tuple)) or len(found) != 2:
         raise NoData("the answer holds no similarities")
     return similarity([str(n) for n in found[0]], found[1])
+
+
+def _residual_tests(view: View) -> Figure:
+    found = view.mapping("residual_tests")
+    before, after = found.get("before"), found.get("after")
+    if not (isinstance(before, Mapping) and isinstance(after, Mapping)):
+        raise NoData("the answer holds no residual tests")
+    return residual_tests(before, after)
+
+
+def _with_commands(tested: Mapping[str, Any]) -> list[list[str]]:
+    rows = []
+    for name, by_axis in (tested.get("with_commands") or {}).items():
+        for axis, entry in by_axis.items():
+            bands = finite(entry.get("bands"))
+            if bands is not None and bands > 1:
+                cells = [number(entry.get(k), 2) for k in ("largest", "lag", "bands")]
+                rows.append([str(name), str(axis), *cells])
+    return rows
 
 
 def _parameter_columns(fitted: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:

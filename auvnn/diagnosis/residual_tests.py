@@ -1,0 +1,146 @@
+"""Is what is left white, and has it nothing to do with the commands? Correlations with bands that really hold.
+
+The errors of free-running windows are not white even where the model is true and the sensors' noise is: each
+window's initial state was fitted to them, which takes the slow part out. The textbook band, 2.58 / sqrt(N), is then
+wrong. Here white noise is passed through the very projection that the initial states make of it, many times over, and
+the band is what comes out.
+
+Reference: Ljung (1999), System Identification, section 16.6; the bands by Monte Carlo are ours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from auvnn.diagnosis.explain import Explanation
+from auvnn.diagnosis.locate import AXES
+from auvnn.metrics.windows import VELOCITY, Windows
+from auvnn.models import GreyBox
+from auvnn.training.prediction_error import LOOSE
+from auvnn.training.sensitivity import respond
+
+Array = NDArray[np.float64]
+NAMES = ("u", "v", "w", "p", "q", "r")
+# Two-sided level of every band, draws of noise behind it, and the longest lag, s.
+LEVEL, DRAWS, LONGEST = 0.99, 200, 2.0
+LAGS = 40
+# Windows taken at a time, which bounds the memory of the draws.
+CHUNK = 12
+
+
+@dataclass(frozen=True)
+class ResidualTests:
+    """Correlations of what a model leaves, with bands that hold where it is true.
+
+    Attributes:
+        lags: s, (K,).
+        auto: autocorrelation of each velocity's error, (6, K); NaN where it was not measured.
+        auto_low: lower end of its band, (6, K).
+        auto_high: upper end, (6, K).
+        cross: correlation of each velocity's error with each component of the commanded wrench that many seconds
+            before, (6, 6, K).
+        cross_low: lower ends, (6, 6, K).
+        cross_high: upper ends, (6, 6, K).
+    """
+
+    lags: Array
+    auto: Array
+    auto_low: Array
+    auto_high: Array
+    cross: Array
+    cross_low: Array
+    cross_high: Array
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what the answer holds: curves, bands, and how often each leaves its band."""
+        out: dict[str, Any] = {"level": LEVEL, "lags": self.lags, "autocorrelation": {}, "with_commands": {}}
+        for k, name in enumerate(NAMES):
+            if not np.isfinite(self.auto[k]).any():
+                continue
+            beyond = (self.auto[k] < self.auto_low[k]) | (self.auto[k] > self.auto_high[k])
+            out["autocorrelation"][name] = {
+                "value": self.auto[k],
+                "low": self.auto_low[k],
+                "high": self.auto_high[k],
+                "outside": float(beyond.mean()),
+            }
+            rows = {}
+            for j, axis in enumerate(AXES):
+                value = self.cross[k, j]
+                if not np.isfinite(value).any():
+                    continue
+                half = 0.5 * (self.cross_high[k, j] - self.cross_low[k, j])
+                middle = 0.5 * (self.cross_high[k, j] + self.cross_low[k, j])
+                excess = np.abs(value - middle) / np.maximum(half, 1e-12)
+                at = int(np.nanargmax(excess))
+                rows[axis] = {
+                    "outside": float((excess > 1).mean()),
+                    "largest": float(value[at]),
+                    "lag": float(self.lags[at]),
+                    "bands": float(excess[at]),
+                }
+            out["with_commands"][name] = rows
+        return out
+
+
+def residual_tests(explanation: Explanation, windows: Windows, draws: int = DRAWS) -> ResidualTests:
+    """Return the correlations of what an explanation leaves on the windows that it was fitted to.
+
+    Args:
+        explanation: a fit; its model and initial states are used.
+        windows: those it was fitted to.
+        draws: of noise, for the bands.
+    """
+    fitted = explanation.fitted
+    step = float(torch.median(windows.times[:, windows.warmup + 1 :] - windows.times[:, windows.warmup : -1]))
+    length = windows.nu.shape[1]
+    count = int(min(LAGS, length // 2, max(2, round(LONGEST / max(step, 1e-9)))))
+    generator = torch.Generator().manual_seed(0)
+    weight = torch.as_tensor(np.where(np.isfinite(fitted.sigma), 1.0 / fitted.sigma, 0.0))
+    loose = torch.diag(torch.as_tensor(1.0 / LOOSE))
+    wrench = _wrench(fitted.model, windows)
+    wrench = wrench - wrench.mean((0, 1))
+    # One column for what was measured, the others for noise: all take the same way.
+    sums = torch.zeros(draws + 1, 6, count + 1, dtype=torch.float64)
+    crossed = torch.zeros(draws + 1, 6, 6, count, dtype=torch.float64)
+    drive = torch.zeros(6, 6, dtype=torch.float64)
+    for begin in range(0, len(windows), CHUNK):
+        part = windows.pick(slice(begin, begin + CHUNK))
+        answer = respond(fitted.model, part, fitted.initial[begin : begin + CHUNK], ())
+        size = len(part)
+        mask = part.mask * (weight > 0)
+        state = (answer.state * weight[:, None]).reshape(size, length * 18, 12)
+        q = torch.linalg.qr(torch.cat([state, loose.expand(size, 12, 12)], dim=1))[0][:, :-12]
+        noise = torch.randn(size, length, 18, draws, generator=generator, dtype=torch.float64)
+        both = torch.cat([(answer.error * weight).unsqueeze(-1), noise], dim=-1) * mask.unsqueeze(-1)
+        flat = both.reshape(size, length * 18, draws + 1)
+        left = (flat - q @ (q.mT @ flat)).reshape(size, length, 18, draws + 1)
+        error = (left * mask.unsqueeze(-1))[:, :, VELOCITY]
+        tau = wrench[begin : begin + CHUNK]
+        for k in range(count + 1):
+            sums[:, :, k] += torch.einsum("blcd,blcd->dc", error[:, k:], error[:, : length - k])
+            if k:
+                crossed[..., k - 1] += torch.einsum("blcd,blj->dcj", error[:, k:], tau[:, : length - k])
+        drive += torch.einsum("blc,blj->cj", mask[:, :, VELOCITY], tau**2)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        energy = sums[:, :, :1]
+        auto = (sums[:, :, 1:] / energy).numpy()
+        cross = (crossed / torch.sqrt(energy.unsqueeze(-1) * drive.unsqueeze(-1))).numpy()
+    tail = 0.5 * (1.0 - LEVEL)
+    low, high = np.quantile(auto[1:], [tail, 1.0 - tail], axis=0).astype(np.float64)
+    below, above = np.quantile(cross[1:], [tail, 1.0 - tail], axis=0).astype(np.float64)
+    lags = (step * np.arange(1, count + 1)).astype(np.float64)
+    return ResidualTests(lags, auto[0], low, high, cross[0], below, above)
+
+
+def _wrench(model: GreyBox, windows: Windows) -> Tensor:
+    """Return the wrench that the commands stand for, actuators settled, (B, L, 6)."""
+    command = windows.inputs.command[:, windows.warmup :]
+    with torch.no_grad():
+        return model.actuators.static(command) @ model.actuators.allocation.mT
