@@ -262,7 +262,10 @@ class Adapter:
         std = self._noise.std()
         lesson = Lesson(sample.t, dt, found.nu, target, error, slope, torch.tensor(std) ** 2)
         if guards.off:
-            return self._set(self.scheme.propose(self.weights, lesson), lesson, found, told)
+            proposed = self.scheme.propose(self.weights, lesson)
+            if proposed is None:
+                return self._no(sample.t, "no_news", **told)
+            return self._set(proposed, lesson, found, told)
         if self.paused:
             return self._no(sample.t, "paused", **told)
         if sample.t < self._off_until:
@@ -305,26 +308,23 @@ class Adapter:
             self.counts.validated += 1
         return verdict == "worse", verdict == "valid"
 
-    def _set(self, proposed: Tensor | None, lesson: Lesson, found: Residual, told: dict[str, Any]) -> Update:
+    def _set(self, proposed: Tensor, lesson: Lesson, found: Residual, told: dict[str, Any]) -> Update:
         before = self.weights.read()
-        if self.guards.off:
-            assert proposed is not None
-            sound = bool(torch.isfinite(proposed).all())
-            if sound:
-                self.weights.write(proposed)
-        else:
-            assert proposed is not None
-            sound, shortened = self._bounds.admit(self.weights, proposed, lesson.nu, lesson.dt)
-            self.counts.shortened += int(shortened)
-        if not sound:
-            return self._no(lesson.t, "limited", **told)
+        moved: Tensor | None = None
         if not self.guards.off:
-            self._shadow.open(lesson.t)
-        now = self.weights.read()
-        moved = self.weights.value(lesson.nu) - (lesson.target - lesson.error)
+            moved, shortened = self._bounds.admit(self.weights, proposed, lesson.nu, lesson.dt)
+            self.counts.shortened += int(shortened)
+            if moved is not None:
+                self._shadow.open(lesson.t)
+        elif bool(torch.isfinite(proposed).all()):
+            self.weights.write(proposed)
+            moved = self.weights.value(lesson.nu) - (lesson.target - lesson.error)
+        if moved is None:
+            return self._no(lesson.t, "limited", **told)
         return Update(
             lesson.t, True, "learned from this sample", "adapted", **told,
-            change=float((now - before).norm()), force_change=moved * self.weights.bank.output_scale,
+            change=float((self.weights.read() - before).norm()),
+            force_change=moved * self.weights.bank.output_scale,
         )  # fmt: skip
 
     def _no(self, t: float, cause: str, **told: Any) -> Update:
