@@ -185,6 +185,18 @@ class Adapter:
         if self._monitor is not None:
             self._monitor.use(self._unadapted())
 
+    def new_run(self) -> None:
+        """Begin another run, whose time may start again: nothing is compared across the gap; weights stay."""
+        self._predictor.forget_all()
+        self._consistency.forget()
+        self._gate.clear()
+        self._held, self._resting, self._off_until = [], 0, -float("inf")
+        if self._shadow.since is not None:
+            # What was being judged is kept only if the next run confirms it, on that run's clock.
+            self._shadow.restart()
+        if self._monitor is not None:
+            self._monitor.new_run()
+
     def step(
         self,
         t: float,
@@ -245,7 +257,7 @@ class Adapter:
         dt = 0.0 if last is None else sample.t - last.t
         if fault:
             self._off_until, self._off_cause = sample.t + self.guards.hold, "fault_flagged"
-        elif not self.guards.off and self._consistency.faulty(last, sample):
+        elif self.guards.enabled and self._consistency.faulty(last, sample):
             self._off_until, self._off_cause = sample.t + self.guards.hold, "inconsistent"
         if self._passed_over(sample):
             self._predictor.skip(sample)
@@ -260,7 +272,7 @@ class Adapter:
 
     def _passed_over(self, sample: Sample) -> bool:
         """Whether this is one of the many samples at rest that are not looked at."""
-        if self.guards.off or not self._rests(sample.nu):
+        if not self.guards.enabled or not self._rests(sample.nu):
             self._resting = 0
             return False
         self._resting += 1
@@ -286,7 +298,7 @@ class Adapter:
         missing = -original * bank.output_scale
         std = self._noise.std()
         lesson = Lesson(sample.t, dt, found.nu, target, error, slope, torch.tensor(std) ** 2)
-        if guards.off:
+        if not guards.enabled:
             self._watch(found, missing)
             proposed = self.scheme.propose(self.weights, lesson)
             if proposed is None:
@@ -351,7 +363,7 @@ class Adapter:
     def _set(self, proposed: Tensor, lesson: Lesson, found: Residual, told: dict[str, Any]) -> Update:
         before = self.weights.read()
         moved: Tensor | None = None
-        if not self.guards.off:
+        if self.guards.enabled:
             moved, shortened = self._bounds.admit(self.weights, proposed, lesson.nu, lesson.dt)
             self.counts.shortened += int(shortened)
             if moved is not None:

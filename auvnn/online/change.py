@@ -235,12 +235,17 @@ class Monitor:
         effect = max(alone, key=lambda name: alone[name][0].evidence)
         found, columns = alone[effect]
         std = np.sqrt(np.diag(found.covariance))
+        off = {
+            p.name: abs(columns.now[i] + found.theta[i] - p.null) / std[i]
+            for i, p in enumerate(columns.parameters)
+        }
         parameters = {
             p.name: {"value": float(columns.now[i] + found.theta[i]), "std": float(std[i]), "unit": p.unit}
             for i, p in enumerate(columns.parameters)
             if std[i] < UNDETERMINED * p.scale
         }
-        return effect, parameters
+        # Those that have changed most certainly come first.
+        return effect, dict(sorted(parameters.items(), key=lambda item: -off[item[0]]))
 
     def _revise(self, block: Block) -> None:
         """Judge an open change again with one more block, and close it when it has settled."""
@@ -305,6 +310,10 @@ class Monitor:
             for k, sample in enumerate(pending)
         ]
 
+    def new_run(self) -> None:
+        """Drop the block that was being filled: the next sample is from another run."""
+        self._pending = []
+
     @property
     def pending(self) -> list[Sample]:
         """The samples of the block that is being filled."""
@@ -329,10 +338,7 @@ def _words(
 ) -> str:  # fmt: skip
     when = f"at {time:.1f} s"
     if named != "unclear":
-        largest = sorted(parameters.items(), key=lambda item: -abs(item[1]["value"]) / item[1]["std"])[:3]
-        values = ", ".join(
-            f"{n} {v['value']:.3g} +- {v['std']:.2g} {v['unit']}".rstrip(" 1") for n, v in largest
-        )
+        values = ", ".join(_value(name, v) for name, v in list(parameters.items())[:3])
         return f"{when} a change of {named} ({effect}: {values or 'no single value is determined'})"
     if rivals:
         others = " or ".join([kind, *rivals])
@@ -340,3 +346,8 @@ def _words(
     return (
         f"{when} something changed that no single kind explains: {kind} explains {100 * share:.0f} % at best"
     )
+
+
+def _value(name: str, told: dict[str, Any]) -> str:
+    unit = "" if told["unit"] == "1" else f" {told['unit']}"
+    return f"{name} {told['value']:.3g} +- {told['std']:.2g}{unit}"

@@ -114,6 +114,11 @@ class Predictor:
         """Drop the history: the next sample starts afresh."""
         self.history.clear()
 
+    def forget_all(self) -> None:
+        """Drop the history and the last sample's time: another run begins."""
+        self.history.clear()
+        self._last = None
+
     def skip(self, sample: Sample) -> None:
         """Add a sample without comparing it with anything."""
         self.history.append(sample)
