@@ -1,0 +1,21 @@
+"""Adaptation while running, and what kind of change was seen."""
+
+from __future__ import annotations
+
+from auvnn.online.adapt import Adaptation, adapt
+from auvnn.online.adapter import Adapter, Counts, Update
+from auvnn.online.change import Change
+from auvnn.online.frozen import FrozenErrors, frozen_errors
+from auvnn.online.guards import Guards
+
+__all__ = [
+    "Adaptation",
+    "Adapter",
+    "Change",
+    "Counts",
+    "FrozenErrors",
+    "Guards",
+    "Update",
+    "adapt",
+    "frozen_errors",
+]
