@@ -11,8 +11,15 @@ def _run(job: Job) -> Answering:
 
     effects, log, test = job.names("effect"), job.log(), job.held_out()
     model, say = job.model(log), job.say
-    better = add(model, log, effects, test=test, derivative=job["derivative"], objective=job["objective"],
-                 progress=say.progress)
+    better = add(
+        model,
+        log,
+        effects,
+        test=test,
+        derivative=job["derivative"],
+        objective=job["objective"],
+        progress=say.progress,
+    )
     better.model.save(job.folder / "model")
     better.write(job.folder)
     data = better.to_dict()

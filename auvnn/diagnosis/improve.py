@@ -46,6 +46,8 @@ class Improvement(Answer):
         refitted_model: the model as given, its uncertain coefficients refitted.
         left_out: where one-step errors were fitted, their weighted size on runs of `log` left out in turn: before
             and after, the fall and its standard error; None otherwise. It never saw the test log.
+        steps: the models of the waterfall one by one: their held-out figures, and what `left_out` is from each to
+            the next.
     """
 
     kind = "improvement"
@@ -68,6 +70,7 @@ class Improvement(Answer):
     series: list[dict[str, Any]] = field(default_factory=list)
     objective: str = "rollout"
     left_out: dict[str, float] | None = None
+    steps: list[dict[str, Any]] = field(default_factory=list)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
@@ -156,13 +159,15 @@ def add(
     results, rolled, key = {}, {}, "5"
     for step, candidate in models:
         whole = step in ("as given", "coefficients refitted") or candidate is final
-        rollout, kept = table(candidate, test, scale, tuple(horizons) if whole else (key,))
+        rollout, kept = table(
+            candidate, test, scale, tuple(horizons) if whole or objective == "one_step" else (key,)
+        )
         results[step] = {"rollout": rollout}
         rolled[step] = kept
         if key not in kept:
             # The held-out stretches are shorter than that: the longest horizon that they bear.
             key = next((h for h in ("2", "1", "0.5") if h in kept), "full")
-        if whole:
+        if whole or objective == "one_step":
             results[step]["one_step"] = scores(one_step(candidate, test, how))
     last = names[-1]
     gain, std = paired_gain(rolled["coefficients refitted"][key], rolled[last][key], scale)
@@ -202,6 +207,17 @@ def add(
         ],
         objective,
         left_out_gain(nothing, best) if objective == "one_step" else None,
+        [
+            {
+                "step": step,
+                **results[step],
+                "left_out": left_out_gain(fits[k - 2], fits[k - 1])
+                if objective == "one_step" and k > 1
+                else None,
+                "model": candidate,
+            }
+            for k, (step, candidate) in enumerate(models)
+        ],
     )
 
 

@@ -69,7 +69,9 @@ def left_out_gain(before: Explanation, after: Explanation) -> dict[str, float]:
     runs left out as on those fitted. The standard error is by leaving out groups of stretches (Kuensch 1989).
     """
     total = float(before.left_out_count.sum())
-    group = np.arange(len(before.left_out)) * min(GROUPS, len(before.left_out)) // max(len(before.left_out), 1)
+    group = (
+        np.arange(len(before.left_out)) * min(GROUPS, len(before.left_out)) // max(len(before.left_out), 1)
+    )
 
     def fall(keep: NDArray[np.bool_]) -> float:
         size = max(float(before.left_out_count[keep].sum()), 1.0)

@@ -225,7 +225,9 @@ def _column(name: str, value: Any, where: str) -> Column:
         k: _number(value[k], f"{here}: {k}") for k in ("scale", "offset", "delay") if k in value
     }
     if abs(numbers.get("delay", 0.0)) > _LONGEST_DELAY:
-        raise ConfigError(f"{here}: delay: {numbers['delay']:g} s is beyond {_LONGEST_DELAY:g} s; give seconds")
+        raise ConfigError(
+            f"{here}: delay: {numbers['delay']:g} s is beyond {_LONGEST_DELAY:g} s; give seconds"
+        )
     if "delay" in numbers and name in ("t", "run"):
         raise ConfigError(f"{here}: '{name}' takes no delay: give it to the columns that are late")
     if numbers.get("scale") == 0.0:

@@ -17,12 +17,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from auvnn.effects.base import HOOKS as ALL_HOOKS
 from auvnn.errors import InputError
 from auvnn.logs import Log, Run
 from auvnn.logs.derivatives import LocalPolynomial
 from auvnn.metrics.one_step import Derivative, Replay
 from auvnn.metrics.windows import ACCELERATION, CHANNELS
-from auvnn.effects.base import HOOKS as ALL_HOOKS
 from auvnn.models import GreyBox
 from auvnn.training.prediction_error import Fitted, Priors, Statistics, parameters_of, set_parameters
 
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 # Step of the difference quotients, as a share of each parameter's plausible size.
 STEP = 1e-4
 # A fit has settled when a step gains less than this share of the cost, and the weights keep still within this.
-SETTLED, STILL = 1e-5, 0.01
+SETTLED, STILL = 1e-4, 0.01
 
 
 class _Part:
@@ -49,10 +49,8 @@ class _Part:
 
     def error(self) -> Array:
         """Return measured minus predicted acceleration, (N, 6); zero where there is none."""
-        if self.filter is None:
-            predicted = self.replay.acceleration()
-        else:
-            predicted = self.filter(self.replay.velocity())[1]
+        replay = self.replay
+        predicted = replay.acceleration() if self.filter is None else self.filter(replay.velocity())[1]
         gap = self.measured - predicted
         return np.where(np.isfinite(gap), gap, 0.0)
 
@@ -122,8 +120,9 @@ def fit_one_step(
                     break
             out[..., k] = (here - errors(effect.hooks())) / moved
             set_parameters(model, names, theta)
-            for part in parts:
-                part.replay.update(effect.hooks())
+            if k + 1 == len(free) or free[k + 1][0] is not effect:
+                for part in parts:
+                    part.replay.update(effect.hooks())
         return out
 
     def penalty(at: Array) -> float:
@@ -140,7 +139,10 @@ def fit_one_step(
         normal = hessian / scale[:, None] / scale
         now = float(((here / own) ** 2).sum()) + penalty(theta)
         for _attempt in range(10):
-            step = np.linalg.lstsq(normal + damping * np.eye(len(theta)), gradient / scale, rcond=1e-13)[0] / scale
+            step = (
+                np.linalg.lstsq(normal + damping * np.eye(len(theta)), gradient / scale, rcond=1e-13)[0]
+                / scale
+            )
             set_parameters(model, names, theta + step)
             reached, there = parameters_of(model, names), errors()
             then = float(((there / own) ** 2).sum()) + penalty(reached)
