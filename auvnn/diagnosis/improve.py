@@ -47,7 +47,7 @@ class Improvement(Answer):
         left_out: where one-step errors were fitted, their weighted size on runs of `log` left out in turn: before
             and after, the fall and its standard error; None otherwise. It never saw the test log.
         steps: the models of the waterfall one by one: their held-out figures, and what `left_out` is from each to
-            the next.
+            the next, by "run" and by "fifth" of every run.
     """
 
     kind = "improvement"

@@ -54,31 +54,54 @@ def explain_one_step(
         set_parameters(model, start.names, start.theta)
     sigma = None if start is None else start.sigma
     fitted = fit_one_step(model, log, names, held, how, sigma=sigma, progress=progress)
-    run = fitted.statistics.run
-    runs = np.unique(run)
-    fold = np.searchsorted(runs, run) if len(runs) >= 2 else np.arange(len(run)) * FOLDS // len(run)
-    cost = left_out(fitted.statistics, fitted.theta, held, fold)
+    cost = left_out(fitted.statistics, fitted.theta, held, _folds(fitted, "run"))
     count = fitted.statistics.count[:, np.isfinite(fitted.sigma)].sum(1)
     return Explanation(tuple(effects), fitted, names, 0.0, cost, count)
 
 
-def left_out_gain(before: Explanation, after: Explanation) -> dict[str, float]:
-    """Return the weighted error on runs left out before and after, and the fall with its standard error.
+def _folds(fitted: Fitted, by: str) -> NDArray[np.int64]:
+    """Return each stretch's fold, (B,): its run where there are several, or its fifth of the run."""
+    run = fitted.statistics.run
+    runs, index = np.unique(run, return_inverse=True)
+    if by == "run" and len(runs) > 1:
+        return index
+    fold = np.empty(len(run), dtype=np.int64)
+    for k in range(len(runs)):
+        own = np.flatnonzero(index == k)
+        fold[own] = np.arange(len(own)) * FOLDS // len(own)
+    return fold
 
-    Both fits must have the same weights and stretches; the error is one where the fit before is as good on
-    runs left out as on those fitted. The standard error is by leaving out groups of stretches (Kuensch 1989).
+
+def left_out_gain(before: Explanation, after: Explanation, by: str = "run") -> dict[str, float]:
+    """Return the weighted error on what is left out before and after, and the fall with its standard error.
+
+    Both fits must have the same weights and stretches; the error is one where the fit before is as good on what is
+    left out as on what is fitted. The standard error is by leaving out groups of stretches (Kuensch 1989).
+
+    Args:
+        before: fit without.
+        after: fit with.
+        by: "run", or "fifth" of every run: where only one run drives a degree of freedom, nothing is known of that
+            once the run is left out, and only its fifths can tell.
     """
-    total = float(before.left_out_count.sum())
-    group = (
-        np.arange(len(before.left_out)) * min(GROUPS, len(before.left_out)) // max(len(before.left_out), 1)
+    first, last = (
+        left_out(e.fitted.statistics, e.fitted.theta, e.fitted.priors, _folds(e.fitted, by))
+        for e in (before, after)
     )
+    count, size = before.left_out_count, len(first)
+    group = np.arange(size) * min(GROUPS, size) // max(size, 1)
 
-    def fall(keep: NDArray[np.bool_]) -> float:
-        size = max(float(before.left_out_count[keep].sum()), 1.0)
-        first, last = (max(float(e.left_out[keep].sum()), 0.0) for e in (before, after))
-        return float(np.sqrt(first / size) - np.sqrt(last / size))
+    def errors(keep: NDArray[np.bool_]) -> Array:
+        samples = max(float(count[keep].sum()), 1.0)
+        return np.sqrt(np.maximum([first[keep].sum(), last[keep].sum()], 0.0) / samples)
 
-    without = np.array([fall(group != g) for g in np.unique(group)])
+    whole = errors(group >= 0)
+    without = np.array([-np.diff(errors(group != g))[0] for g in np.unique(group)])
     n = len(without)
-    std = float(np.sqrt((n - 1) / n * ((without - without.mean()) ** 2).sum())) if n > 1 and total else np.inf
-    return {"before": before.cv, "after": after.cv, "gain": before.cv - after.cv, "std": std}
+    std = float(np.sqrt((n - 1) / n * ((without - without.mean()) ** 2).sum())) if n > 1 else float("inf")
+    return {
+        "before": float(whole[0]),
+        "after": float(whole[1]),
+        "gain": float(whole[0] - whole[1]),
+        "std": std,
+    }

@@ -138,14 +138,14 @@ def main() -> None:
         result[words] = told(words, step)
         if step["left_out"] is None:
             continue
-        # Runs left out of the fitted ones decide; what the held-out log says of it decides nothing.
-        left = step["left_out"]
-        result[words].update(left_out=left, pays=left["gain"] > left["std"])
-        print(
-            f"{'':<28} runs left out {left['before']:.4f} -> {left['after']:.4f} (+- {left['std']:.4f}): "
-            f"{'pays' if result[words]['pays'] else 'does not pay'}",
-            flush=True,
-        )
+        # Parts left out of the fitted runs decide; what the held-out log says of it decides nothing.
+        result[words].update(left_out=step["left_out"])
+        for by, left in step["left_out"].items():
+            verdict = "pays" if left["gain"] > left["std"] else "does not pay"
+            print(
+                f"{'':<28} {by} left out {left['before']:.4f} -> {left['after']:.4f} (+- {left['std']:.4f}): {verdict}",
+                flush=True,
+            )
     result["parameters"], result["coefficients"] = answer.parameters, answer.coefficients
     result["warnings"], result["seconds"] = answer.warnings, time.monotonic() - began
     answer.model.save(out / "model", overwrite=True)
