@@ -211,7 +211,7 @@ def add(
             {
                 "step": step,
                 **results[step],
-                "left_out": left_out_gain(fits[k - 2], fits[k - 1])
+                "left_out": {by: left_out_gain(fits[k - 2], fits[k - 1], by) for by in ("run", "fifth")}
                 if objective == "one_step" and k > 1
                 else None,
                 "model": candidate,
