@@ -13,7 +13,8 @@ def _run(job: Job) -> Answering:
     model, say = job.model(log), job.say
     better = add(
         model, log, effects,
-        test=test, derivative=job["derivative"], window=job["window"], force=job["force"], progress=say.progress,
+        test=test, derivative=job["derivative"], window=job["window"], objective=job["objective"],
+        force=job["force"], progress=say.progress,
     )  # fmt: skip
     better.model.save(job.folder / "model")
     better.write(job.folder)

@@ -11,11 +11,13 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.answers import Answer, plain
+from auvnn.catalogue import unknown_name
 from auvnn.diagnosis.bake import baked
 from auvnn.diagnosis.compare import stitch
 from auvnn.diagnosis.diagnose import windows_for
 from auvnn.diagnosis.explain import Explanation, determined, explain, standard_errors
-from auvnn.diagnosis.nuisance import lay_out
+from auvnn.diagnosis.nuisance import Layout, lay_out
+from auvnn.diagnosis.one_step_fit import explain_one_step, left_out_gain
 from auvnn.effects import EFFECTS
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log
@@ -24,9 +26,13 @@ from auvnn.metrics.noise import attitude_noise, white
 from auvnn.metrics.one_step import choose_derivative, one_step, scores
 from auvnn.metrics.rollouts import HORIZONS, Rolled, Scale, scale_of, table
 from auvnn.models import GreyBox
+from auvnn.training.prediction_error import Fitted
 
 Array = NDArray[np.float64]
+# Layout, effects that are free anyway, effects asked for, the fit to start from.
+Fit = Callable[[Layout, Sequence[str], Sequence[str], Fitted | None], Explanation]
 BLOCKS = 20
+OBJECTIVES = ("rollout", "one_step")
 
 
 @dataclass
@@ -38,6 +44,10 @@ class Improvement(Answer):
         accepted: whether the held-out error fell by more than its own uncertainty.
         better: the model with the effects.
         refitted_model: the model as given, its uncertain coefficients refitted.
+        left_out: where one-step errors were fitted, their weighted size on runs of `log` left out in turn: before
+            and after, the fall and its standard error; None otherwise. It never saw the test log.
+        steps: the models of the waterfall one by one: their held-out figures, and what `left_out` is from each to
+            the next, by "run" and by "fifth" of every run.
     """
 
     kind = "improvement"
@@ -58,6 +68,9 @@ class Improvement(Answer):
     refitted_model: GreyBox
     warnings: list[str] = field(default_factory=list)
     series: list[dict[str, Any]] = field(default_factory=list)
+    objective: str = "rollout"
+    left_out: dict[str, float] | None = None
+    steps: list[dict[str, Any]] = field(default_factory=list)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
@@ -74,6 +87,8 @@ class Improvement(Answer):
             "parameters",
             "coefficients",
             "held_out",
+            "objective",
+            "left_out",
             "warnings",
         )
         return plain(
@@ -90,6 +105,8 @@ def add(
     derivative: dict[str, Any] | None = None,
     window: float | None = None,
     force: bool = False,
+    objective: str = "rollout",
+    horizons: Sequence[str] = HORIZONS,
     progress: Callable[[str], None] | None = None,
 ) -> Improvement:
     """Add effects, fit them jointly with the uncertain coefficients on `log`, and judge on held-out data.
@@ -102,10 +119,13 @@ def add(
         derivative: how accelerations are obtained where they were not measured.
         window: length of the windows of free running that are fitted, s; by default 5.
         force: go on with a log that contradicts itself: signs, units, axes.
+        objective: "rollout" fits the error of free-running windows; "one_step" that of the acceleration one
+            step ahead, which is better where lasting disturbances, not sensors, limit the prediction.
+        horizons: of free running on the held-out data, s, "5" among them; fewer take less time.
         progress: told in words what is being done.
 
     Raises:
-        ConfigError: an unknown effect, one that is there already, or one named twice.
+        ConfigError: an unknown effect or objective, an effect that is there already, or one named twice.
         InputError: the same data on both sides, `log` says nothing about an effect, or contradicts itself.
     """
     say = progress or (lambda words: None)
@@ -118,16 +138,22 @@ def add(
         leakage(log, test)
         test.quality().refuse_contradictions(force)
     log.quality().refuse_contradictions(force)
-    windows = windows_for(model, log, window)
+    if objective not in OBJECTIVES:
+        raise ConfigError(unknown_name("objective", str(objective), OBJECTIVES))
+    if "5" not in horizons:
+        raise ConfigError(f"horizons={list(horizons)}: '5' must be among them, the gain is measured there")
+    if objective == "one_step" and window is not None:
+        raise ConfigError("window= belongs to objective=rollout: leave it out, or fit windows")
     layout = lay_out(model, names)
+    fit = _by_one_step(log, derivative) if objective == "one_step" else _by_windows(model, log, window)
     base = [n for n in layout.names if n not in names or n in layout.nuisance]
     say("refitting the uncertain coefficients alone")
     # A coefficient group that is itself to be added stays as stated in the model that is compared with.
-    nothing = explain(layout, windows, [n for n in base if n not in names], ())
+    nothing = fit(layout, [n for n in base if n not in names], (), None)
     models, fits = [("as given", model), ("coefficients refitted", baked(model, layout, nothing))], [nothing]
     for count in range(1, len(names) + 1):
         say(f"fitting with {', '.join(names[:count])}")
-        found = explain(layout, windows, base, names[:count], start=fits[-1].fitted)
+        found = fit(layout, base, names[:count], fits[-1].fitted)
         fits.append(found)
         models.append((names[count - 1], baked(model, layout, found)))
     final, best = models[-1][1], fits[-1]
@@ -136,14 +162,16 @@ def add(
     scale, how = scale_of(test), choose_derivative(test, derivative)
     results, rolled, key = {}, {}, "5"
     for step, candidate in models:
-        horizons = HORIZONS if step in ("as given", "coefficients refitted") or candidate is final else (key,)
-        rollout, kept = table(candidate, test, scale, horizons)
+        whole = step in ("as given", "coefficients refitted") or candidate is final
+        rollout, kept = table(
+            candidate, test, scale, tuple(horizons) if whole or objective == "one_step" else (key,)
+        )
         results[step] = {"rollout": rollout}
         rolled[step] = kept
         if key not in kept:
             # The held-out stretches are shorter than that: the longest horizon that they bear.
             key = next((h for h in ("2", "1", "0.5") if h in kept), "full")
-        if len(horizons) > 1:
+        if whole or objective == "one_step":
             results[step]["one_step"] = scores(one_step(candidate, test, how))
     last = names[-1]
     gain, std = paired_gain(rolled["coefficients refitted"][key], rolled[last][key], scale)
@@ -181,7 +209,30 @@ def add(
             }
             for run in test.runs
         ],
+        objective,
+        left_out_gain(nothing, best) if objective == "one_step" else None,
+        [
+            {
+                "step": step,
+                **results[step],
+                "left_out": {by: left_out_gain(fits[k - 2], fits[k - 1], by) for by in ("run", "fifth")}
+                if objective == "one_step" and k > 1
+                else None,
+                "model": candidate,
+            }
+            for k, (step, candidate) in enumerate(models)
+        ],
     )
+
+
+def _by_windows(model: GreyBox, log: Log, window: float | None) -> Fit:
+    windows = windows_for(model, log, window)
+    return lambda layout, base, effects, start: explain(layout, windows, base, effects, start=start)
+
+
+def _by_one_step(log: Log, derivative: dict[str, Any] | None) -> Fit:
+    how = choose_derivative(log, derivative)
+    return lambda layout, base, effects, start: explain_one_step(layout, log, base, effects, how, start=start)
 
 
 def _check(model: GreyBox, names: list[str]) -> None:

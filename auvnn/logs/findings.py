@@ -192,7 +192,8 @@ def _agreement(kinematics: dict[str, Agreement], order: str | None) -> list[Find
     if late:
         times = ", ".join(f"{n} {v:+.2f} s" for n, v in late.items())
         what = f"velocities are not at the time of attitude and position (+ is late): {times}"
-        found.append(Finding("warning", "delay", what, "correct the stamps, or consider it in the model"))
+        cure = "correct the stamps, or give the late columns a delay in the mapping, u: {delay: 0.2}"
+        found.append(Finding("warning", "delay", what, cure))
     return found
 
 

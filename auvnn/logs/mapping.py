@@ -3,6 +3,9 @@
 A value passes through these steps, in this order: the curve `(value - neutral) / span` cut to [-1, 1],
 `value * scale + offset`, the unit (`angles`, `rates`, `time`), and last the frame (`FLU` to `FRD`, `ENU`
 to `NED`). A `scale: -1` therefore turns a sign in the frame in which the file was recorded.
+
+A `delay` says by how many seconds a column lags behind the time it is stamped with (`auvnn check` measures it for
+the velocities): once the runs are told apart, each of them takes its values from that much later in the record.
 """
 
 from __future__ import annotations
@@ -24,10 +27,11 @@ from auvnn.logs.readers.base import Table
 from auvnn.logs.repair import Repair
 
 _KEYS = ("columns", "frame", "angles", "rates", "quaternion", "time", "run")
-_COLUMN_KEYS = ("from", "scale", "offset", "curve", "value")
+_COLUMN_KEYS = ("from", "scale", "offset", "curve", "delay", "value")
 _TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _RATES = ("p", "q", "r", "dp", "dq", "dr")
 _NO_SIGNAL = 65535.0
+_LONGEST_DELAY = 60.0  # s
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,7 @@ class Column:
     neutral: float | None = None
     span: float = 1.0
     value: float = 0.0
+    delay: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -217,8 +222,14 @@ def _column(name: str, value: Any, where: str) -> Column:
     if not isinstance(source, str):
         raise ConfigError(f"{here}: 'from' must be a column's name, not {source!r}")
     numbers: dict[str, float] = {
-        k: _number(value[k], f"{here}: {k}") for k in ("scale", "offset") if k in value
+        k: _number(value[k], f"{here}: {k}") for k in ("scale", "offset", "delay") if k in value
     }
+    if abs(numbers.get("delay", 0.0)) > _LONGEST_DELAY:
+        raise ConfigError(
+            f"{here}: delay: {numbers['delay']:g} s is beyond {_LONGEST_DELAY:g} s; give seconds"
+        )
+    if "delay" in numbers and name in ("t", "run"):
+        raise ConfigError(f"{here}: '{name}' takes no delay: give it to the columns that are late")
     if numbers.get("scale") == 0.0:
         raise ConfigError(f"{here}: scale: 0 would wipe the column out; use 'value: 0' for a constant")
     if "curve" in value:

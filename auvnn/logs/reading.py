@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import ConfigError, InputError
-from auvnn.logs import attitude, clock, frames, plausible, required
+from auvnn.logs import attitude, clock, delays, frames, plausible, required
 from auvnn.logs.channels import (
     ACCELERATION,
     EULER,
@@ -151,6 +151,8 @@ def _collect(table: Table, plan: Mapping, file: Path, collector: _Collector) -> 
             pick = slice(None) if whole else taken
             columns = {n: c[pick].astype(np.float64, copy=False) for n, c in table.columns.items()}
             columns["t"] = t[pick]
+            columns, notes = delays.undo(columns, plan, here)
+            collector.repairs.extend(notes)
             run = _run(number if i == 0 else highest, columns, outside, plan, here, collector.repairs)
             collector.runs.append(run)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,6 @@ from auvnn.logs import Log, Run
 from auvnn.logs.derivatives import LocalPolynomial, bandwidth_hz
 from auvnn.metrics.noise import noisier
 from auvnn.models import GreyBox, Inputs
-from auvnn.models.actuators import Drive
 from auvnn.physics.attitude import quat_to_matrix
 
 Array = NDArray[np.float64]
@@ -115,7 +114,7 @@ def model_acceleration(model: GreyBox, run: Run) -> Array:
     Raises:
         InputError: the run lacks the commands that drive the model.
     """
-    return _Replay(model, run).accelerations(lambda drive: torch.stack(drive.start))
+    return Replay(model, run).acceleration()
 
 
 def model_velocity(model: GreyBox, run: Run) -> Array:
@@ -128,17 +127,7 @@ def model_velocity(model: GreyBox, run: Run) -> Array:
     Raises:
         InputError: the run lacks the commands that drive the model.
     """
-    replay = _Replay(model, run)
-
-    def mean(drive: Drive) -> torch.Tensor:
-        return torch.stack([part[0] for part in drive.mean])
-
-    def mean_before(drive: Drive) -> torch.Tensor:
-        held = mean(drive)
-        return torch.cat([held[:1], held[:-1]])
-
-    begin, end = replay.accelerations(mean), replay.accelerations(mean_before)
-    return integrated(run.t, begin, end)
+    return Replay(model, run).velocity()
 
 
 def integrated(t: Array, begin: Array, end: Array | None = None) -> Array:
@@ -155,10 +144,19 @@ def integrated(t: Array, begin: Array, end: Array | None = None) -> Array:
     return np.where(np.isfinite(begin), total, np.nan)
 
 
-class _Replay:
-    """A run's measured states and inputs, for the model to say what acceleration it expects there."""
+class Replay:
+    """A run's measured states and inputs, for a model to say what acceleration it expects there.
+
+    Args:
+        model: the model; where its parameters change later, `update` before asking again.
+        run: measurements.
+
+    Raises:
+        InputError: the run lacks the commands that drive the model.
+    """
 
     def __init__(self, model: GreyBox, run: Run) -> None:
+        """Take what the model needs from the run."""
         command = run.thrusters if model.actuation == "thrusters" else run.wrench
         if command is None:
             raise InputError(
@@ -182,22 +180,53 @@ class _Replay:
             tensor(run.voltage),
             tensor(run.altitude),
         )
+        self.t = run.t
         self.times = torch.tensor(run.t)
         # A missing position or attitude must not make the rest of the row a missing number.
         eta = torch.tensor(np.where(np.isfinite(run.eta), run.eta, np.array([0, 0, 0, 1.0, 0, 0, 0])))
+        self.seen = Sensed(eta[:, :3], eta[:, 3:], torch.tensor(np.nan_to_num(run.nu)))
+        self._read_sensors()
+        self._drive()
+
+    def update(self, hooks: Collection[str] = ("sense", "command", "respond")) -> None:
+        """Work out again what depends on the model's parameters; what does not is kept.
+
+        Args:
+            hooks: of the effects whose parameters have changed.
+        """
+        if "sense" in hooks and self.model.using("sense"):
+            self._read_sensors()
+        if any(h in hooks and self.model.using(h) for h in ("command", "respond")):
+            self._drive()
+
+    def _read_sensors(self) -> None:
         with torch.no_grad():
-            self.state = model.unsense(Sensed(eta[:, :3], eta[:, 3:], torch.tensor(np.nan_to_num(run.nu))))
-            self.drive = model.actuators.drive(
+            self.state = self.model.unsense(self.seen)
+        self.rotation = quat_to_matrix(self.state.quaternion)
+
+    def _drive(self) -> None:
+        model = self.model
+        with torch.no_grad():
+            drive = model.actuators.drive(
                 self.inputs.command, self.times, model.using("command") + model.using("respond")
             )
+        self.start = torch.stack(drive.start)
+        self.mean = torch.stack([part[0] for part in drive.mean])
 
-    def accelerations(self, thrust: Callable[[Drive], torch.Tensor]) -> Array:
+    def acceleration(self) -> Array:
+        """Return the acceleration just after each row's command has begun to act, (N, 6)."""
+        return self._accelerations(self.start)
+
+    def velocity(self) -> Array:
+        """Return what the accelerations add up to, (N, 6); see `model_velocity`."""
+        before = torch.cat([self.mean[:1], self.mean[:-1]])
+        return integrated(self.t, self._accelerations(self.mean), self._accelerations(before))
+
+    def _accelerations(self, thrust: torch.Tensor) -> Array:
         """Return what the sensors would report under a thrust, (N, 6); NaN where a sample is missing."""
         at = self.state
         with torch.no_grad():
-            rate = self.model.nu_dot(
-                at.position, quat_to_matrix(at.quaternion), at.nu, thrust(self.drive), self.inputs, self.times
-            )
+            rate = self.model.nu_dot(at.position, self.rotation, at.nu, thrust, self.inputs, self.times)
             seen = self.model.sense(Sensed(at.position, at.quaternion, at.nu, rate)).nu_dot
         assert seen is not None
         return np.where(np.expand_dims(self.good, 1), seen.numpy(), np.nan)

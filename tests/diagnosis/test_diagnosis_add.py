@@ -306,3 +306,22 @@ def test_baking_moves_factors_into_matrices_elements_and_inertia():
     for changed, old in zip(baked.vehicle.damping_elements, vehicle.damping_elements, strict=True):
         np.testing.assert_allclose(changed.linear / old.linear, [1, 1.3, 1, 1, 1, 0.7])
     assert layout().nuisance == GROUPS
+
+
+def test_one_step_errors_find_the_current_too_and_say_what_runs_left_out_make_of_it(model, logs):
+    log, test, _ = logs
+    better = add(model, log, "ocean_current", test=test, objective="one_step", derivative={"half_width": 3})
+    found = better.parameters["ocean_current"]
+    assert all(abs(found[n]["value"] - v) < 0.03 for n, v in CURRENT.items())
+    assert better.accepted and better.left_out["gain"] > 3 * better.left_out["std"] > 0
+    assert better.left_out["before"] - better.left_out["after"] == pytest.approx(better.left_out["gain"])
+    assert better.to_dict()["objective"] == "one_step"
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [({"objective": "two_step"}, "objective"), ({"objective": "one_step", "window": 2.0}, "window= belongs")],
+)
+def test_objectives_that_do_not_exist_or_do_not_fit_are_refused(model, logs, options, words):
+    with pytest.raises(ConfigError, match=words):
+        add(model, logs[0], "ocean_current", test=logs[1], **options)

@@ -242,3 +242,35 @@ def test_depth_alone_is_a_position(tmp_path: Path) -> None:
     assert "x" not in run.channels
     assert len(run.segments()) == 1
     assert any("only z" in r.what for r in log.repairs)
+
+
+def test_a_delay_puts_late_columns_back_to_their_time(tmp_path: Path) -> None:
+    """u logged 0.25 s late, between two rows: it comes back as it was, but for the last rows."""
+    t = 0.1 * np.arange(200)
+    table = TABLE.with_columns(pl.Series("t", t), pl.Series("u", 0.05 * (t - 0.25)), pl.Series("v", np.sin(t)))
+    log = read(tmp_path, table, {"columns": {"u": {"delay": 0.25}, "v": {"delay": -0.1}}})
+    u, v = log.runs[0].nu[:, 0], log.runs[0].nu[:, 1]
+    np.testing.assert_allclose(u[:197], 0.05 * t[:197], atol=1e-12)
+    assert np.isnan(u[197:]).all() and np.isnan(v[0])
+    np.testing.assert_allclose(v[1:], np.sin(t[:-1]), atol=1e-12)
+    assert any("put back by their delay: u 0.25 s, v -0.1 s" in r.what for r in log.repairs)
+
+
+def test_a_delay_invents_nothing_across_gaps_and_holes(tmp_path: Path) -> None:
+    t = 0.1 * np.arange(200)
+    t[100:] += 3.0
+    u = 0.01 * np.arange(200.0)
+    u[50] = np.nan
+    table = TABLE.with_columns(pl.Series("t", t), pl.Series("u", u))
+    found = read(tmp_path, table, {"columns": {"u": {"delay": 0.05}}}).runs[0].nu[:, 0]
+    assert np.flatnonzero(np.isnan(found)).tolist() == [49, 50, 99, 199]
+    np.testing.assert_allclose(found[:49], u[:49] + 0.005)
+
+
+@pytest.mark.parametrize(
+    ("column", "words"),
+    [({"qx": {"delay": 0.1}}, "take no delay"), ({"u": {"delay": 200}}, "seconds"), ({"t": {"delay": 0.1}}, "no delay")],
+)
+def test_delays_that_make_no_sense_are_refused(tmp_path: Path, column: dict, words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        read(tmp_path, TABLE, {"columns": column})

@@ -1,0 +1,68 @@
+"""Thrust that is larger at first and falls back to its settled value as the flow develops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from auvnn.effects.base import Effect, Parameter
+from auvnn.effects.thruster_gain import actuators
+
+# Rows whose filter is worked out as one product of matrices.
+CHUNK = 128
+
+
+class ThrustOvershoot(Effect):
+    """A demand counts more while it is new: c <- c + excess (c - s), time_constant ds/dt = c - s.
+
+    A thruster that speeds up in water at rest gives more than later, when its own jet has set the water around
+    it (in a tank: all the water) in motion; after a change of demand the settled value is reached with the
+    time constant of that flow. An excess of -1 would be a plain lag. The excess acts on the command, before the
+    thruster curves; where the wrench is commanded, on the force itself. Within a row its mean is used.
+    Reference: Healey, Rock, Cody, Miles and Brown (1995), IEEE JOE 20(4).
+    """
+
+    name = "thrust_overshoot"
+    cause = "thrust is larger at first and falls back as the flow develops"
+    symbol = "kappa_T"
+    reference = "Healey, Rock, Cody, Miles and Brown (1995), IEEE JOE 20(4)"
+
+    @classmethod
+    def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
+        """Return the excess of each actuator, a share of the change of demand, and the time in which it fades."""
+        return (
+            Parameter("time_constant", "s", 1.0, 0.5, 0.05, 30.0),
+            *(Parameter(n, "1", 0.0, 0.5, -1.0, 20.0, probes=(0.5,)) for n in actuators(vehicle, actuation)),
+        )
+
+    def command(self, command: Tensor, times: Tensor) -> Tensor:
+        """Add the excess; the flow is taken as settled at the first row."""
+        tau, excess = self.theta[0].to(command), self.theta[1:].to(command)
+        steps = (times[..., 1:] - times[..., :-1]).unsqueeze(-1)
+        # The last row has no length of its own: as long as the one before, as if the record went on.
+        last = steps[..., -1:, :] if steps.shape[-2] else torch.zeros_like(times[..., :1].unsqueeze(-1))
+        steps = torch.cat([steps, last], dim=-2)
+        ratio = steps / tau
+        # Share of the gap that is left on average over the row; one for a row without length.
+        mean = torch.where(ratio > 1e-6, -torch.expm1(-ratio) / torch.clamp(ratio, min=1e-6), 1 - ratio / 2)
+        return command + excess * (command - self._flow(command, times, tau)) * mean
+
+    def _flow(self, command: Tensor, times: Tensor, tau: Tensor) -> Tensor:
+        """Return s at the start of every row: first-order filtering of the held commands, exact, (..., T, n)."""
+        rows, parts, state, begin = command.shape[-2], [], command[..., 0, :], 0
+        while begin < rows:
+            end = min(begin + CHUNK, rows)
+            # One row more than is kept: the state with which the next chunk begins.
+            last = min(end + 1, rows)
+            t, c = times[..., begin:last], command[..., begin:last, :]
+            # s_i = s_0 exp(-(t_i - t_0)/tau) + sum_{j<i} c_j [exp(-(t_i - t_{j+1})/tau) - exp(-(t_i - t_j)/tau)]
+            gap = torch.clamp(t.unsqueeze(-1) - t.unsqueeze(-2), min=0.0)
+            left = torch.tril(torch.exp(-gap / tau))
+            weight = torch.tril(left[..., 1:] - left[..., :-1], -1)
+            flow = left[..., :1] * state.unsqueeze(-2) + weight @ c[..., :-1, :]
+            parts.append(flow[..., : end - begin, :])
+            state = flow[..., -1, :]
+            begin = end
+        return torch.cat(parts, dim=-2)
