@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,11 @@ def load(source: str | Path, actuation: str | None = None) -> GreyBox:
         raise ModelError(
             f"{path} holds no {MODEL}: give a saved model's folder, a YAML file or a built-in name"
         )
+    return from_contents(files, path, actuation)
+
+
+def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None = None) -> GreyBox:
+    """Return the model that the files of a folder describe; see `contents`."""
     # Parsed from the bytes whose hash was checked, not from the file, which may have changed since.
     data: dict[str, Any] = parse_yaml(files[MODEL].decode("utf-8"), str(path / MODEL))
     networks = data.pop(SUBNETWORKS, None)
@@ -94,6 +100,13 @@ def save(model: GreyBox, folder: str | Path, *, overwrite: bool = False) -> Path
     Raises:
         InputError: the folder exists, is not empty and `overwrite` is not set.
     """
+    path = Path(folder)
+    write_folder(path, contents(model, path), overwrite=overwrite)
+    return path
+
+
+def contents(model: GreyBox, path: Path) -> dict[str, bytes | str]:
+    """Return the files that describe a model, by name, as they are written into the folder `path`."""
     from auvnn.models.structures.base import Structure
 
     data = model.vehicle.to_dict()
@@ -108,10 +121,8 @@ def save(model: GreyBox, folder: str | Path, *, overwrite: bool = False) -> Path
         data[SUBNETWORKS] = model.damping.describe()
         # Always in double precision, which holds single precision exactly: a folder has one form.
         files[WEIGHTS] = tensors_to_bytes({k: v.double() for k, v in model.damping.state_dict().items()})
-    files[MODEL] = dump_yaml(data, str(folder))
-    path = Path(folder)
-    write_folder(path, files, overwrite=overwrite)
-    return path
+    files[MODEL] = dump_yaml(data, str(path))
+    return files
 
 
 def remove(model: GreyBox, effects: str | list[str]) -> GreyBox:

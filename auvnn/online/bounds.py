@@ -1,0 +1,123 @@
+"""The set that the weights may not leave, and how fast the damping may change."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import torch
+from torch import Tensor
+
+from auvnn.models import GreyBox, Inputs
+from auvnn.models.grey_box import DRAG_TERMS
+from auvnn.online.guards import Guards
+from auvnn.online.weights import Weights
+
+VISITED = 32
+# New velocities are remembered when they lie this far from those that are, in the velocity scale.
+APART = 0.2
+HALVINGS = 6
+
+
+class Bounds:
+    """Shortens a proposed step until its end is admissible.
+
+    Admissible are weights (a) within `bound` row sizes of where they began, (b) whose damping, at the velocities
+    visited, stays below `output_bound` force scales, and (c) with which the whole drag takes no energy less
+    than before where it took none (nu . d >= 0 at the velocities visited); (d) at the present velocity the
+    damping moves by no more than `rate` dt. (a) is a projection; for (b), (c) and (d) the step is shortened.
+
+    Args:
+        weights: the adapted ones.
+        guards: the numbers.
+    """
+
+    def __init__(self, weights: Weights, guards: Guards) -> None:
+        """Keep where the weights began."""
+        self.guards = guards
+        self.start = weights.read()
+        size = self.start.square().sum(1, keepdim=True) / weights.used.sum(1, keepdim=True).clamp_min(1)
+        self.reach = guards.bound * (1.0 + size.sqrt())
+        self.visited = torch.zeros(0, 6, dtype=self.start.dtype)
+        self.known = torch.zeros(0, dtype=self.start.dtype)
+        self._next = 0
+
+    def visit(self, model: GreyBox, nu: Tensor) -> None:
+        """Remember a velocity (6,) if it is a new one; the oldest gives way."""
+        assert model.damping is not None
+        scaled = (self.visited - nu) / model.damping.input_scale
+        if len(scaled) and float(scaled.square().sum(1).min()) < APART**2:
+            return
+        known = known_drag_power(model, nu)[None]
+        if len(self.visited) < VISITED:
+            self.visited, self.known = torch.cat([self.visited, nu[None]]), torch.cat([self.known, known])
+            return
+        self.visited, self.known = self.visited.clone(), self.known.clone()
+        self.visited[self._next], self.known[self._next] = nu, known[0]
+        self._next = (self._next + 1) % VISITED
+
+    def power(self, weights: Weights, rows: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the power that all drag takes (V,), W, and the largest scaled output (V,)."""
+        scaled = weights.value(rows)
+        return known + (rows * scaled * weights.bank.output_scale).sum(-1), scaled.abs().amax(-1)
+
+    def admit(self, weights: Weights, proposed: Tensor, nu: Tensor, dt: float) -> tuple[bool, bool]:
+        """Set the proposed weights as far as they are admissible.
+
+        Returns:
+            Whether any step was taken, and whether it was shortened.
+        """
+        before = weights.read()
+        if not bool(torch.isfinite(proposed).all()):
+            return False, True
+        wanted = torch.minimum(torch.maximum(proposed, self.start - self.reach), self.start + self.reach)
+        shortened = bool((wanted != proposed).any())
+        rows, known = torch.cat([self.visited, nu[None]]), torch.cat([self.known, self.known.new_zeros(1)])
+        old, largest_before = self.power(weights, rows, known)
+        here = weights.value(nu)
+        most = torch.clamp(largest_before, min=self.guards.output_bound)
+        least = torch.clamp(old, max=0.0) - 1e-9 * (1.0 + old.abs())
+        step, share = wanted - before, 1.0
+        # The velocity here has no known power of its own yet unless it was visited: leave it to the list.
+        judged = slice(0, len(self.visited)) if self.guards.dissipative else slice(0, 0)
+        for _ in range(HALVINGS):
+            weights.write(before + share * step)
+            moved = float((weights.value(nu) - here).abs().max())
+            power, largest = self.power(weights, rows, known)
+            if moved > self.guards.rate * dt:
+                share, shortened = share * max(self.guards.rate * dt / moved, 0.1), True
+            elif bool((largest > most).any()) or bool((power[judged] < least[judged]).any()):
+                share, shortened = 0.5 * share, True
+            else:
+                return True, shortened
+        weights.write(before)
+        return False, True
+
+    def state(self) -> dict[str, Tensor]:
+        """Return what is remembered."""
+        return {
+            "start": self.start,
+            "visited": self.visited,
+            "known": self.known,
+            "next": torch.tensor(self._next),
+        }
+
+    def load(self, state: Mapping[str, Tensor], weights: Weights) -> None:
+        """Take up a state."""
+        self.start = state["start"].clone()
+        size = self.start.square().sum(1, keepdim=True) / weights.used.sum(1, keepdim=True).clamp_min(1)
+        self.reach = self.guards.bound * (1.0 + size.sqrt())
+        self.visited, self.known = state["visited"].clone(), state["known"].clone()
+        self._next = int(state["next"])
+
+
+def known_drag_power(model: GreyBox, nu: Tensor) -> Tensor:
+    """Return the power that the drag outside the subnetworks takes at a velocity through still water, W."""
+    rest = torch.zeros(3, dtype=nu.dtype)
+    command = torch.zeros(model.actuators.size, dtype=nu.dtype)
+    with torch.no_grad():
+        terms = model.wrenches(
+            rest, torch.eye(3, dtype=nu.dtype), nu, model.actuators.static(command), Inputs(command),
+            torch.zeros((), dtype=nu.dtype),
+        )  # fmt: skip
+    known = [terms[n] for n in DRAG_TERMS if n in terms and n != "damping subnetworks"]
+    return -(nu * torch.stack(known).sum(0)).sum() if known else torch.zeros((), dtype=nu.dtype)

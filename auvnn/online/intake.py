@@ -1,0 +1,85 @@
+"""What comes in: numbers into tensors, and the samples that must not be used, by reason."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from auvnn.errors import ConfigError
+from auvnn.models import GreyBox
+from auvnn.online.guards import Guards
+from auvnn.online.residual import Sample
+
+
+def tensor(value: Any, name: str, sizes: tuple[int, ...]) -> Tensor:
+    """Return numbers as a double vector of one of the sizes; 0 stands for a scalar.
+
+    Raises:
+        ConfigError: they are no numbers, or of another size.
+    """
+    try:
+        if isinstance(value, Tensor):
+            found = value.detach().to("cpu", torch.float64).clone()
+        else:
+            found = torch.tensor(np.array(value, dtype=np.float64))
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise ConfigError(f"adapter: {name} is no vector of numbers ({error})") from error
+    shape = tuple(found.shape)
+    if shape not in [(size,) if size else () for size in sizes]:
+        wanted = " or ".join("a number" if size == 0 else str(size) for size in sizes)
+        raise ConfigError(f"adapter: {name} has shape {shape}: give {wanted}")
+    return found
+
+
+def sample_of(
+    model: GreyBox,
+    t: float,
+    eta: Any,
+    nu: Any,
+    command: Any,
+    nu_dot: Any = None,
+    fins: Any = None,
+    voltage: Any = None,
+    altitude: Any = None,
+) -> Sample | None:
+    """Return a sample, or None where a number is missing or not finite.
+
+    Raises:
+        ConfigError: a vector has the wrong size.
+    """
+    state = (
+        tensor(eta, "eta", (7, 6)),
+        tensor(nu, "nu", (6,)),
+        tensor(command, "command", (model.actuators.size,)),
+    )
+    others: dict[str, Tensor | None] = {
+        "nu_dot": None if nu_dot is None else tensor(nu_dot, "nu_dot", (6,)),
+        "fins": None if fins is None else tensor(fins, "fins", (len(model.vehicle.fins),)),
+        "voltage": None if voltage is None else tensor(voltage, "voltage", (0,)),
+        "altitude": None if altitude is None else tensor(altitude, "altitude", (0,)),
+    }
+    time = tensor(t, "t", (0,))
+    given = [time, *state, *(v for v in others.values() if v is not None)]
+    if not all(bool(torch.isfinite(v).all()) for v in given):
+        return None
+    return Sample.of(float(time), *state, **others)
+
+
+def refusal(sample: Sample, last: Sample | None, guards: Guards, now: float | None) -> str | None:
+    """Return why a sample is not used at all, or None."""
+    if now is not None and guards.max_age is not None and now - sample.t > guards.max_age:
+        return "stale"
+    if last is None:
+        return None
+    if sample.t == last.t:
+        return "repeated"
+    if sample.t < last.t:
+        return "out_of_order"
+    if guards.off:
+        return None
+    # Measured velocities of a vehicle that moves are never twice the same to the last bit.
+    same = bool((sample.nu == last.nu).all()) and bool((sample.eta == last.eta).all())
+    return "repeated" if same and bool((sample.nu != 0).any()) else None

@@ -1,0 +1,137 @@
+"""An adapter on disk: whole or absent, without pickle, so that a restart goes on bit for bit.
+
+One folder holds the model's description, every tensor (safetensors) and the plain rest (JSON), with the SHA-256 of
+each. It is staged beside its place and moved there in one step: a loss of power leaves the old state or the new
+one, never half of an update.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections import deque
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import torch
+from torch import Tensor
+
+from auvnn.errors import ModelError
+from auvnn.models.saving import MODEL, contents, from_contents
+from auvnn.online.guards import Guards
+from auvnn.online.residual import Sample
+from auvnn.storage import read_folder, tensors_from_bytes, tensors_to_bytes, write_folder
+
+if TYPE_CHECKING:
+    from auvnn.online.adapter import Adapter
+
+SCHEMA = "auvnn/adapter/1"
+PLAIN, TENSORS = "adapter.json", "adapter.safetensors"
+_VECTORS = ("eta", "nu", "command", "nu_dot", "fins", "voltage", "altitude")
+
+
+def save(adapter: Adapter, folder: str | Path) -> Path:
+    """Write an adapter's state into a folder, replacing a former state there in one step."""
+    path = Path(folder)
+    files = contents(adapter._model, path)
+    files[TENSORS] = tensors_to_bytes(_tensors(adapter), finite=False)
+    files[PLAIN] = json.dumps(_plain(adapter), indent=1, sort_keys=True)
+    return write_folder(path, files, overwrite=True, schema=SCHEMA)
+
+
+def restore(folder: str | Path, *, validated: bool = False) -> Adapter:
+    """Return the adapter that `save` wrote.
+
+    Args:
+        folder: where it is.
+        validated: begin from the last validated weights, which drops updates that were still being judged.
+
+    Raises:
+        InputError: there is no such folder.
+        ModelError: it is damaged, incomplete, or of another kind.
+    """
+    from auvnn.online.adapter import Adapter, Counts
+
+    path = Path(folder)
+    files = read_folder(path, schema=SCHEMA)
+    missing = [name for name in (PLAIN, TENSORS, MODEL) if name not in files]
+    if missing:
+        raise ModelError(f"{path}: {', '.join(missing)} is missing: this is no adapter's state")
+    tensors = {
+        k: v.clone() for k, v in tensors_from_bytes(files[TENSORS], where=TENSORS, finite=False).items()
+    }
+    try:
+        plain = json.loads(files[PLAIN])
+        adapter = Adapter(from_contents(files, path), plain["scheme"], guards=Guards(**plain["guards"]))
+        adapter._original.bank.load_state_dict(_part(tensors, "original"))
+        adapter.scheme.load(_part(tensors, "scheme"))
+        adapter._shadow.load(_part(tensors, "shadow"))
+        adapter._noise.load(_part(tensors, "noise"))
+        adapter._bounds.load(_part(tensors, "bounds"), adapter.weights)
+        adapter._gate.load(plain["gate"])
+        adapter.counts = Counts(**plain["counts"])
+        adapter.paused, adapter.added = plain["paused"], plain["added"]
+        adapter._debt, adapter._resting = plain["debt"], plain["resting"]
+        off = plain["off_until"]
+        adapter._off_until = -float("inf") if off is None else off
+        predictor = adapter._predictor
+        samples = [_sample(tensors, f"history.{k}") for k in range(plain["history"])]
+        predictor.history = deque(samples, maxlen=predictor.history.maxlen)
+        predictor._last = _sample(tensors, "last") if plain["last"] else None
+    except (KeyError, TypeError, RuntimeError) as error:
+        raise ModelError(f"{path}: not a complete adapter's state ({error}): begin a new one") from error
+    if validated:
+        adapter.weights.write(adapter._shadow.valid)
+        adapter.scheme.load(adapter._shadow.scheme_state)
+        adapter._shadow.close()
+    return adapter
+
+
+def _plain(adapter: Adapter) -> dict[str, Any]:
+    off = adapter._off_until
+    return {
+        "scheme": {"scheme": adapter.scheme.name, **adapter.scheme.options()},
+        "guards": adapter.guards.to_dict(),
+        "counts": asdict(adapter.counts),
+        "gate": adapter._gate.state(),
+        "paused": adapter.paused,
+        "added": adapter.added,
+        "debt": adapter._debt,
+        "resting": adapter._resting,
+        "off_until": None if off == -float("inf") else off,
+        "history": len(adapter._predictor.history),
+        "last": adapter._predictor.last is not None,
+    }
+
+
+def _tensors(adapter: Adapter) -> dict[str, Tensor]:
+    parts: dict[str, dict[str, Tensor]] = {
+        "original": copy.deepcopy(adapter._original.bank).state_dict(),
+        "scheme": adapter.scheme.state(),
+        "shadow": adapter._shadow.state(),
+        "noise": adapter._noise.state(),
+        "bounds": adapter._bounds.state(),
+    }
+    found = {f"{part}/{name}": v for part, tensors in parts.items() for name, v in tensors.items()}
+    for k, sample in enumerate(adapter._predictor.history):
+        found |= _of(sample, f"history.{k}")
+    if adapter._predictor.last is not None:
+        found |= _of(adapter._predictor.last, "last")
+    return found
+
+
+def _part(tensors: dict[str, Tensor], part: str) -> dict[str, Tensor]:
+    prefix = f"{part}/"
+    return {name[len(prefix) :]: v for name, v in tensors.items() if name.startswith(prefix)}
+
+
+def _of(sample: Sample, where: str) -> dict[str, Tensor]:
+    vectors = {n: getattr(sample, n) for n in _VECTORS}
+    given = {f"{where}/{n}": v for n, v in vectors.items() if v is not None}
+    return {f"{where}/t": torch.tensor(sample.t, dtype=torch.float64), **given}
+
+
+def _sample(tensors: dict[str, Tensor], where: str) -> Sample:
+    own = _part(tensors, where)
+    return Sample(float(own.pop("t")), **own)
