@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import io
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from auvnn.answers import Answer, plain
+import numpy as np
+
+from auvnn.answers import Answer, plain, write_text
 from auvnn.models import GreyBox
 
 
@@ -52,3 +57,23 @@ class Study(Answer):
                 "warnings": self.warnings,
             }
         )
+
+    def write(self, folder: str | Path, *, report: bool = True) -> Path:
+        """Write `study.json`, the report with its figures, and beside each figure of curves its numbers as CSV."""
+        path = super().write(folder, report=report)
+        for drawn in self.drawn if report else ():
+            if drawn["kind"] == "velocity":
+                write_text(Path(folder) / "figures" / f"{drawn['name']}.csv", _csv(drawn))
+        return path
+
+
+def _csv(drawn: Mapping[str, Any]) -> str:
+    """Return the velocities of a figure: t, then the six components of each line."""
+    names, columns = ["t"], [np.asarray(drawn["t"])[:, None]]
+    for line, values in drawn["lines"].items():
+        word = "_".join("".join(c if c.isalnum() else " " for c in line).split())
+        names += [f"{word}_{axis}" for axis in "uvwpqr"]
+        columns.append(np.asarray(values))
+    stream = io.StringIO()
+    np.savetxt(stream, np.concatenate(columns, axis=1), fmt="%.7g", delimiter=",", header=",".join(names), comments="")
+    return stream.getvalue()

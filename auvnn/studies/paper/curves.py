@@ -33,5 +33,5 @@ def damping_curves_of(model: GreyBox, plant: GreyBox, log: Log, points: int = 12
         states = torch.zeros(points, 6, dtype=torch.float64)
         states[:, k] = torch.tensor(grid)
         learned, truth = (drag(m, states).numpy()[:, k] for m in (model, plant))
-        out.append({"nu": grid, "learned": learned, "nominal": truth, "low": low, "high": high})
+        out.append({"nu": grid, "learned": learned, "nominal": truth, "covered": (low, high)})
     return out
