@@ -21,6 +21,7 @@ DRAWERS = Catalogue(
         "comparison": "auvnn.report.pages.comparison:PAGE",
         "diagnosis": "auvnn.report.pages.diagnosis:PAGE",
         "improvement": "auvnn.report.pages.improvement:PAGE",
+        "adaptation": "auvnn.report.pages.adaptation:PAGE",
         "training": "auvnn.report.pages.training:PAGE",
         "demo": "auvnn.report.pages.demo:PAGE",
         "benchmark": "auvnn.report.pages.benchmark:PAGE",

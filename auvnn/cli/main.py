@@ -24,6 +24,7 @@ VERBS = Catalogue(
         "diagnose": "auvnn.cli.diagnose:VERB",
         "add": "auvnn.cli.add:VERB",
         "remove": "auvnn.cli.remove:VERB",
+        "adapt": "auvnn.cli.adapt:VERB",
         "demo": "auvnn.cli.demo:VERB",
         "study": "auvnn.cli.study:VERB",
         "benchmark": "auvnn.cli.benchmark:VERB",

@@ -2,8 +2,20 @@
 
 from __future__ import annotations
 
+from auvnn.online.adapt import Adaptation, adapt
 from auvnn.online.adapter import Adapter, Counts, Update
+from auvnn.online.change import Change
 from auvnn.online.frozen import FrozenErrors, frozen_errors
 from auvnn.online.guards import Guards
 
-__all__ = ["Adapter", "Counts", "FrozenErrors", "Guards", "Update", "frozen_errors"]
+__all__ = [
+    "Adaptation",
+    "Adapter",
+    "Change",
+    "Counts",
+    "FrozenErrors",
+    "Guards",
+    "Update",
+    "adapt",
+    "frozen_errors",
+]

@@ -16,6 +16,8 @@ from auvnn.damping.bank import DampingBank, Description
 from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
 from auvnn.online.bounds import Bounds
+from auvnn.online.change import Change, Monitor
+from auvnn.online.consistency import Consistency
 from auvnn.online.guards import REASONS, Guards, build_guards
 from auvnn.online.intake import refusal, sample_of
 from auvnn.online.noise import Gate, NoiseLevel
@@ -27,6 +29,7 @@ from auvnn.online.weights import Weights
 # Scales of subnetworks that an adapter adds itself: of velocity, and of acceleration for the force.
 SPEED = 0.3
 ACCELERATION = 0.3
+MOST_HELD = 64
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,7 @@ class Adapter:
         scheme: `rls`, `sgd`, `replay`, or a mapping of its options with `scheme`.
         guards: "full", "none" (weights follow every sample, as in the paper), or numbers by name.
         damping: form of the subnetworks for a model that has none.
+        watch: say what kind of change was seen (`changes`); costs about as much as the adaptation itself.
         clock: seconds, for the budget; another one for tests.
 
     Attributes:
@@ -103,6 +107,7 @@ class Adapter:
         *,
         guards: Guards | str | Mapping[str, Any] | None = "full",
         damping: Description = "polynomial",
+        watch: bool = True,
         clock: Callable[[], float] = clocks.perf_counter,
     ) -> None:
         """Copy the model and begin."""
@@ -126,9 +131,23 @@ class Adapter:
         self._shadow = Shadow(self.weights, self.guards.judge, self.guards.worse)
         self._shadow.close(scheme_state=self.scheme.state())
         self._bounds = Bounds(self.weights, self.guards)
+        self._consistency = Consistency()
+        self._monitor = Monitor(self._unadapted(), bank.output_scale) if watch else None
+        self._held: list[tuple[Sample, Tensor, Tensor]] = []
         self._off_until = -float("inf")
+        self._off_cause = "fault_flagged"
         self._debt = 0.0
         self._resting = 0
+
+    def _unadapted(self) -> GreyBox:
+        """Return the model with the subnetworks that the adapter began with."""
+        own = self._model
+        return GreyBox(own.vehicle, own.copied_effects(), copy.deepcopy(self._original.bank), own.actuation)
+
+    @property
+    def changes(self) -> list[Change]:
+        """The changes of the vehicle that were seen, oldest first; the last one may still be revised."""
+        return [] if self._monitor is None else list(self._monitor.changes)
 
     @property
     def model(self) -> GreyBox:
@@ -162,6 +181,21 @@ class Adapter:
         found = GreyBox(model.vehicle, model.copied_effects(), self._model.damping, model.actuation)
         self._model = found
         self._predictor.use(found)
+        self._consistency.forget()
+        if self._monitor is not None:
+            self._monitor.use(self._unadapted())
+
+    def new_run(self) -> None:
+        """Begin another run, whose time may start again: nothing is compared across the gap; weights stay."""
+        self._predictor.forget_all()
+        self._consistency.forget()
+        self._gate.clear()
+        self._held, self._resting, self._off_until = [], 0, -float("inf")
+        if self._shadow.since is not None:
+            # What was being judged is kept only if the next run confirms it, on that run's clock.
+            self._shadow.restart()
+        if self._monitor is not None:
+            self._monitor.new_run()
 
     def step(
         self,
@@ -222,7 +256,9 @@ class Adapter:
             last = None
         dt = 0.0 if last is None else sample.t - last.t
         if fault:
-            self._off_until = sample.t + self.guards.hold
+            self._off_until, self._off_cause = sample.t + self.guards.hold, "fault_flagged"
+        elif self.guards.enabled and self._consistency.faulty(last, sample):
+            self._off_until, self._off_cause = sample.t + self.guards.hold, "inconsistent"
         if self._passed_over(sample):
             self._predictor.skip(sample)
             return self._no(sample.t, "at_rest")
@@ -236,7 +272,7 @@ class Adapter:
 
     def _passed_over(self, sample: Sample) -> bool:
         """Whether this is one of the many samples at rest that are not looked at."""
-        if self.guards.off or not self._rests(sample.nu):
+        if not self.guards.enabled or not self._rests(sample.nu):
             self._resting = 0
             return False
         self._resting += 1
@@ -259,24 +295,39 @@ class Adapter:
             "prediction_error": found.acceleration,
             "unadapted_error": torch.linalg.solve(inertia, -original * bank.output_scale),
         }
+        missing = -original * bank.output_scale
         std = self._noise.std()
         lesson = Lesson(sample.t, dt, found.nu, target, error, slope, torch.tensor(std) ** 2)
-        if guards.off:
-            return self._set(self.scheme.propose(self.weights, lesson), lesson, found, told)
+        if not guards.enabled:
+            self._watch(found, missing)
+            proposed = self.scheme.propose(self.weights, lesson)
+            if proposed is None:
+                return self._no(sample.t, "no_news", **told)
+            return self._set(proposed, lesson, found, told)
         if self.paused:
             return self._no(sample.t, "paused", **told)
         if sample.t < self._off_until:
             self._gate.clear()
-            return self._no(sample.t, "fault_flagged", **told)
+            self._held.clear()
+            return self._no(sample.t, self._off_cause, **told)
         if self._rests(found.nu):
+            self._watch(found, missing)
             return self._no(sample.t, "at_rest", **told)
         if self._noise.count < guards.settle:
             self._noise.add(error)
+            self._watch(found, missing)
             return self._no(sample.t, "noise_unknown", **told)
         held, believed = self._gate.holds(sample.t, error, std)
         if held:
+            # The monitor sees them only if they turn out to be true.
+            self._held = [*self._held[-MOST_HELD:], (found.sample, found.nu, missing)]
             return self._no(sample.t, "gated", **told)
         self._noise.add(error)
+        held_back, self._held = self._held, []
+        if believed and self._monitor is not None:
+            for row in held_back:
+                self._monitor.add(*row)
+        self._watch(found, missing)
         if believed:
             self.counts.believed += 1
             self.scheme.changed()
@@ -292,6 +343,10 @@ class Adapter:
             return self._no(sample.t, "no_news", **told)
         return self._set(proposed, lesson, found, told)
 
+    def _watch(self, found: Residual, missing: Tensor) -> None:
+        if self._monitor is not None:
+            self._monitor.add(found.sample, found.nu, missing)
+
     def _judge(self, lesson: Lesson) -> tuple[bool, bool]:
         old = self._shadow.error(lesson.target, lesson.nu)
         verdict = self._shadow.verdict(lesson.t, lesson.error, old, lesson.variance)
@@ -305,26 +360,23 @@ class Adapter:
             self.counts.validated += 1
         return verdict == "worse", verdict == "valid"
 
-    def _set(self, proposed: Tensor | None, lesson: Lesson, found: Residual, told: dict[str, Any]) -> Update:
+    def _set(self, proposed: Tensor, lesson: Lesson, found: Residual, told: dict[str, Any]) -> Update:
         before = self.weights.read()
-        if self.guards.off:
-            assert proposed is not None
-            sound = bool(torch.isfinite(proposed).all())
-            if sound:
-                self.weights.write(proposed)
-        else:
-            assert proposed is not None
-            sound, shortened = self._bounds.admit(self.weights, proposed, lesson.nu, lesson.dt)
+        moved: Tensor | None = None
+        if self.guards.enabled:
+            moved, shortened = self._bounds.admit(self.weights, proposed, lesson.nu, lesson.dt)
             self.counts.shortened += int(shortened)
-        if not sound:
+            if moved is not None:
+                self._shadow.open(lesson.t)
+        elif bool(torch.isfinite(proposed).all()):
+            self.weights.write(proposed)
+            moved = self.weights.value(lesson.nu) - (lesson.target - lesson.error)
+        if moved is None:
             return self._no(lesson.t, "limited", **told)
-        if not self.guards.off:
-            self._shadow.open(lesson.t)
-        now = self.weights.read()
-        moved = self.weights.value(lesson.nu) - (lesson.target - lesson.error)
         return Update(
             lesson.t, True, "learned from this sample", "adapted", **told,
-            change=float((now - before).norm()), force_change=moved * self.weights.bank.output_scale,
+            change=float((self.weights.read() - before).norm()),
+            force_change=moved * self.weights.bank.output_scale,
         )  # fmt: skip
 
     def _no(self, t: float, cause: str, **told: Any) -> Update:

@@ -55,42 +55,42 @@ class Bounds:
         self.visited[self._next], self.known[self._next] = nu, known[0]
         self._next = (self._next + 1) % VISITED
 
-    def power(self, weights: Weights, rows: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the power that all drag takes (V,), W, and the largest scaled output (V,)."""
-        scaled = weights.value(rows)
-        return known + (rows * scaled * weights.bank.output_scale).sum(-1), scaled.abs().amax(-1)
-
-    def admit(self, weights: Weights, proposed: Tensor, nu: Tensor, dt: float) -> tuple[bool, bool]:
+    def admit(self, weights: Weights, proposed: Tensor, nu: Tensor, dt: float) -> tuple[Tensor | None, bool]:
         """Set the proposed weights as far as they are admissible.
 
         Returns:
-            Whether any step was taken, and whether it was shortened.
+            The change of the scaled damping at `nu` (6,), or None where no step was taken; and whether the step
+            was shortened.
         """
         before = weights.read()
         if not bool(torch.isfinite(proposed).all()):
-            return False, True
+            return None, True
         wanted = torch.minimum(torch.maximum(proposed, self.start - self.reach), self.start + self.reach)
         shortened = bool((wanted != proposed).any())
-        rows, known = torch.cat([self.visited, nu[None]]), torch.cat([self.known, self.known.new_zeros(1)])
-        old, largest_before = self.power(weights, rows, known)
-        here = weights.value(nu)
-        most = torch.clamp(largest_before, min=self.guards.output_bound)
-        least = torch.clamp(old, max=0.0) - 1e-9 * (1.0 + old.abs())
-        step, share = wanted - before, 1.0
-        # The velocity here has no known power of its own yet unless it was visited: leave it to the list.
-        judged = slice(0, len(self.visited)) if self.guards.dissipative else slice(0, 0)
+        rows = torch.cat([self.visited, nu[None]])
+        old = weights.value(rows)
+        most = torch.clamp(old.abs().amax(-1), min=self.guards.output_bound)
+        least = self._power(weights, old).clamp(max=0.0)
+        least = least - 1e-9 * (1.0 + least.abs())
+        step, share, limit = wanted - before, 1.0, self.guards.rate * dt
         for _ in range(HALVINGS):
-            weights.write(before + share * step)
-            moved = float((weights.value(nu) - here).abs().max())
-            power, largest = self.power(weights, rows, known)
-            if moved > self.guards.rate * dt:
-                share, shortened = share * max(self.guards.rate * dt / moved, 0.1), True
-            elif bool((largest > most).any()) or bool((power[judged] < least[judged]).any()):
+            weights.write(before + share * step if share < 1.0 else wanted)
+            new = weights.value(rows)
+            moved = float((new[-1] - old[-1]).abs().max())
+            if moved > limit:
+                share, shortened = share * max(0.99 * limit / moved, 0.1), True
+            elif bool((new.abs().amax(-1) > most).any()) or (
+                self.guards.dissipative and bool((self._power(weights, new) < least).any())
+            ):
                 share, shortened = 0.5 * share, True
             else:
-                return True, shortened
+                return new[-1] - old[-1], shortened
         weights.write(before)
-        return False, True
+        return None, True
+
+    def _power(self, weights: Weights, scaled: Tensor) -> Tensor:
+        """Return the power that all drag takes at the velocities visited (V,), W."""
+        return self.known + (self.visited * scaled[:-1] * weights.bank.output_scale).sum(-1)
 
     def state(self) -> dict[str, Tensor]:
         """Return what is remembered."""

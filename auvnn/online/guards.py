@@ -50,6 +50,7 @@ class Guards:
         rate: change of the damping per second, in the force scale, where the vehicle is.
         dissipative: no update may make the drag add energy where the vehicle has been.
         budget: s of wall clock that a step may take, or None; what was overdrawn is paid back by skipping.
+        enabled: false leaves only what no adapter can do without: numbers, and time that goes forward.
     """
 
     max_gap: float = 0.5
@@ -69,7 +70,7 @@ class Guards:
     rate: float = 50.0
     dissipative: bool = True
     budget: float | None = None
-    off: bool = False
+    enabled: bool = True
 
     def __post_init__(self) -> None:
         """Check the numbers.
@@ -79,7 +80,7 @@ class Guards:
         """
         for item in fields(self):
             value = getattr(self, item.name)
-            if item.name in ("dissipative", "off"):
+            if item.name in ("dissipative", "enabled"):
                 good, wanted = isinstance(value, bool), "true or false"
             elif value is None and item.name in ("max_age", "budget"):
                 good, wanted = True, ""
@@ -94,7 +95,7 @@ class Guards:
     @classmethod
     def none(cls) -> Guards:
         """Return guards that are off: weights follow every finite new sample, as in the paper."""
-        return cls(off=True)
+        return cls(enabled=False)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the numbers as plain data."""

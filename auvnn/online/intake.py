@@ -78,7 +78,7 @@ def refusal(sample: Sample, last: Sample | None, guards: Guards, now: float | No
         return "repeated"
     if sample.t < last.t:
         return "out_of_order"
-    if guards.off:
+    if not guards.enabled:
         return None
     # Measured velocities of a vehicle that moves are never twice the same to the last bit.
     same = bool((sample.nu == last.nu).all()) and bool((sample.eta == last.eta).all())

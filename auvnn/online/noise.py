@@ -42,7 +42,8 @@ class NoiseLevel:
         """Return the standard deviation (6,), at least the floor."""
         if len(self._ring) < 3:
             return np.full(6, self.floor)
-        spread = np.median(np.abs(np.diff(self._ring, axis=0)), axis=0)
+        steps = np.sort(np.abs(np.diff(self._ring, axis=0)), axis=0)
+        spread = 0.5 * (steps[(len(steps) - 1) // 2] + steps[len(steps) // 2])
         return np.maximum(TO_STD * spread, self.floor)
 
     def forget(self) -> None:

@@ -18,6 +18,7 @@ from torch import Tensor
 
 from auvnn.effects import Moment
 from auvnn.models import GreyBox, Inputs
+from auvnn.models.grey_box import Prepared
 from auvnn.physics.attitude import quat_to_matrix
 from auvnn.physics.kinematics import eta6_to_eta7
 
@@ -99,7 +100,10 @@ class Predictor:
         self.model = model
         remembers = bool(model.using("respond") or model.using("command"))
         self.history = deque(self.history, maxlen=MEMORY if remembers else 2)
-        self._total = None if model.time_varying else model.prepare().total.detach()
+        self._prepared: Prepared | None = None
+        if not model.time_varying:
+            with torch.no_grad():
+                self._prepared = model.prepare()
 
     @property
     def last(self) -> Sample | None:
@@ -110,6 +114,11 @@ class Predictor:
         """Drop the history: the next sample starts afresh."""
         self.history.clear()
 
+    def forget_all(self) -> None:
+        """Drop the history and the last sample's time: another run begins."""
+        self.history.clear()
+        self._last = None
+
     def skip(self, sample: Sample) -> None:
         """Add a sample without comparing it with anything."""
         self.history.append(sample)
@@ -117,8 +126,8 @@ class Predictor:
 
     def inertia(self, sample: Sample) -> Tensor:
         """Return the inertia matrix, added mass included, (6, 6)."""
-        if self._total is not None:
-            return self._total
+        if self._prepared is not None:
+            return self._prepared.total
         rotation, time = quat_to_matrix(sample.eta[3:]), torch.tensor(sample.t, dtype=sample.nu.dtype)
         moment = Moment(
             time, sample.eta[:3], rotation, sample.nu, sample.nu, torch.zeros_like(sample.nu),
@@ -148,7 +157,7 @@ class Predictor:
         )
         return self.model.nu_dot(
             sample.eta[:3], quat_to_matrix(sample.eta[3:]), sample.nu, drive.start[-1], sample.inputs(),
-            times[-1],
+            times[-1], self._prepared,
         )  # fmt: skip
 
     def _increment(self, previous: Sample, sample: Sample) -> tuple[Tensor, Tensor, Sample]:

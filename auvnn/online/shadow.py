@@ -45,6 +45,8 @@ class Shadow:
         """Take in a sample; return "worse", "valid", or None while it is open."""
         if self.since is None:
             return None
+        if self.since == -float("inf"):
+            self.since = t
         new, before = error.square(), old.square()
         score = float(((new - before) / (new + before + variance)).mean())
         self._sums = self._sums + torch.tensor([1.0, score, score * score], dtype=torch.float64)
@@ -71,6 +73,11 @@ class Shadow:
             self._bank.write(weights)
         if scheme_state is not None:
             self.scheme_state = dict(scheme_state)
+
+    def restart(self) -> None:
+        """Judge from the next sample on, by a clock that may have started again."""
+        self.since = -float("inf")
+        self._sums = torch.zeros_like(self._sums)
 
     def state(self) -> dict[str, Tensor]:
         """Return the tensors that are remembered."""

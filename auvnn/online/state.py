@@ -19,6 +19,7 @@ from torch import Tensor
 
 from auvnn.errors import ModelError
 from auvnn.models.saving import MODEL, contents, from_contents
+from auvnn.online.change import Monitor
 from auvnn.online.guards import Guards
 from auvnn.online.residual import Sample
 from auvnn.storage import read_folder, tensors_from_bytes, tensors_to_bytes, write_folder
@@ -63,7 +64,10 @@ def restore(folder: str | Path, *, validated: bool = False) -> Adapter:
     }
     try:
         plain = json.loads(files[PLAIN])
-        adapter = Adapter(from_contents(files, path), plain["scheme"], guards=Guards(**plain["guards"]))
+        watched = plain["monitor"]
+        adapter = Adapter(
+            from_contents(files, path), plain["scheme"], guards=Guards(**plain["guards"]), watch=False
+        )
         adapter._original.bank.load_state_dict(_part(tensors, "original"))
         adapter.scheme.load(_part(tensors, "scheme"))
         adapter._shadow.load(_part(tensors, "shadow"))
@@ -78,6 +82,16 @@ def restore(folder: str | Path, *, validated: bool = False) -> Adapter:
         predictor = adapter._predictor
         samples = [_sample(tensors, f"history.{k}") for k in range(plain["history"])]
         predictor.history = deque(samples, maxlen=predictor.history.maxlen)
+        if watched is not None:
+            adapter._monitor = Monitor(adapter._unadapted(), adapter.weights.bank.output_scale)
+            filling = [_sample(tensors, f"pending.{k}") for k in range(watched["pending"])]
+            adapter._monitor.load(watched, _part(tensors, "monitor"), filling)
+        adapter._held = [
+            (_sample(tensors, f"held.{k}"), tensors[f"held.{k}.nu"], tensors[f"held.{k}.missing"])
+            for k in range(plain["held"])
+        ]
+        adapter._consistency.load(_part(tensors, "consistency"))
+        adapter._off_cause = plain["off_cause"]
         predictor._last = _sample(tensors, "last") if plain["last"] else None
     except (KeyError, TypeError, RuntimeError) as error:
         raise ModelError(f"{path}: not a complete adapter's state ({error}): begin a new one") from error
@@ -102,6 +116,9 @@ def _plain(adapter: Adapter) -> dict[str, Any]:
         "off_until": None if off == -float("inf") else off,
         "history": len(adapter._predictor.history),
         "last": adapter._predictor.last is not None,
+        "held": len(adapter._held),
+        "off_cause": adapter._off_cause,
+        "monitor": None if adapter._monitor is None else adapter._monitor.state()[0],
     }
 
 
@@ -112,10 +129,17 @@ def _tensors(adapter: Adapter) -> dict[str, Tensor]:
         "shadow": adapter._shadow.state(),
         "noise": adapter._noise.state(),
         "bounds": adapter._bounds.state(),
+        "consistency": adapter._consistency.state(),
     }
     found = {f"{part}/{name}": v for part, tensors in parts.items() for name, v in tensors.items()}
     for k, sample in enumerate(adapter._predictor.history):
         found |= _of(sample, f"history.{k}")
+    for k, (sample, nu, missing) in enumerate(adapter._held):
+        found |= {**_of(sample, f"held.{k}"), f"held.{k}.nu": nu, f"held.{k}.missing": missing}
+    if adapter._monitor is not None:
+        found |= {f"monitor/{name}": v for name, v in adapter._monitor.state()[1].items()}
+        for k, sample in enumerate(adapter._monitor.pending):
+            found |= _of(sample, f"pending.{k}")
     if adapter._predictor.last is not None:
         found |= _of(adapter._predictor.last, "last")
     return found

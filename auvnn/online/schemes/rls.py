@@ -30,6 +30,7 @@ class RLS(OnlineScheme):
     shape (`shape`, of the output's scale). Forgetting goes towards P0, so that nothing winds up without
     excitation. Innovations that no chance explains (a chi-square test over the last second) say that the vehicle
     has changed: P is then widened by `change_gain` and `change_shape`, and learning is as fast as noise allows.
+    Damping vanishes at rest: this is known beforehand, as exactly as `rest` says, and is learned first.
 
     Args:
         forgetting: time constant of excited time, s.
@@ -37,6 +38,7 @@ class RLS(OnlineScheme):
         shape: uncertainty of its shape, of the output's scale, in calm.
         change_gain: the same after a change; damping many times larger is what a payload can do.
         change_shape: the same after a change.
+        rest: uncertainty of the damping's vanishing at rest, of the output's scale; 0 to know nothing of it.
 
     Reference: Ljung (1999), System Identification, section 11.2; Kulhavy and Zarrop (1993), Int. J. Control 58(4)
     for forgetting towards a prior.
@@ -53,6 +55,7 @@ class RLS(OnlineScheme):
         shape: float = 0.02,
         change_gain: float = 3.0,
         change_shape: float = 0.3,
+        rest: float = 0.01,
     ) -> None:
         """Check the options."""
         self.forgetting = number(forgetting, "forgetting", 0.01, 1e9)
@@ -60,13 +63,14 @@ class RLS(OnlineScheme):
         self.shape = number(shape, "shape", 1e-6, 100.0)
         self.change_gain = number(change_gain, "change_gain", 0.0, 100.0)
         self.change_shape = number(change_shape, "change_shape", 1e-6, 100.0)
+        self.rest = number(rest, "rest", 0.0, 100.0)
         self._threshold = 0.0
         self._calm = self._wide = self._covariance = self._information = torch.zeros(0)
-        self._evidence = self._carried = self._age = torch.zeros(0)
+        self._evidence = self._carried = self._age = self._still = torch.zeros(0)
 
     def options(self) -> dict[str, Any]:
         """Return the options that rebuild this scheme."""
-        names = ("forgetting", "gain", "shape", "change_gain", "change_shape")
+        names = ("forgetting", "gain", "shape", "change_gain", "change_shape", "rest")
         return {name: getattr(self, name) for name in names}
 
     def start(self, weights: Weights) -> None:
@@ -83,10 +87,22 @@ class RLS(OnlineScheme):
         mask, absent = there[:, :, None] * there[:, None, :], torch.diag_embed(1.0 - there)
         self._calm = (self.gain**2 * common + self.shape**2 * free) * mask + 1e-12 * absent
         self._wide = (self.change_gain**2 * common + self.change_shape**2 * free) * mask
+        self._still = torch.zeros_like(own)
         self._information = torch.linalg.inv(self._calm)
         self._covariance = self._calm.clone()
+        if self.rest > 0.0:
+            self._still = weights.jacobian(torch.zeros(6, dtype=own.dtype))[1]
+            self._wide = self._towards_rest(self._wide)[1]
+            known = self._still[:, :, None] * self._still[:, None, :] / self.rest**2
+            self._information = self._information + known
         self._threshold = float(stats.chi2.isf(FALSE_ALARM, weights.width))
         self._watch()
+
+    def _towards_rest(self, covariance: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the gain (6, P) towards no damping at rest, and the covariance after that is known."""
+        towards = torch.einsum("apq,aq->ap", covariance, self._still)
+        gain = towards / ((towards * self._still).sum(-1) + max(self.rest, 1e-6) ** 2)[:, None]
+        return gain, covariance - gain[:, :, None] * towards[:, None, :]
 
     def _watch(self) -> None:
         self._evidence = torch.zeros_like(self._covariance[..., 0])
@@ -111,7 +127,12 @@ class RLS(OnlineScheme):
         kept = float(torch.exp(torch.tensor(-lesson.dt / self.forgetting)))
         covariance = torch.linalg.inv(kept * torch.linalg.inv(covariance) + (1.0 - kept) * self._information)
         self._covariance = 0.5 * (covariance + covariance.mT)
-        return weights.read() + gain * error[:, None]
+        found = weights.read() + gain * error[:, None]
+        if self.rest > 0.0:
+            # The last layer's output at rest is linear in it, for every form that has any.
+            gain, self._covariance = self._towards_rest(self._covariance)
+            found = found - gain * (self._still * found).sum(-1, keepdim=True)
+        return found
 
     def _wake(self, lesson: Lesson) -> None:
         """Widen the axes whose innovations of the last second no chance explains."""
@@ -145,6 +166,7 @@ class RLS(OnlineScheme):
             "evidence": self._evidence,
             "carried": self._carried,
             "age": self._age,
+            "still": self._still,
         }
 
     def load(self, state: Mapping[str, Tensor]) -> None:

@@ -1,0 +1,195 @@
+"""The page of `adapt`: what was learned, what changed, and what was refused."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from auvnn.report import style
+from auvnn.report.html import Table
+from auvnn.report.page import Page, Plot
+from auvnn.report.pages import common
+from auvnn.report.plots.adaptation import movement, skipped, with_and_without
+from auvnn.report.view import View
+from auvnn.report.words import count, finite, number, plural
+
+
+class AdaptationPage(Page):
+    """What an online adaptation says."""
+
+    kind = "adaptation"
+
+    def title(self, view: View) -> str:
+        """Return the heading."""
+        return "Online adaptation"
+
+    def about(self, view: View) -> str:
+        """Return model, log and scheme."""
+        scheme = view.mapping("scheme").get("scheme")
+        words = f", scheme {scheme}" if scheme else ""
+        return f"{view.text('model', 'a model')} on {view.text('log', 'a log')}{words}"
+
+    def brief(self, view: View) -> list[str]:
+        """Return the verdict in plain words."""
+        metrics, out = view.mapping("metrics"), []
+        ratio = finite(metrics.get("frozen_5_s_error_ratio"))
+        if ratio is not None:
+            verdict = "less than" if ratio < 0.98 else "more than" if ratio > 1.02 else "about"
+            out.append(
+                f"Running free for 5 s with the weights frozen at each moment, the error is {number(ratio, 2)} "
+                f"times that of the model as it was ({verdict} before)."
+            )
+        changes = _changes(view)
+        for change in changes[:2]:
+            words = str(change.get("words", ""))
+            out.append(f"Run {change.get('run')}: {words}.")
+        if not changes:
+            out.append("No change of the vehicle was seen.")
+        learned, samples = metrics.get("samples_learned"), metrics.get("samples")
+        out.append(f"{count(learned)} of {count(samples)} samples were learned from.")
+        reverted = int(metrics.get("updates_reverted") or 0)
+        if reverted:
+            out.append(
+                f"Updates were taken back {plural(reverted, 'time')} because the prediction got worse."
+            )
+        return out
+
+    def plots(self, view: View) -> list[Plot]:
+        """Return the figures."""
+        return [
+            Plot(
+                "prediction_error",
+                "Prediction error of the acceleration, with and without adaptation",
+                lambda: _one_step(view),
+                "Before each sample is learned from. Following every residual makes this small by itself: the "
+                "next figure shows what was learned of the vehicle.",
+            ),
+            Plot(
+                "frozen_error",
+                "Free running for 5 s with the weights frozen at each moment",
+                lambda: _frozen(view),
+                "Root mean square error of the velocity over the 5 s that follow, from the measured state.",
+            ),
+            Plot(
+                "movement",
+                "How far the weights moved",
+                lambda: _movement(view),
+                "Distance of all parameters from where they began, relative to their size; dotted lines mark "
+                "changes of the vehicle that were seen, with their kind.",
+            ),
+            Plot(
+                "skipped",
+                "What became of the samples",
+                lambda: skipped(_counts(view)),
+                "Samples learned from, and those that were not, by reason.",
+            ),
+        ]
+
+    def tables(self, view: View) -> list[Table]:
+        """Return the tables."""
+        rows, kinds = [], []
+        for change in _changes(view):
+            fitted = {str(change.get("effect")): change.get("parameters") or {}}
+            time = number(change.get("time"), 4)
+            rows += [[time, str(change.get("kind")), *row] for row in common.parameter_rows(fitted)]
+            if not fitted[str(change.get("effect"))]:
+                rows.append([time, str(change.get("kind")), "–", "–", "–", "–"])
+            kinds += [
+                [time, str(k.get("kind")), number(k.get("evidence")), number(k.get("explained"), 3)]
+                for k in change.get("kinds") or []
+            ]
+        refused = [
+            [name.replace("_", " "), count(told.get("count", 0)), str(told.get("words", ""))]
+            for name, told in view.mapping("skipped").items()
+        ]
+        metrics = [[str(k), number(v, 4)] for k, v in view.mapping("metrics").items()]
+        return [
+            Table("Changes seen", ["time, s", "kind", *common.PARAMETER_HEAD], rows, words=4),
+            Table(
+                "What each kind of change would explain",
+                ["time, s", "kind", "evidence, nats", "share explained"],
+                kinds,
+                "Evidence: logarithm of the odds against no change. Where several explain as much, the "
+                "excitation cannot tell them apart and none is named.",
+                words=2,
+            ),
+            Table("Samples not learned from", ["reason", "samples", "meaning"], refused),
+            Table("Metrics", ["name", "value"], metrics),
+        ]
+
+    def assumed(self, view: View) -> list[tuple[str, str]]:
+        """Return what was read and assumed."""
+        scheme = ", ".join(f"{k} {v}" for k, v in view.mapping("scheme").items())
+        guards = ", ".join(f"{k} {v}" for k, v in view.mapping("guards").items())
+        return [
+            ("Model", view.text("model")),
+            ("Log", view.text("log")),
+            ("Compared", view.text("compared")),
+            ("Scheme", scheme),
+            ("Guards", guards),
+            ("Assumed", "; ".join(view.texts("assumed"))),
+        ]
+
+
+def _changes(view: View) -> list[Mapping[str, Any]]:
+    return [c for c in view.get("changes") or [] if isinstance(c, Mapping)]
+
+
+def _counts(view: View) -> dict[str, int]:
+    told = {name: int(v.get("count") or 0) for name, v in view.mapping("skipped").items()}
+    return {"learned from": int(view.mapping("metrics").get("samples_learned") or 0), **told}
+
+
+def _joined(
+    view: View, key: str
+) -> tuple[list[Mapping[str, Any]], dict[Any, float], list[tuple[float, str]]]:
+    """Return the runs of a history, when each begins on a common clock, and the changes on that clock."""
+    runs = [h for h in view.get(key) or [] if isinstance(h, Mapping) and len(h.get("t") or [])]
+    whole = {h.get("run"): h for h in view.get("history") or [] if len(h.get("t") or [])}
+    offsets, begin = {}, 0.0
+    for name, h in whole.items():
+        offsets[name] = begin - float(h["t"][0])
+        begin += float(h["t"][-1]) - float(h["t"][0])
+    changes = [
+        (float(c["time"]) + offsets[c["run"]], str(c["kind"]))
+        for c in _changes(view)
+        if c.get("run") in offsets
+    ]
+    return runs, offsets, changes
+
+
+def _table(rows: Any) -> np.ndarray:
+    return np.array([[np.nan if v is None else float(v) for v in row] for row in rows], dtype=float).reshape(
+        -1, 6
+    )
+
+
+def _drawn(view: View, key: str, adapted: str, unadapted: str, names: Any) -> Figure:
+    runs, offsets, changes = _joined(view, key)
+    t = [np.asarray(h["t"], dtype=float) + offsets.get(h.get("run"), 0.0) for h in runs]
+    values = [np.concatenate([_table(h[n]) for h in runs]) if runs else [] for n in (adapted, unadapted)]
+    return with_and_without(np.concatenate(t) if t else [], *values, names=names, changes=changes)
+
+
+def _one_step(view: View) -> Figure:
+    return _drawn(view, "history", "prediction_error", "unadapted_error", style.ACCELERATION)
+
+
+def _frozen(view: View) -> Figure:
+    return _drawn(view, "frozen", "adapted", "unadapted", style.VELOCITY)
+
+
+def _movement(view: View) -> Figure:
+    runs, offsets, changes = _joined(view, "history")
+    t = np.concatenate(
+        [np.asarray(h["t"], dtype=float) + offsets.get(h.get("run"), 0.0) for h in runs] or [[]]
+    )
+    moved = np.concatenate([np.asarray(h["moved"], dtype=float) for h in runs] or [[]])
+    learned = np.concatenate([np.array([c == "adapted" for c in h["cause"]]) for h in runs] or [[]])
+    return movement(t, moved, learned, changes=changes)
+
+
+PAGE = AdaptationPage()
