@@ -16,7 +16,7 @@ from auvnn.models.structures.base import parameter_count
 from auvnn.studies.paper.answer import Study
 from auvnn.studies.paper.curves import damping_curves_of
 from auvnn.studies.paper.options import Options
-from auvnn.studies.paper.plant import by_axis, free_run, joined, load_plant, manoeuvre_log, over_range, rich_log
+from auvnn.studies.paper.plant import by_axis, free_run, load_plant, manoeuvre_log, over_range, rich_log
 from auvnn.training.fit_structure import StructureFit, fit_structure
 
 Array = np.ndarray
@@ -216,4 +216,4 @@ def _assumed(case: Mapping[str, Any]) -> list[str]:
     ]
 
 
-__all__ = ["joined", "noise_free", "six_networks"]
+__all__ = ["noise_free", "six_networks"]

@@ -26,7 +26,16 @@ from auvnn.studies.paper.following import (
 )
 from auvnn.studies.paper.noise_free import HELD_OUT_SEED
 from auvnn.studies.paper.options import Options, number, word
-from auvnn.studies.paper.plant import by_axis, free_run, load_plant, manoeuvre_log, over_range, rich_log
+from auvnn.studies.paper.plant import (
+    by_axis,
+    free_run,
+    load_plant,
+    manoeuvre_log,
+    over_range,
+    rich_log,
+    training_log,
+    training_words,
+)
 from auvnn.training.fit_damping import Fit, fit_damping
 from auvnn.training.fit_structure import OneStepData
 from auvnn.training.problem import DampingProblem
@@ -58,7 +67,7 @@ def noisy(options: Options, progress: Callable[[str], None]) -> Study:
     plant, case = load_plant(options.model), options.case
     noise = noise_of(case["noise"])
     truth = manoeuvre_log(plant, options).runs[0]
-    training = repeated(plant, options, noise, int(case["offline"]["runs"]))
+    training = training_log(plant, options, noise)
     live = manoeuvre_log(plant, options, noise, LIVE_SEED + options.seed).runs[0]
     model, fit = offline(plant, options, training)
     progress(f"offline: {fit.stopped_because}")
@@ -76,7 +85,7 @@ def noisy(options: Options, progress: Callable[[str], None]) -> Study:
         counts[f"{name}_updates"] = adapter.counts.adapted
         counts[f"{name}_reverted"] = adapter.counts.reverted
         progress(f"online, {name}: {adapter.counts.adapted} of {adapter.counts.samples} samples learned from")
-    metrics: dict[str, Any] = {"offline_training_s": fit.seconds, "offline_samples": len(training.runs) * truth.samples}
+    metrics: dict[str, Any] = {"offline_training_s": fit.seconds, "offline_samples": training.samples}
     metrics["parameters"] = sum(p.numel() for p in still.values())
     table, windows = [], {}
     for name, own in weights.items():
@@ -104,19 +113,9 @@ def noisy(options: Options, progress: Callable[[str], None]) -> Study:
     metrics |= counts
     figures = _figures(plant, model, truth, tracks, windows, training, ahead)
     return Study(
-        "noisy", plant.vehicle.name, options.to_dict(), [*options.assumed(), *_assumed(case)], metrics, table, figures,
+        "noisy", plant.vehicle.name, options.to_dict(), [*options.assumed(), training_words(options), *_assumed(case)], metrics, table, figures,
         model, list(fit.warnings),
     )  # fmt: skip
-
-
-def repeated(plant: GreyBox, options: Options, noise: Mapping[str, Any] | str, runs: int) -> Log:
-    """Return the manoeuvre, repeated with fresh noise each time."""
-    if runs < 1:
-        raise ConfigError(f"case.offline.runs={runs}: give at least 1")
-    logs = [manoeuvre_log(plant, options, noise, 100 * options.seed + i).runs[0] for i in range(runs)]
-    from dataclasses import replace
-
-    return Log.from_runs([replace(run, number=i) for i, run in enumerate(logs)], name="training")
 
 
 def offline(plant: GreyBox, options: Options, log: Log) -> tuple[GreyBox, Fit]:
@@ -139,9 +138,7 @@ def offline(plant: GreyBox, options: Options, log: Log) -> tuple[GreyBox, Fit]:
 
 
 def _held_out(plant: GreyBox, options: Options) -> list[Run]:
-    rich = dict(options.case["rich"])
-    rich["runs"] = rich.pop("held_out_runs")
-    return list(rich_log(plant, options, rich, seed=HELD_OUT_SEED + options.seed).runs)
+    return list(rich_log(plant, options, options.case["held_out"], seed=HELD_OUT_SEED + options.seed).runs)
 
 
 def _global(
@@ -210,8 +207,7 @@ def _assumed(case: Mapping[str, Any]) -> list[str]:
     meaning = "standard deviation of normal noise" if noise["amplitude"] == "std" else "half-width of uniform noise"
     return [
         f"ours: the noise's \"amplitude\" is the {meaning}",
-        f"ours: trained offline on {how['runs']} repetitions of the manoeuvre with fresh noise, stopped by "
-        f"{100 * float(how['stopping']):g} % of the samples drawn at random; the paper gives no amount of data",
+        f"ours: {100 * float(how['stopping']):g} % of the training samples, drawn at random, decide when training stops",
         "ours: attitude is measured without noise; the paper adds noise to velocities and accelerations alone",
         *(f"ours: online learning '{n}': {', '.join(f'{k} {v}' for k, v in d.items())}" for n, d in case["online"].items()),
     ]

@@ -13,8 +13,8 @@ EFFORTS = ("full", "smoke")
 # A smoke run shows that everything works; its numbers mean nothing.
 SMOKE_SCHEME = {"restarts": 1, "max_iterations": 40, "epochs": 40}
 SMOKE_MOST = {
-    "duration": 12.0, "rate": 10.0, "runs": 1, "iterations": 8, "restarts": 1, "best_of": 2, "rows": 40,
-    "held_out_runs": 1, "larger": 6, "ahead": 2.0, "settle": 1.0,
+    "duration": 12.0, "rate": 10.0, "runs": 1, "iterations": 8, "restarts": 1, "best_of": 2, "larger": 6, "repeats": 1,
+    "ahead": 2.0, "settle": 1.0,
 }  # fmt: skip
 
 

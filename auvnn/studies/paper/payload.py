@@ -27,9 +27,8 @@ from auvnn.studies.paper.following import (
     window_rows,
 )
 from auvnn.studies.paper.noise_free import six_networks
-from auvnn.studies.paper.noisy import repeated
 from auvnn.studies.paper.options import Options, number, word
-from auvnn.studies.paper.plant import by_axis, load_plant, manoeuvre_log, over_range
+from auvnn.studies.paper.plant import by_axis, load_plant, manoeuvre_log, over_range, training_log, training_words
 
 VARIANTS = ("paper", "physical")
 
@@ -62,7 +61,7 @@ def payload(options: Options, progress: Callable[[str], None]) -> Study:
     """
     plant, case = load_plant(options.model), options.case
     variant = word(case["variant"], "case.variant", VARIANTS)
-    training = repeated(plant, options, case["offline"]["noise"], int(case["offline"]["runs"]))
+    training = training_log(plant, options, "none")
     model, fit = six_networks(plant, options, training)
     progress(f"six networks on the empty vehicle: {fit.stopped}")
     mission = pick_up(plant, options, variant)
@@ -116,7 +115,8 @@ def payload(options: Options, progress: Callable[[str], None]) -> Study:
     before = over_range(tracks["offline"][: mission.row], truth.nu[: mission.row])
     metrics["offline_before_pick_up_rmse_over_range_worst"] = float(before.max())
     return Study(
-        "payload", plant.vehicle.name, options.to_dict(), [*options.assumed(), *_assumed(case, mission)], metrics, table,
+        "payload", plant.vehicle.name, options.to_dict(), [*options.assumed(), training_words(options), *_assumed(case, mission)],
+        metrics, table,
         _figures(truth, tracks, windows, mission, ahead, late), model, list(fit.details.get("warnings", [])),
     )  # fmt: skip
 

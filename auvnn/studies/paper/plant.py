@@ -14,7 +14,7 @@ from auvnn.errors import AuvnnError, ConfigError
 from auvnn.logs import Log, Run
 from auvnn.models import GreyBox, load
 from auvnn.simulate import simulate
-from auvnn.studies.paper.options import Options
+from auvnn.studies.paper.options import Options, word
 
 Array = NDArray[np.float64]
 AXES = ("u", "v", "w", "p", "q", "r")
@@ -55,10 +55,34 @@ def rich_log(
     ).log  # fmt: skip
 
 
-def joined(first: Log, name: str, *others: Run) -> Log:
-    """Return a log of further runs beside those of the first, numbered afresh."""
-    runs = [replace(run, number=i) for i, run in enumerate([*first.runs, *others])]
-    return Log.from_runs(runs, name=name)
+def training_log(plant: GreyBox, options: Options, noise: str | Mapping[str, Any]) -> Log:
+    """Return what the networks are trained on offline: the manoeuvre, repeated, and with `data: rich` multisines too.
+
+    Raises:
+        ConfigError: `case.offline` asks for something else.
+    """
+    how = options.case["offline"]
+    data = word(how["data"], "case.offline.data", ("manoeuvre", "rich"))
+    repeats = how["repeats"]
+    if isinstance(repeats, bool) or not isinstance(repeats, int) or repeats < 1:
+        raise ConfigError(f"case.offline.repeats={repeats!r}: a whole number of at least 1 is needed")
+    runs = [manoeuvre_log(plant, options, noise, 100 * options.seed + i).runs[0] for i in range(repeats)]
+    if data == "rich":
+        runs += rich_log(plant, options, how["rich"], options.seed, noise).runs
+    return Log.from_runs([replace(run, number=i) for i, run in enumerate(runs)], name="training")
+
+
+def training_words(options: Options) -> str:
+    """Return in words what the networks are trained on offline."""
+    how, rich = options.case["offline"], options.case["offline"]["rich"]
+    times = "once" if how["repeats"] == 1 else f"{how['repeats']} times"
+    words = f"ours: trained offline on the manoeuvre, {times}"
+    if how["data"] == "rich":
+        words += (
+            f", and on {rich['runs']} runs of {rich['duration']:g} s of multisines at {rich['rate']:g} samples a second; "
+            "on the manoeuvre alone the damping is not identified (see case noise_free)"
+        )
+    return f"{words}; the paper does not say"
 
 
 def free_run(model: GreyBox, run: Run, step: float, *, start: int = 0, end: int | None = None) -> Array:
