@@ -195,7 +195,9 @@ def _fit_joint(
 
         def told(iteration: int, cost: float, number: int = number) -> None:
             if progress is not None and iteration % 20 == 0:
-                progress(f"{model.structure}, start {number}, iteration {iteration}: relative error {cost**0.5:.3g}")
+                progress(
+                    f"{model.structure}, start {number}, iteration {iteration}: relative error {cost**0.5:.3g}"
+                )
 
         module, inputs, target, scale = _task(model, bare, data, spread, generator)
         names = {n: p for n, p in module.named_parameters() if p.requires_grad and "theta" not in n}
@@ -237,7 +239,9 @@ def _task(
     if isinstance(model, Separate):
         wrench = data.damping_wrench(bare)
         if "velocity" in model.learned:
-            cast(Networks, model.learned["velocity"]).fit_to_data(velocity_features(data.nu), wrench, generator)
+            cast(Networks, model.learned["velocity"]).fit_to_data(
+                velocity_features(data.nu), wrench, generator
+            )
         if "gravity" in model.learned:
             gravity = cast(Networks, model.learned["gravity"])
             rest = torch.zeros_like(wrench) if "velocity" in model.learned else wrench

@@ -17,7 +17,6 @@ from auvnn.models.structures.base import Structure
 from auvnn.models.structures.damping import velocity_features
 from auvnn.models.structures.networks import Networks
 from auvnn.physics.coriolis import coriolis_force
-from auvnn.physics.products import matvec
 from auvnn.vehicle import Vehicle
 
 STATES = ("known", "learned")

@@ -71,7 +71,9 @@ class StudyPage(Page):
 
     def assumed(self, view: View) -> list[tuple[str, str]]:
         """Return what the paper leaves open and was decided here."""
-        return [(words.partition(": ")[0], words.partition(": ")[2] or words) for words in view.texts("assumed")]
+        return [
+            (words.partition(": ")[0], words.partition(": ")[2] or words) for words in view.texts("assumed")
+        ]
 
 
 def _plot(found: Mapping[str, Any]) -> Plot:
@@ -116,7 +118,7 @@ def _noise_free(m: Mapping[str, float | None]) -> list[str]:
     if m.get("parallel_over_six_held_out_rich") is not None:
         out.append(
             "One network in parallel to the whole model, of as many weights and on the same data, has "
-            f"{number(m['parallel_over_six_held_out_rich'], 2)} times their held-out error trained on the rich manoeuvre, "
+            f"{number(m['parallel_over_six_held_out_rich'], 2)} times their held-out error, trained on rich data, "
             f"and {number(m.get('parallel_over_six_held_out_manoeuvre'), 2)} times trained on the paper's."
         )
     return out
@@ -148,8 +150,9 @@ def _payload(m: Mapping[str, float | None]) -> list[str]:
     ]
     for name in _online(m):
         out.append(
-            f"With it ({name}): {number(m.get(f'{name}_tracking_rmse_over_range_worst'), 2)} while the weights follow; with "
-            f"weights frozen, the error is {number(m[f'{name}_frozen_over_offline'], 2)} times that of the offline networks."
+            f"With it ({name}): {number(m.get(f'{name}_tracking_rmse_over_range_worst'), 2)} while the weights "
+            f"follow; frozen, their error is {number(m[f'{name}_frozen_over_offline'], 2)} times that of the offline "
+            "networks."
         )
     return out
 

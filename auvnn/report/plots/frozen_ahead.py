@@ -17,7 +17,11 @@ LOOKS = (style.BEFORE, style.AFTER, style.REFITTED, style.PERSISTENCE)
 
 @style.styled
 def frozen_ahead(
-    windows: Mapping[str, tuple[ArrayLike, ArrayLike]], *, ahead: float, mark: float | None = None, mark_words: str = ""
+    windows: Mapping[str, tuple[ArrayLike, ArrayLike]],
+    *,
+    ahead: float,
+    mark: float | None = None,
+    mark_words: str = "",
 ) -> Figure:
     """Draw the error of each free run over the time at which its weights were frozen, on a log axis.
 

@@ -38,14 +38,22 @@ def structures(rows: Sequence[Mapping[str, Any]], errors: Mapping[str, str]) -> 
             x = [100.0 * float(r[key]) for r in own]
             y = [names.index(str(r["structure"])) + 0.14 * (k - (len(data) - 1) / 2) for r in own]
             handles[f"trained on {trained}"] = ax.plot(
-                x, y, ls="none", marker=look.marker, ms=5.5, color=look.color, mfc="white" if k else look.color
+                x,
+                y,
+                ls="none",
+                marker=look.marker,
+                ms=5.5,
+                color=look.color,
+                mfc="white" if k else look.color,
             )[0]
         ax.set_xscale("log")
         ax.set_xlabel("rms error (% of the range)")
         ax.set_title(label(title, 60), fontsize=8)
         style.show_grid(ax, "both")
     sizes = {str(r["structure"]): r.get("parameters") for r in rows}
-    panels[0].set_yticks(range(len(names)), [f"{label(n.replace('_', ' '))} ({count(sizes[n])})" for n in names])
+    panels[0].set_yticks(
+        range(len(names)), [f"{label(n.replace('_', ' '))} ({count(sizes[n])})" for n in names]
+    )
     panels[0].set_ylim(len(names) - 0.5, -0.5)
     figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=len(handles))
     return figure

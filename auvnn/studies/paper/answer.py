@@ -75,5 +75,12 @@ def _csv(drawn: Mapping[str, Any]) -> str:
         names += [f"{word}_{axis}" for axis in "uvwpqr"]
         columns.append(np.asarray(values))
     stream = io.StringIO()
-    np.savetxt(stream, np.concatenate(columns, axis=1), fmt="%.7g", delimiter=",", header=",".join(names), comments="")
+    np.savetxt(
+        stream,
+        np.concatenate(columns, axis=1),
+        fmt="%.7g",
+        delimiter=",",
+        header=",".join(names),
+        comments="",
+    )
     return stream.getvalue()

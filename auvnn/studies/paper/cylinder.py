@@ -61,7 +61,9 @@ class Cylinder:
         axis, position = (np.asarray(described[k], dtype=np.float64) for k in ("axis", "position"))
         size = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0
         if position.shape != (3,) or not size > 0.0 or not np.isfinite(position).all():
-            raise ConfigError("case.cylinder.position and axis take three numbers each, and the axis is not zero")
+            raise ConfigError(
+                "case.cylinder.position and axis take three numbers each, and the axis is not zero"
+            )
         first = axis / size
         other = np.eye(3)[int(np.argmin(np.abs(first)))]
         second = np.cross(first, other)
@@ -88,7 +90,9 @@ class Cylinder:
     def rigid(self) -> Array:
         """Rigid-body inertia about the body origin, (6, 6)."""
         made = rigid_body_inertia(
-            torch.tensor(self.mass, dtype=torch.float64), torch.tensor(self.inertia), torch.tensor(self.position)
+            torch.tensor(self.mass, dtype=torch.float64),
+            torch.tensor(self.inertia),
+            torch.tensor(self.position),
         )
         return made.numpy()
 
@@ -127,7 +131,9 @@ def with_cylinder(vehicle: Vehicle, cylinder: Cylinder) -> Vehicle:
     )
 
 
-def factored(vehicle: Vehicle, low: float, high: float, generator: np.random.Generator) -> tuple[Vehicle, list[float]]:
+def factored(
+    vehicle: Vehicle, low: float, high: float, generator: np.random.Generator
+) -> tuple[Vehicle, list[float]]:
     """Return the vehicle with every damping coefficient multiplied by a factor of its own, and the factors.
 
     The factors are drawn evenly on a log scale; the smallest and the largest are then stretched to the range's ends,
@@ -140,7 +146,9 @@ def factored(vehicle: Vehicle, low: float, high: float, generator: np.random.Gen
     if not 0.0 < low <= high <= 1000.0:
         raise ConfigError(f"case.factors: low={low:g} and high={high:g} are no range of positive factors")
     elements = list(vehicle.damping_elements)
-    matrices = [name for name in ("linear_damping", "quadratic_damping") if getattr(vehicle, name) is not None]
+    matrices = [
+        name for name in ("linear_damping", "quadratic_damping") if getattr(vehicle, name) is not None
+    ]
     drawn = generator.uniform(size=12 * len(elements) + 6 * len(matrices))
     if len(drawn) > 1:
         drawn = (drawn - drawn.min()) / np.ptp(drawn)

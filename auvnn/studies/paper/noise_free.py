@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from auvnn.catalogue import unknown_name
 from auvnn.damping.bank import DampingBank
 from auvnn.errors import ConfigError
 from auvnn.logs import Log, Run
@@ -74,7 +75,9 @@ def noise_free(options: Options, progress: Callable[[str], None]) -> Study:
     )
     metrics["rich_relative_residual"] = _residual(wide_fit)
     if case.get("larger"):
-        large, large_fit = six_networks(plant, options, rich, case["rich"].get("restarts"), hidden=int(case["larger"]))
+        large, large_fit = six_networks(
+            plant, options, rich, case["rich"].get("restarts"), hidden=int(case["larger"])
+        )
         metrics["larger_hidden_units"] = int(case["larger"])
         metrics["larger_parameters"] = large_fit.parameters
         metrics["larger_relative_residual"] = _residual(large_fit)
@@ -82,9 +85,13 @@ def noise_free(options: Options, progress: Callable[[str], None]) -> Study:
         metrics["larger_held_out_rmse_over_range_worst"] = max(worst)
         progress(f"{case['larger']} hidden units: {large_fit.stopped}")
     if case.get("best_of"):
-        metrics |= _best_of(plant, options, rich, int(case["best_of"]), metrics["rich_relative_residual"], progress)
+        metrics |= _best_of(
+            plant, options, rich, int(case["best_of"]), metrics["rich_relative_residual"], progress
+        )
     for data, words in ((rich, "rich"), (log, "manoeuvre")):
-        table += _compare(plant, options, data, words, held, {"rich": wide, "manoeuvre": model}[words], progress)
+        table += _compare(
+            plant, options, data, words, held, {"rich": wide, "manoeuvre": model}[words], progress
+        )
     metrics |= _ratios(table)
     first = next(iter(held.values()))
     figures += [
@@ -119,7 +126,12 @@ def noise_free(options: Options, progress: Callable[[str], None]) -> Study:
 
 
 def six_networks(
-    plant: GreyBox, options: Options, log: Log, restarts: int | None = None, hidden: int | None = None, **how: Any
+    plant: GreyBox,
+    options: Options,
+    log: Log,
+    restarts: int | None = None,
+    hidden: int | None = None,
+    **how: Any,
 ) -> tuple[GreyBox, StructureFit]:
     """Return the six networks of `options.damping` in the known model, trained on a log, and how that went."""
     known = build_structure("known", plant.vehicle, actuation="wrench")
@@ -175,7 +187,9 @@ def _compare(
     for name in options.case["structures"]:
         structure, given = VARIANTS.get(name, (name, {}))
         if structure not in STRUCTURES:
-            raise ConfigError(f"case.structures: no structure '{name}'; there are: {', '.join([*STRUCTURES.names(), *VARIANTS])}")
+            raise ConfigError(
+                f"case.structures: {unknown_name('structure', str(name), [*STRUCTURES.names(), *VARIANTS])}"
+            )
         seconds = 0.0
         if name == "damping":
             model = six
@@ -187,7 +201,12 @@ def _compare(
                 progress=progress,
             )  # fmt: skip
             seconds = fit.seconds
-        row = {"structure": name, "trained_on": words, "parameters": parameter_count(model), "training_s": seconds}
+        row = {
+            "structure": name,
+            "trained_on": words,
+            "parameters": parameter_count(model),
+            "training_s": seconds,
+        }
         for where, error in _errors(model, held, options).items():
             row[f"{where}_rmse_over_range_worst"] = float(error.max())
         rows.append(row)

@@ -9,7 +9,6 @@ import numpy as np
 import torch
 
 from auvnn.damping.bank import DampingBank
-from auvnn.errors import ConfigError
 from auvnn.logs import Log, Run
 from auvnn.models import GreyBox
 from auvnn.models.structures import build_structure
@@ -108,12 +107,16 @@ def noisy(options: Options, progress: Callable[[str], None]) -> Study:
     base = metrics["offline_frozen_rmse_over_range_worst"]
     for name in case["online"]:
         metrics[f"{name}_frozen_over_offline"] = metrics[f"{name}_frozen_rmse_over_range_worst"] / base
-        ratio = metrics[f"{name}_held_out_damping_relative_error"] / metrics["offline_held_out_damping_relative_error"]
+        ratio = (
+            metrics[f"{name}_held_out_damping_relative_error"]
+            / metrics["offline_held_out_damping_relative_error"]
+        )
         metrics[f"{name}_global_error_over_offline"] = ratio
     metrics |= counts
     figures = _figures(plant, model, truth, tracks, windows, training, ahead)
+    assumed = [*options.assumed(), training_words(options), *_assumed(case)]
     return Study(
-        "noisy", plant.vehicle.name, options.to_dict(), [*options.assumed(), training_words(options), *_assumed(case)], metrics, table, figures,
+        "noisy", plant.vehicle.name, options.to_dict(), assumed, metrics, table, figures,
         model, list(fit.warnings),
     )  # fmt: skip
 
@@ -189,8 +192,8 @@ def _figures(
             "name": "frozen", "kind": "ahead", "ahead": ahead, "unit": "share of the range",
             "windows": {name: (w.starts, w.rmse.max(axis=1)) for name, w in windows.items()},
             "title": f"Weights frozen at each moment, {ahead:g} s ahead",
-            "caption": "Error of free runs that begin at the plant's state with the weights of that moment, worst degree of "
-            "freedom, over the range of the plant's velocity.",
+            "caption": "Error of free runs that begin at the plant's state with the weights of that moment, worst "
+            "degree of freedom, over the range of the plant's velocity.",
         },
         {
             "name": "damping", "kind": "damping", "curves": damping_curves_of(model, plant, training),
@@ -204,10 +207,15 @@ def _figures(
 
 def _assumed(case: Mapping[str, Any]) -> list[str]:
     noise, how = case["noise"], case["offline"]
-    meaning = "standard deviation of normal noise" if noise["amplitude"] == "std" else "half-width of uniform noise"
+    meaning = (
+        "standard deviation of normal noise" if noise["amplitude"] == "std" else "half-width of uniform noise"
+    )
     return [
-        f"ours: the noise's \"amplitude\" is the {meaning}",
+        f'ours: the noise\'s "amplitude" is the {meaning}',
         f"ours: {100 * float(how['stopping']):g} % of the training samples, drawn at random, decide when training stops",
         "ours: attitude is measured without noise; the paper adds noise to velocities and accelerations alone",
-        *(f"ours: online learning '{n}': {', '.join(f'{k} {v}' for k, v in d.items())}" for n, d in case["online"].items()),
+        *(
+            f"ours: online learning '{n}': {', '.join(f'{k} {v}' for k, v in d.items())}"
+            for n, d in case["online"].items()
+        ),
     ]

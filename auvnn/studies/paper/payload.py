@@ -28,7 +28,14 @@ from auvnn.studies.paper.following import (
 )
 from auvnn.studies.paper.noise_free import six_networks
 from auvnn.studies.paper.options import Options, number, word
-from auvnn.studies.paper.plant import by_axis, load_plant, manoeuvre_log, over_range, training_log, training_words
+from auvnn.studies.paper.plant import (
+    by_axis,
+    load_plant,
+    manoeuvre_log,
+    over_range,
+    training_log,
+    training_words,
+)
 
 VARIANTS = ("paper", "physical")
 
@@ -95,7 +102,9 @@ def payload(options: Options, progress: Callable[[str], None]) -> Study:
         windows[name] = found
         counted = found.starts >= late - 1e-9
         if not counted.any():
-            raise ConfigError(f"case.settle={settle:g} s leaves no window of {ahead:g} s: shorten one of them")
+            raise ConfigError(
+                f"case.settle={settle:g} s leaves no window of {ahead:g} s: shorten one of them"
+            )
         settled = np.sqrt(np.mean(found.rmse[counted] ** 2, axis=0))
         after = slice(mission.row, None)
         follow = np.sqrt(np.mean((tracks[name][after] - truth.nu[after]) ** 2, axis=0)) / spread
@@ -114,8 +123,9 @@ def payload(options: Options, progress: Callable[[str], None]) -> Study:
         metrics[f"{name}_frozen_over_offline"] = metrics[f"{name}_frozen_rmse_over_range_worst"] / base
     before = over_range(tracks["offline"][: mission.row], truth.nu[: mission.row])
     metrics["offline_before_pick_up_rmse_over_range_worst"] = float(before.max())
+    assumed = [*options.assumed(), training_words(options), *_assumed(case, mission)]
     return Study(
-        "payload", plant.vehicle.name, options.to_dict(), [*options.assumed(), training_words(options), *_assumed(case, mission)],
+        "payload", plant.vehicle.name, options.to_dict(), assumed,
         metrics, table,
         _figures(truth, tracks, windows, mission, ahead, late), model, list(fit.details.get("warnings", [])),
     )  # fmt: skip
@@ -132,9 +142,14 @@ def pick_up(plant: GreyBox, options: Options, variant: str) -> Mission:
     time = number(case["time"], "case.time")
     row = int(np.searchsorted(first.t, time - 1e-9))
     if not 2 <= row <= first.samples - 3:
-        raise ConfigError(f"case.time={time:g} s: the pick-up must lie within the {options.duration:g} s of the run")
+        raise ConfigError(
+            f"case.time={time:g} s: the pick-up must lie within the {options.duration:g} s of the run"
+        )
     cylinder = Cylinder.build(
-        number(case["mass"], "case.mass"), case["cylinder"], float(vehicle.water_density), float(vehicle.gravity)
+        number(case["mass"], "case.mass"),
+        case["cylinder"],
+        float(vehicle.water_density),
+        float(vehicle.gravity),
     )
     loaded, factors, jump = with_cylinder(vehicle, cylinder), [], None
     if variant == "paper":
@@ -151,7 +166,11 @@ def pick_up(plant: GreyBox, options: Options, variant: str) -> Mission:
     start = start if jump is None else torch.tensor(jump) @ start
     with torch.no_grad():
         second = after.rollout(
-            eta[row], start, torch.tensor(first.wrench[row:]), torch.tensor(first.t[row:]), max_step=options.step
+            eta[row],
+            start,
+            torch.tensor(first.wrench[row:]),
+            torch.tensor(first.t[row:]),
+            max_step=options.step,
         )
     eta = torch.cat([eta[:row], second.eta])
     nu = torch.cat([torch.tensor(first.nu[:row]), second.nu])
@@ -160,7 +179,9 @@ def pick_up(plant: GreyBox, options: Options, variant: str) -> Mission:
     return Mission(truth, live, row, after, jump, factors)
 
 
-def _measured(first: Run, eta: torch.Tensor, nu: torch.Tensor, before: GreyBox, after: GreyBox, row: int) -> Run:
+def _measured(
+    first: Run, eta: torch.Tensor, nu: torch.Tensor, before: GreyBox, after: GreyBox, row: int
+) -> Run:
     wrench = torch.tensor(first.wrench)
     zero = torch.zeros((), dtype=nu.dtype)
     rates = []
@@ -178,11 +199,18 @@ def _measured(first: Run, eta: torch.Tensor, nu: torch.Tensor, before: GreyBox, 
 def _noisy(truth: Run, noise: Any, options: Options) -> Run:
     draws = Draws(make_noise(noise), truth.samples, [np.random.default_rng([options.seed, 13])])
     assert truth.nu_dot is not None
-    return replace(truth, nu=draws.added("u", truth.nu[None])[0], nu_dot=draws.added("du", truth.nu_dot[None])[0])
+    return replace(
+        truth, nu=draws.added("u", truth.nu[None])[0], nu_dot=draws.added("du", truth.nu_dot[None])[0]
+    )
 
 
 def _figures(
-    truth: Run, tracks: Mapping[str, Array], windows: Mapping[str, Any], mission: Mission, ahead: float, late: float
+    truth: Run,
+    tracks: Mapping[str, Array],
+    windows: Mapping[str, Any],
+    mission: Mission,
+    ahead: float,
+    late: float,
 ) -> list[dict[str, Any]]:
     online = {f"online, {name}": track for name, track in tracks.items() if name != "offline"}
     marked = {"t": truth.t, "mark": float(truth.t[mission.row]), "mark_words": "pick-up"}
@@ -208,8 +236,8 @@ def _figures(
             "mark_words": "counted from here",
             "windows": {name: (w.starts, w.rmse.max(axis=1)) for name, w in windows.items()},
             "title": f"Weights frozen at each moment after the pick-up, {ahead:g} s ahead",
-            "caption": "Error of free runs that begin at the plant's state with the weights of that moment, worst degree of "
-            "freedom, over the range of the plant's velocity.",
+            "caption": "Error of free runs that begin at the plant's state with the weights of that moment, worst "
+            "degree of freedom, over the range of the plant's velocity.",
         },
     ]  # fmt: skip
     return out
@@ -224,12 +252,16 @@ def _assumed(case: Mapping[str, Any], mission: Mission) -> list[str]:
         "ours: M and C gain the cylinder's rigid-body inertia and its added mass by strip theory; g gains its weight "
         f"and buoyancy, which differ by {cylinder['net_weight']:g} N; all three are known to the model",
         "ours: the mission is the manoeuvre of case I with the pick-up on the way",
-        f"ours: measurements on the mission carry {'no noise' if case['noise'] == 'none' else 'the noise ' + str(case['noise'])}",
+        f"ours: the noise of what is measured on the mission: {case['noise']}",
     ]
     if mission.factors:
         words = ", ".join(f"{f:.2f}" for f in mission.factors)
-        out.append(f"ours: which coefficient gets which of the paper's factors 1.5 to 10 is drawn by the seed: {words}")
-        out.append("as the paper: the velocity does not jump at the pick-up, which a rigid grasp would make it do")
+        out.append(
+            f"ours: which coefficient gets which of the paper's factors 1.5 to 10 is drawn by the seed: {words}"
+        )
+        out.append(
+            "as the paper: the velocity does not jump at the pick-up, which a rigid grasp would make it do"
+        )
     else:
         out.append("ours: D gains the cylinder's own drag by component build-up, not factors")
         out.append("ours: momentum is kept at the grasp, nu+ = (M + M_p)^-1 M nu-, and the model knows it")

@@ -35,7 +35,9 @@ def load_plant(source: str) -> GreyBox:
     return plant
 
 
-def manoeuvre_log(plant: GreyBox, options: Options, noise: str | Mapping[str, Any] = "none", seed: int = 0) -> Log:
+def manoeuvre_log(
+    plant: GreyBox, options: Options, noise: str | Mapping[str, Any] = "none", seed: int = 0
+) -> Log:
     """Return the paper's manoeuvre as a log: a constant wrench for a time, then none, from rest."""
     excitation = {"name": "paper", **options.manoeuvre}
     return simulate(
@@ -45,7 +47,11 @@ def manoeuvre_log(plant: GreyBox, options: Options, noise: str | Mapping[str, An
 
 
 def rich_log(
-    plant: GreyBox, options: Options, rich: Mapping[str, Any], seed: int, noise: str | Mapping[str, Any] = "none"
+    plant: GreyBox,
+    options: Options,
+    rich: Mapping[str, Any],
+    seed: int,
+    noise: str | Mapping[str, Any] = "none",
 ) -> Log:
     """Return runs of random-phase multisines in all six degrees of freedom."""
     excitation = {"name": "multisine", **dict(rich.get("excitation") or {})}
@@ -96,7 +102,11 @@ def free_run(model: GreyBox, run: Run, step: float, *, start: int = 0, end: int 
     eta0 = torch.tensor(np.concatenate([run.position[start], run.quaternion[start]]))
     with torch.no_grad():
         found = model.rollout(
-            eta0, torch.tensor(run.nu[start]), torch.tensor(command[rows]), torch.tensor(run.t[rows]), max_step=step
+            eta0,
+            torch.tensor(run.nu[start]),
+            torch.tensor(command[rows]),
+            torch.tensor(run.t[rows]),
+            max_step=step,
         )
     return found.nu.numpy()
 
