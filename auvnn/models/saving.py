@@ -71,7 +71,7 @@ def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None 
     return GreyBox(model.vehicle, model.copied_effects(), bank, model.actuation)
 
 
-def _structured(model: GreyBox, described: Any, files: dict[str, bytes], path: Path) -> GreyBox:
+def _structured(model: GreyBox, described: Any, files: Mapping[str, bytes], path: Path) -> GreyBox:
     """Return the model in one of the structures other than the six damping subnetworks."""
     from auvnn.models.structures import build_structure
     from auvnn.models.structures.base import Structure

@@ -48,7 +48,7 @@ def test_each_case_composes_to_options(case, auvnn):
 
 @pytest.mark.parametrize("case", CASES.names())
 def test_each_case_runs_and_leaves_what_it_says(case, auvnn):
-    status, out, err = auvnn("study", f"case={case}", "effort=smoke", "out=out", *QUICK[case])
+    status, _, err = auvnn("study", f"case={case}", "effort=smoke", "out=out", *QUICK[case])
     assert status == 0 and "Traceback" not in err, err
     assert {p.name + "/" * p.is_dir() for p in Path("out").iterdir()} - {".hydra/"} == set(
         VERBS.get("study").writes

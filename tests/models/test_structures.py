@@ -97,7 +97,7 @@ def test_each_of_the_papers_networks_has_71_weights(vehicle):
 
 
 def test_the_known_model_is_the_equation_of_motion_without_damping(vehicle, states):
-    eta, nu, command = states
+    nu = states[1]
     known = build_structure("known", vehicle, actuation="wrench")
     full = GreyBox(vehicle, actuation="wrench")
     # M (nu_dot_cpm - nu_dot_ppm) = D(nu) nu, equation 14, with D written out here.

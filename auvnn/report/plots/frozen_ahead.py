@@ -12,7 +12,8 @@ from auvnn.report import style
 from auvnn.report.panels import NoData
 from auvnn.report.words import label
 
-LOOKS = (style.BEFORE, style.AFTER, style.REFITTED, style.PERSISTENCE)
+# The networks as they were trained come first; the others look as they do in the figures of velocity.
+LOOKS = (style.MEASURED, style.BEFORE, style.AFTER, style.REFITTED, style.PERSISTENCE)
 
 
 @style.styled

@@ -68,7 +68,7 @@ class Cylinder:
         other = np.eye(3)[int(np.argmin(np.abs(first)))]
         second = np.cross(first, other)
         second /= np.linalg.norm(second)
-        axes = np.stack([first, second, np.cross(first, second)], axis=1)
+        axes = np.asarray(np.stack([first, second, np.cross(first, second)], axis=1), dtype=np.float64)
         length = displaced / (density * math.pi * diameter**2 / 4.0)
         return cls(mass, diameter, length, position, axes, net)
 
@@ -169,7 +169,7 @@ def grasp(empty: GreyBox, cylinder: Cylinder) -> Array:
     """
     inertia = empty.prepare().total.detach().numpy()
     own = cylinder.rigid() + cylinder.added_mass(float(empty.vehicle.water_density))
-    return np.linalg.solve(inertia + own, inertia)
+    return np.asarray(np.linalg.solve(inertia + own, inertia), dtype=np.float64)
 
 
 def _turned(axes: Array, matrix: Array) -> Array:

@@ -35,6 +35,11 @@ def snapshot_of(model: GreyBox) -> Snapshot:
     return {name: p.detach().clone() for name, p in model.damping.named_parameters()}
 
 
+def learners(case: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Return the ways of learning online that are compared, by name; one that is set to null is left out."""
+    return {str(name): how for name, how in (case.get("online") or {}).items() if how is not None}
+
+
 def adapted(
     model: GreyBox, run: Run, described: Mapping[str, Any], change: Change | None = None
 ) -> tuple[list[Snapshot], Adapter]:

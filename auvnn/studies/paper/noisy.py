@@ -19,6 +19,7 @@ from auvnn.studies.paper.following import (
     Snapshot,
     adapted,
     frozen_ahead,
+    learners,
     snapshot_of,
     tracked,
     window_rows,
@@ -78,7 +79,7 @@ def noisy(options: Options, progress: Callable[[str], None]) -> Study:
     weights: dict[str, list[Snapshot] | Snapshot] = {"offline": still}
     tracks = {"offline": free_run(model, truth, options.step)}
     counts: dict[str, Any] = {}
-    for name, described in case["online"].items():
+    for name, described in learners(case).items():
         weights[name], adapter = adapted(model, live, described)
         tracks[name] = tracked(model, truth, weights[name], options.step)
         counts[f"{name}_updates"] = adapter.counts.adapted
@@ -105,7 +106,7 @@ def noisy(options: Options, progress: Callable[[str], None]) -> Study:
         metrics |= by_axis(f"{name}_frozen_rmse_over_range", found.overall)
         metrics |= {f"{name}_{k}": v for k, v in row.items() if k.startswith(("held_out", "frozen_windows"))}
     base = metrics["offline_frozen_rmse_over_range_worst"]
-    for name in case["online"]:
+    for name in learners(case):
         metrics[f"{name}_frozen_over_offline"] = metrics[f"{name}_frozen_rmse_over_range_worst"] / base
         ratio = (
             metrics[f"{name}_held_out_damping_relative_error"]
@@ -216,6 +217,6 @@ def _assumed(case: Mapping[str, Any]) -> list[str]:
         "ours: attitude is measured without noise; the paper adds noise to velocities and accelerations alone",
         *(
             f"ours: online learning '{n}': {', '.join(f'{k} {v}' for k, v in d.items())}"
-            for n, d in case["online"].items()
+            for n, d in learners(case).items()
         ),
     ]

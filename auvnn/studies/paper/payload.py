@@ -22,6 +22,7 @@ from auvnn.studies.paper.following import (
     Change,
     adapted,
     frozen_ahead,
+    learners,
     snapshot_of,
     tracked,
     window_rows,
@@ -80,7 +81,7 @@ def payload(options: Options, progress: Callable[[str], None]) -> Study:
     rows = window_rows(live, ahead, int(case["stride"]), float(truth.t[mission.row]))
     weights: dict[str, Any] = {"offline": snapshot_of(model)}
     counts: dict[str, Any] = {}
-    for name, described in case["online"].items():
+    for name, described in learners(case).items():
         weights[name], adapter = adapted(model, live, described, change)
         counts[f"{name}_updates"] = adapter.counts.adapted
         counts[f"{name}_reverted"] = adapter.counts.reverted
@@ -119,7 +120,7 @@ def payload(options: Options, progress: Callable[[str], None]) -> Study:
             }
         )
     base = metrics["offline_frozen_rmse_over_range_worst"]
-    for name in case["online"]:
+    for name in learners(case):
         metrics[f"{name}_frozen_over_offline"] = metrics[f"{name}_frozen_rmse_over_range_worst"] / base
     before = over_range(tracks["offline"][: mission.row], truth.nu[: mission.row])
     metrics["offline_before_pick_up_rmse_over_range_worst"] = float(before.max())
