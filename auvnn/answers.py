@@ -26,6 +26,7 @@ DRAWERS = Catalogue(
         "training": "auvnn.report.pages.training:PAGE",
         "demo": "auvnn.report.pages.demo:PAGE",
         "benchmark": "auvnn.report.pages.benchmark:PAGE",
+        "study": "auvnn.report.pages.study:PAGE",
     },
     "auvnn.report_pages",
 )

@@ -26,6 +26,7 @@ VERBS = Catalogue(
         "remove": "auvnn.cli.remove:VERB",
         "adapt": "auvnn.cli.adapt:VERB",
         "demo": "auvnn.cli.demo:VERB",
+        "study": "auvnn.cli.study:VERB",
         "benchmark": "auvnn.cli.benchmark:VERB",
     },
     "auvnn.verbs",

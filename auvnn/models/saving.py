@@ -8,13 +8,14 @@ from typing import Any
 
 from auvnn.config import dump_yaml, parse_yaml
 from auvnn.effects import effect_class
-from auvnn.errors import ModelError
+from auvnn.errors import ConfigError, ModelError
 from auvnn.models.grey_box import GreyBox
 from auvnn.storage import folder_exists, read_folder, tensors_from_bytes, tensors_to_bytes, write_folder
 from auvnn.vehicle import Vehicle, load_vehicle
 
 MODEL, WEIGHTS = "model.yaml", "weights.safetensors"
 SUBNETWORKS = "damping_subnetworks"
+STRUCTURE = "structure"
 
 
 def from_vehicle(vehicle: Vehicle, actuation: str | None = None) -> GreyBox:
@@ -52,9 +53,12 @@ def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None 
     # Parsed from the bytes whose hash was checked, not from the file, which may have changed since.
     data: dict[str, Any] = parse_yaml(files[MODEL].decode("utf-8"), str(path / MODEL))
     networks = data.pop(SUBNETWORKS, None)
+    structure = data.pop(STRUCTURE, None)
     saved_actuation = data.pop("actuation", None)
     vehicle = Vehicle.from_dict(data, where=str(path / MODEL))
     model = from_vehicle(vehicle, actuation or saved_actuation)
+    if structure is not None:
+        return _structured(model, structure, files, path)
     if networks is None:
         return model
     from auvnn.damping.bank import DampingBank
@@ -65,6 +69,27 @@ def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None 
     expected = {k: (tuple(v.shape), v.dtype) for k, v in bank.state_dict().items()}
     bank.load_state_dict(tensors_from_bytes(files[WEIGHTS], expected))
     return GreyBox(model.vehicle, model.copied_effects(), bank, model.actuation)
+
+
+def _structured(model: GreyBox, described: Any, files: Mapping[str, bytes], path: Path) -> GreyBox:
+    """Return the model in one of the structures other than the six damping subnetworks."""
+    from auvnn.models.structures import build_structure
+    from auvnn.models.structures.base import Structure
+
+    if not isinstance(described, dict) or not isinstance(described.get("name"), str) or WEIGHTS not in files:
+        raise ModelError(f"{path}: its '{STRUCTURE}' has no name, or there is no {WEIGHTS}: save the model again")
+    options = {str(k): v for k, v in described.items() if k != "name"}
+    try:
+        made = build_structure(
+            described["name"], model.vehicle, effects=model.copied_effects(), actuation=model.actuation, **options
+        )
+    except (ConfigError, TypeError) as problem:
+        raise ModelError(f"{path}: its '{STRUCTURE}' cannot be built: {problem}") from None
+    if not isinstance(made, Structure):
+        raise ModelError(f"{path}: '{described['name']}' with these options has no weights of its own")
+    expected = {k: (tuple(v.shape), v.dtype) for k, v in made.learned.state_dict().items()}
+    made.learned.load_state_dict(tensors_from_bytes(files[WEIGHTS], expected))
+    return made
 
 
 def save(model: GreyBox, folder: str | Path, *, overwrite: bool = False) -> Path:
@@ -82,12 +107,17 @@ def save(model: GreyBox, folder: str | Path, *, overwrite: bool = False) -> Path
 
 def contents(model: GreyBox, path: Path) -> dict[str, bytes | str]:
     """Return the files that describe a model, by name, as they are written into the folder `path`."""
+    from auvnn.models.structures.base import Structure
+
     data = model.vehicle.to_dict()
     data.pop("effects", None)  # the file's order must not depend on where the effects came from
     data["effects"] = {str(e.name): e.values() for e in model.copied_effects()}
     data["actuation"] = model.actuation
     files: dict[str, bytes | str] = {}
-    if model.damping is not None:
+    if isinstance(model, Structure):
+        data[STRUCTURE] = {"name": model.structure, **model.structure_options()}
+        files[WEIGHTS] = tensors_to_bytes({k: v.double() for k, v in model.learned.state_dict().items()})
+    elif model.damping is not None:
         data[SUBNETWORKS] = model.damping.describe()
         # Always in double precision, which holds single precision exactly: a folder has one form.
         files[WEIGHTS] = tensors_to_bytes({k: v.double() for k, v in model.damping.state_dict().items()})

@@ -29,7 +29,7 @@ VELOCITY_UNITS = ("m_s",) * 3 + ("rad_s",) * 3
 # Windows with frozen weights, s: how long, and how often one begins.
 HORIZON, EVERY = 5.0, 1.0
 # Rows of the time histories that the answer carries, over all runs.
-ROWS = 1500
+ROWS = 400
 
 
 @dataclass
@@ -128,8 +128,9 @@ def adapt(
     }
     assumed = []
     if adapter.added is not None:
+        form = adapter.added if isinstance(adapter.added, str) else adapter.added.get("form", "mlp")
         assumed.append(
-            f"the model had no damping subnetworks: {adapter.added} ones were added, giving nothing at first"
+            f"the model had no damping subnetworks: {form} ones were added, giving nothing at first"
         )
     if not counts.adapted:
         warnings.append("nothing was learned: no sample passed the guards; the model is as it was")

@@ -15,14 +15,14 @@ from torch import Tensor
 from auvnn.damping.bank import DampingBank, Description
 from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
-from auvnn.online.bounds import Bounds
+from auvnn.online.bounds import Bounds, known_drag
 from auvnn.online.change import Change, Monitor
 from auvnn.online.consistency import Consistency
 from auvnn.online.guards import REASONS, Guards, build_guards
 from auvnn.online.intake import refusal, sample_of
 from auvnn.online.noise import Gate, NoiseLevel
 from auvnn.online.residual import Predictor, Residual, Sample
-from auvnn.online.schemes.base import Lesson, OnlineScheme, build_online_scheme
+from auvnn.online.schemes.base import Lesson, OnlineScheme, anchors, build_online_scheme
 from auvnn.online.shadow import Shadow
 from auvnn.online.weights import Weights
 
@@ -124,7 +124,7 @@ class Adapter:
         assert bank is not None
         self.weights = Weights(bank, self.scheme.layers)
         self._original = Weights(copy.deepcopy(bank), self.scheme.layers)
-        self.scheme.start(self.weights)
+        self.scheme.start(self.weights, known_drag(self._model, anchors(self.weights)) / bank.output_scale)
         self._predictor = Predictor(self._model)
         self._noise = NoiseLevel(self.guards.noise_floor)
         self._gate = Gate(self.guards.gate, self.guards.gate_floor, self.guards.persist)
@@ -255,13 +255,13 @@ class Adapter:
             self._predictor.forget()
             last = None
         dt = 0.0 if last is None else sample.t - last.t
+        if not fault and self._passed_over(sample):
+            self._predictor.skip(sample)
+            return self._no(sample.t, "at_rest")
         if fault:
             self._off_until, self._off_cause = sample.t + self.guards.hold, "fault_flagged"
         elif self.guards.enabled and self._consistency.faulty(last, sample):
             self._off_until, self._off_cause = sample.t + self.guards.hold, "inconsistent"
-        if self._passed_over(sample):
-            self._predictor.skip(sample)
-            return self._no(sample.t, "at_rest")
         if self._debt > 0.0 and self.guards.budget is not None:
             self._predictor.skip(sample)
             return self._no(sample.t, "over_budget")
@@ -271,12 +271,13 @@ class Adapter:
         return self._learn(found, sample, dt)
 
     def _passed_over(self, sample: Sample) -> bool:
-        """Whether this is one of the many samples at rest that are not looked at."""
+        """Whether this is one of the many samples at rest that are not looked at, ever rarer as rest goes on."""
         if not self.guards.enabled or not self._rests(sample.nu):
             self._resting = 0
             return False
         self._resting += 1
-        return self._resting % self.guards.idle != 1 and self.guards.idle > 1
+        n = self._resting
+        return bool(n & (n - 1)) and n % max(1, int(self.guards.idle)) != 0
 
     def _rests(self, nu: Tensor) -> bool:
         bank = self._model.damping

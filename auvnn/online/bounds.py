@@ -47,7 +47,7 @@ class Bounds:
         scaled = (self.visited - nu) / model.damping.input_scale
         if len(scaled) and float(scaled.square().sum(1).min()) < APART**2:
             return
-        known = known_drag_power(model, nu)[None]
+        known = (nu * known_drag(model, nu)).sum()[None]
         if len(self.visited) < VISITED:
             self.visited, self.known = torch.cat([self.visited, nu[None]]), torch.cat([self.known, known])
             return
@@ -110,14 +110,12 @@ class Bounds:
         self._next = int(state["next"])
 
 
-def known_drag_power(model: GreyBox, nu: Tensor) -> Tensor:
-    """Return the power that the drag outside the subnetworks takes at a velocity through still water, W."""
-    rest = torch.zeros(3, dtype=nu.dtype)
-    command = torch.zeros(model.actuators.size, dtype=nu.dtype)
+def known_drag(model: GreyBox, nu: Tensor) -> Tensor:
+    """Return the drag outside the subnetworks (..., 6), N and N m, positive against the motion, in still water."""
+    lead = nu.shape[:-1]
+    command, position = nu.new_zeros(*lead, model.actuators.size), nu.new_zeros(*lead, 3)
+    rotation, time = torch.eye(3, dtype=nu.dtype).expand(*lead, 3, 3), nu.new_zeros(lead)
     with torch.no_grad():
-        terms = model.wrenches(
-            rest, torch.eye(3, dtype=nu.dtype), nu, model.actuators.static(command), Inputs(command),
-            torch.zeros((), dtype=nu.dtype),
-        )  # fmt: skip
+        terms = model.wrenches(position, rotation, nu, model.actuators.static(command), Inputs(command), time)
     known = [terms[n] for n in DRAG_TERMS if n in terms and n != "damping subnetworks"]
-    return -(nu * torch.stack(known).sum(0)).sum() if known else torch.zeros((), dtype=nu.dtype)
+    return -torch.stack(known).sum(0) if known else torch.zeros_like(nu)

@@ -36,7 +36,8 @@ class Guards:
         max_gap: a longer step in time starts the history afresh, s.
         max_age: a sample older than this when it arrives is stale, s; needs `now` at each step.
         rest: speeds below this share of the subnetworks' velocity scale do not excite the damping.
-        idle: at rest, one sample in this many is looked at; the others cost next to nothing.
+        idle: at rest samples are looked at ever more rarely, in the end one in this many; the others cost next to
+            nothing.
         gate: residuals beyond this many robust standard deviations are suspect.
         gate_floor: the least standard deviation that the gate assumes, in the subnetworks' force scale.
         persist: a suspect residual is believed when it has lasted this long, s.
@@ -56,7 +57,7 @@ class Guards:
     max_gap: float = 0.5
     max_age: float | None = None
     rest: float = 0.05
-    idle: int = 20
+    idle: int = 1000
     gate: float = 8.0
     gate_floor: float = 0.05
     persist: float = 0.3

@@ -1,1 +1,1 @@
-"""Studies: the hidden-effect demo and benchmark."""
+"""Studies: the hidden-effect demo and benchmark, and the paper's case studies."""

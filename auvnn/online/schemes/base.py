@@ -52,8 +52,8 @@ class OnlineScheme:
         """Return the options that rebuild this scheme."""
         return {}
 
-    def start(self, weights: Weights) -> None:
-        """Begin with a bank's weights."""
+    def start(self, weights: Weights, known: Tensor | None = None) -> None:
+        """Begin with a bank's weights; `known` is the model's other drag at `anchors`, in the output scale."""
 
     def propose(self, weights: Weights, lesson: Lesson) -> Tensor | None:
         """Return the weights (6, P) that the lesson asks for, or None where it has nothing new to say."""

@@ -12,6 +12,9 @@ from auvnn.damping.base import positive_int
 from auvnn.online.schemes.base import Lesson, OnlineScheme, number
 from auvnn.online.weights import Weights
 
+# How exactly the damping vanishes at rest, of the force scale.
+REST = 0.01
+
 
 class Replay(OnlineScheme):
     """A regularised projection onto the present sample and a batch of remembered ones, all weights at once.
@@ -78,6 +81,10 @@ class Replay(OnlineScheme):
             slopes = torch.cat([slopes, more])
             errors = torch.cat([errors, self._target[rows] - values])
             variance = torch.cat([variance, lesson.variance / self._count[rows, None]])
+        # Damping vanishes at rest: this is known beforehand and never leaves the batch.
+        still, more = weights.jacobians(torch.zeros(1, 6, dtype=slopes.dtype))
+        slopes, errors = torch.cat([slopes, more]), torch.cat([errors, -still])
+        variance = torch.cat([variance, torch.full_like(still, REST**2)])
         gram = torch.einsum("map,nap->amn", slopes, slopes)
         size = gram.diagonal(dim1=-2, dim2=-1).mean(-1, keepdim=True)
         gram = gram + torch.diag_embed(variance.T + self.ridge * size + 1e-12)

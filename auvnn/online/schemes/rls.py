@@ -26,15 +26,16 @@ class RLS(OnlineScheme):
     K = P J / (J'P J + R),  w <- w + K e,  P <- (1 - K J') P,  P^-1 <- l P^-1 + (1 - l) P0^-1
 
     The hidden layer is kept, so that what was learned offline gives the shape and the last layer how much of it.
-    P0 says how wrong the subnetworks may be, in force: a common factor on the whole output (`gain`), and any
-    shape (`shape`, of the output's scale). Forgetting goes towards P0, so that nothing winds up without
-    excitation. Innovations that no chance explains (a chi-square test over the last second) say that the vehicle
-    has changed: P is then widened by `change_gain` and `change_shape`, and learning is as fast as noise allows.
+    P0 says how wrong the subnetworks may be, in force: a common factor on the whole drag, the model's other drag
+    included (`gain`), and any shape (`shape`, of the output's scale). Forgetting goes towards P0, so that nothing
+    winds up without excitation. Innovations that no chance explains (a chi-square test over the last second) say
+    that the vehicle has changed: P is then widened by `change_gain` and `change_shape`, and learning is as fast as
+    noise allows.
     Damping vanishes at rest: this is known beforehand, as exactly as `rest` says, and is learned first.
 
     Args:
         forgetting: time constant of excited time, s.
-        gain: relative uncertainty of the whole output, in calm.
+        gain: relative uncertainty of the whole drag, in calm.
         shape: uncertainty of its shape, of the output's scale, in calm.
         change_gain: the same after a change; damping many times larger is what a payload can do.
         change_shape: the same after a change.
@@ -73,15 +74,19 @@ class RLS(OnlineScheme):
         names = ("forgetting", "gain", "shape", "change_gain", "change_shape", "rest")
         return {name: getattr(self, name) for name in names}
 
-    def start(self, weights: Weights) -> None:
+    def start(self, weights: Weights, known: Tensor | None = None) -> None:
         """Turn "how wrong in force" into covariances of the weights."""
         own = weights.read()
-        _, slopes = weights.jacobians(anchors(weights))
+        values, slopes = weights.jacobians(anchors(weights))
         gram = torch.einsum("nap,naq->apq", slopes, slopes) / len(slopes)
         eye = torch.eye(weights.width, dtype=own.dtype)
         size = gram.diagonal(dim1=-2, dim2=-1).mean(-1).clamp_min(1e-12)[:, None, None]
         free = torch.linalg.inv(gram + 1e-3 * size * eye)
-        common = own[:, :, None] * own[:, None, :]
+        # The weights that would give once more the whole drag, or what of it they can.
+        whole = values if known is None else values + known
+        carried = torch.einsum("nap,na->ap", slopes, whole) / len(slopes)
+        factor = torch.einsum("apq,aq->ap", free, carried)
+        common = factor[:, :, None] * factor[:, None, :]
         # What does not exist (padding) must not move, however wide the rest is.
         there = weights.used.to(own.dtype)
         mask, absent = there[:, :, None] * there[:, None, :], torch.diag_embed(1.0 - there)

@@ -53,10 +53,10 @@ def with_and_without(
         if drawn:
             found = np.concatenate(drawn)
             found = found[found > 0]
-            if found.size and found.max() > 50 * np.quantile(found, 0.1):
+            if found.size and found.max() > 100 * np.quantile(found, 0.1):
                 ax.set_yscale("log")
                 # A few samples that happen to fit exactly must not stretch the axis over many decades.
-                ax.set_ylim(bottom=max(found.min(), 1e-5 * found.max()) / 1.5)
+                ax.set_ylim(bottom=float(np.quantile(found, 0.01)) / 1.5)
         _mark(ax, changes, words=i in (0, 3))
         ax.set_ylabel(style.axis_label(*names[i]))
         style.show_grid(ax)

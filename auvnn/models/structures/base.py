@@ -1,0 +1,67 @@
+"""What the structures have in common: the vehicle without its damping, and a grey box with learned parts of its own."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any, ClassVar
+
+from torch import nn
+
+from auvnn.effects import Effect
+from auvnn.models.grey_box import GreyBox
+from auvnn.vehicle import Vehicle
+
+
+def without_damping(vehicle: Vehicle) -> Vehicle:
+    """Return the vehicle as the paper's initial model knows it: everything but the damping."""
+    return replace(vehicle, linear_damping=None, quadratic_damping=None, damping_elements=())
+
+
+class Structure(GreyBox):
+    """A grey box whose learned part is not the six damping subnetworks.
+
+    A member names itself, states its options, and puts what it learns into `learned`.
+
+    Args:
+        vehicle: what is known.
+        effects: named effects beside it, in order of action.
+        actuation: "thrusters" or "wrench".
+    """
+
+    structure: ClassVar[str]
+
+    def __init__(
+        self, vehicle: Vehicle, effects: Iterable[Effect] = (), actuation: str | None = None
+    ) -> None:
+        """Set up the known part; the member then fills `learned`."""
+        super().__init__(vehicle, effects, None, actuation)
+        self.learned = nn.ModuleDict()
+
+    def structure_options(self) -> dict[str, Any]:
+        """Return the options that build this structure again, as plain data."""
+        raise TypeError(f"model structure '{type(self).__name__}' does not state its options")
+
+    def rebuilt(self, effects: Iterable[Effect], vehicle: Vehicle | None = None) -> GreyBox:
+        """Return the same structure, its learned parts copied, with other effects or other numbers."""
+        from auvnn.models.structures import build_structure
+
+        made = build_structure(
+            self.structure, vehicle or self.vehicle, effects=list(effects), actuation=self.actuation,
+            **self.structure_options(),
+        )  # fmt: skip
+        assert isinstance(made, Structure)
+        made.learned.load_state_dict(copy.deepcopy(self.learned.state_dict()))
+        return made.to(self._known("mass"))
+
+
+def learned_parameters(model: GreyBox) -> list[nn.Parameter]:
+    """Return what a structure learns: its networks' weights or its damping's; effects are not among them."""
+    part = model.learned if isinstance(model, Structure) else model.damping
+    return [] if part is None else list(part.parameters())
+
+
+def parameter_count(model: GreyBox) -> int:
+    """Return how many numbers a structure learns."""
+    return sum(p.numel() for p in learned_parameters(model))

@@ -1,0 +1,160 @@
+"""The page of `study`: the paper's figures in their order, and the numbers beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from auvnn.report.html import Table
+from auvnn.report.page import Page, Plot
+from auvnn.report.panels import NoData
+from auvnn.report.plots.damping_curves import damping_curves
+from auvnn.report.plots.free_running import free_running
+from auvnn.report.plots.frozen_ahead import frozen_ahead
+from auvnn.report.plots.structures import structures
+from auvnn.report.view import View
+from auvnn.report.words import count, finite, number, percent
+
+TITLES = {
+    "noise_free": "Case study I: drag from noise-free signals",
+    "noisy": "Case study II: drag under noisy conditions",
+    "payload": "Case study III: a payload is picked up",
+}
+HELD_OUT = {
+    "multisine_rmse_over_range_worst": "held out: a fresh multisine",
+    "manoeuvre_rmse_over_range_worst": "the paper's manoeuvre",
+}
+
+
+class StudyPage(Page):
+    """What a case study says."""
+
+    kind = "study"
+
+    def title(self, view: View) -> str:
+        """Return the heading."""
+        case = view.text("case")
+        return TITLES.get(case, f"Case study: {case}")
+
+    def about(self, view: View) -> str:
+        """Return vehicle and seed."""
+        return f"{view.text('name', 'a vehicle')}, seed {view.mapping('options').get('seed')}"
+
+    def brief(self, view: View) -> list[str]:
+        """Return the verdict in plain words."""
+        metrics = {k: finite(v) for k, v in view.mapping("metrics").items()}
+        words = {"noise_free": _noise_free, "noisy": _noisy, "payload": _payload}.get(view.text("case"))
+        return [] if words is None else words(metrics)
+
+    def warnings(self, view: View) -> list[str]:
+        """Return what a reader must keep in mind."""
+        smoke = view.mapping("options").get("effort") == "smoke"
+        return [*(["A smoke run: everything is cut down, its numbers mean nothing."] if smoke else []),
+                *view.texts("warnings")]  # fmt: skip
+
+    def plots(self, view: View) -> list[Plot]:
+        """Return the figures, in the paper's order and then ours."""
+        return [_plot(found) for found in view.items("drawn")]
+
+    def tables(self, view: View) -> list[Table]:
+        """Return the comparison, and all metrics."""
+        rows = view.items("table")
+        head = list(rows[0]) if rows else []
+        cells = [[_cell(row.get(key)) for key in head] for row in rows]
+        metrics = [[str(k), _cell(v)] for k, v in view.mapping("metrics").items()]
+        return [
+            Table("Compared", [h.replace("_", " ") for h in head], cells, folded=False),
+            Table("Metrics", ["name", "value"], metrics, folded=True),
+        ]
+
+    def assumed(self, view: View) -> list[tuple[str, str]]:
+        """Return what the paper leaves open and was decided here."""
+        return [
+            (words.partition(": ")[0], words.partition(": ")[2] or words) for words in view.texts("assumed")
+        ]
+
+
+def _plot(found: Mapping[str, Any]) -> Plot:
+    def draw() -> Figure:
+        kind = found["kind"]
+        marks = {k: found[k] for k in ("mark", "mark_words") if k in found}
+        if kind == "velocity":
+            return free_running(found["t"], found["lines"], **marks)
+        if kind == "ahead":
+            return frozen_ahead(found["windows"], ahead=found["ahead"], **marks)
+        if kind == "damping":
+            return damping_curves(found["curves"])
+        if kind == "structures":
+            return structures(found["rows"], HELD_OUT)
+        raise NoData(f"a figure of kind {kind} is not known here")
+
+    return Plot(found["name"], found["title"], draw, found["caption"])
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, int) and not isinstance(value, bool):
+        return count(value)
+    return value if isinstance(value, str) else number(value, 4)
+
+
+def _noise_free(m: Mapping[str, float | None]) -> list[str]:
+    out = [
+        f"On the manoeuvre that they were trained on, the six networks run free for the whole run within "
+        f"{percent(m.get('manoeuvre_rmse_over_range_worst'))} of the velocity's range; without damping the model is "
+        f"{number(m.get('manoeuvre_zero_damping_rmse_over_range_worst'), 2)} times the range away.",
+        "On a manoeuvre that they were not trained on, the same networks are "
+        f"{percent(m.get('manoeuvre_trained_held_out_multisine_rmse_over_range_worst'))} of the range off: that figure 5 "
+        "agrees does not show that the damping was identified.",
+        "Trained on a rich manoeuvre they stay within "
+        f"{percent(m.get('held_out_rmse_over_range_worst'))} on everything held out.",
+    ]
+    if m.get("larger_held_out_rmse_over_range_worst") is not None:
+        out.append(
+            f"With {count(m.get('larger_hidden_units'))} hidden units instead of 5 that becomes "
+            f"{percent(m['larger_held_out_rmse_over_range_worst'])}."
+        )
+    if m.get("parallel_over_six_held_out_rich") is not None:
+        out.append(
+            "One network in parallel to the whole model, of as many weights and on the same data, has "
+            f"{number(m['parallel_over_six_held_out_rich'], 2)} times their held-out error, trained on rich data, "
+            f"and {number(m.get('parallel_over_six_held_out_manoeuvre'), 2)} times trained on the paper's."
+        )
+    return out
+
+
+def _online(m: Mapping[str, float | None]) -> list[str]:
+    return [k.removesuffix("_frozen_over_offline") for k in m if k.endswith("_frozen_over_offline")]
+
+
+def _noisy(m: Mapping[str, float | None]) -> list[str]:
+    out = [
+        "Trained on noisy accelerations, the model runs free "
+        f"{number(m.get('offline_tracking_rmse_over_range_worst'), 2)} of the velocity's range away from the plant."
+    ]
+    for name in _online(m):
+        out.append(
+            f"Online learning ({name}): {number(m.get(f'{name}_tracking_rmse_over_range_worst'), 2)} of the range while "
+            f"the weights follow; frozen, their error is {number(m[f'{name}_frozen_over_offline'], 2)} times that of the "
+            f"offline networks, and on held-out velocities the damping is "
+            f"{number(m.get(f'{name}_global_error_over_offline'), 2)} times as wrong."
+        )
+    return out
+
+
+def _payload(m: Mapping[str, float | None]) -> list[str]:
+    out = [
+        "Without online learning the model is "
+        f"{number(m.get('offline_tracking_rmse_over_range_worst'), 2)} of the velocity's range off after the pick-up."
+    ]
+    for name in _online(m):
+        out.append(
+            f"With it ({name}): {number(m.get(f'{name}_tracking_rmse_over_range_worst'), 2)} while the weights "
+            f"follow; frozen, their error is {number(m[f'{name}_frozen_over_offline'], 2)} times that of the offline "
+            "networks."
+        )
+    return out
+
+
+PAGE = StudyPage()

@@ -1,0 +1,130 @@
+"""The process plant model of the studies: its manoeuvres, logged, and how far a model runs free from them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from auvnn.errors import AuvnnError, ConfigError
+from auvnn.logs import Log, Run
+from auvnn.models import GreyBox, load
+from auvnn.simulate import simulate
+from auvnn.studies.paper.options import Options, word
+
+Array = NDArray[np.float64]
+AXES = ("u", "v", "w", "p", "q", "r")
+UNITS = ("m_s", "m_s", "m_s", "rad_s", "rad_s", "rad_s")
+
+
+def load_plant(source: str) -> GreyBox:
+    """Return the plant, driven by a wrench as in the paper: the vehicle can be actuated in all degrees of freedom.
+
+    Raises:
+        ConfigError: it has no damping that a network could learn.
+    """
+    plant = load(source, actuation="wrench")
+    vehicle = plant.vehicle
+    parts = (vehicle.linear_damping, vehicle.quadratic_damping)
+    if not vehicle.damping_elements and all(p is None or not np.any(p) for p in parts):
+        raise ConfigError(f"model={source}: has no damping, which is what the case studies identify")
+    return plant
+
+
+def manoeuvre_log(
+    plant: GreyBox, options: Options, noise: str | Mapping[str, Any] = "none", seed: int = 0
+) -> Log:
+    """Return the paper's manoeuvre as a log: a constant wrench for a time, then none, from rest."""
+    excitation = {"name": "paper", **options.manoeuvre}
+    return simulate(
+        plant, excitation, noise, None, seed, runs=1, duration=options.duration, rate=options.rate,
+        accelerations=True, max_step=options.step,
+    ).log  # fmt: skip
+
+
+def rich_log(
+    plant: GreyBox,
+    options: Options,
+    rich: Mapping[str, Any],
+    seed: int,
+    noise: str | Mapping[str, Any] = "none",
+) -> Log:
+    """Return runs of random-phase multisines in all six degrees of freedom."""
+    excitation = {"name": "multisine", **dict(rich.get("excitation") or {})}
+    return simulate(
+        plant, excitation, noise, None, seed, runs=int(rich["runs"]), duration=float(rich["duration"]),
+        rate=float(rich["rate"]), accelerations=True, max_step=options.step,
+    ).log  # fmt: skip
+
+
+def training_log(plant: GreyBox, options: Options, noise: str | Mapping[str, Any]) -> Log:
+    """Return what the networks are trained on offline: the manoeuvre, repeated, and with `data: rich` multisines too.
+
+    Raises:
+        ConfigError: `case.offline` asks for something else.
+    """
+    how = options.case["offline"]
+    data = word(how["data"], "case.offline.data", ("manoeuvre", "rich"))
+    repeats = how["repeats"]
+    if isinstance(repeats, bool) or not isinstance(repeats, int) or repeats < 1:
+        raise ConfigError(f"case.offline.repeats={repeats!r}: a whole number of at least 1 is needed")
+    runs = [manoeuvre_log(plant, options, noise, 100 * options.seed + i).runs[0] for i in range(repeats)]
+    if data == "rich":
+        runs += rich_log(plant, options, how["rich"], options.seed, noise).runs
+    return Log.from_runs([replace(run, number=i) for i, run in enumerate(runs)], name="training")
+
+
+def training_words(options: Options) -> str:
+    """Return in words what the networks are trained on offline."""
+    how, rich = options.case["offline"], options.case["offline"]["rich"]
+    times = "once" if how["repeats"] == 1 else f"{how['repeats']} times"
+    words = f"ours: trained offline on the manoeuvre, {times}"
+    if how["data"] == "rich":
+        words += (
+            f", and on {rich['runs']} runs of {rich['duration']:g} s of multisines at {rich['rate']:g} samples a second; "
+            "on the manoeuvre alone the damping is not identified (see case noise_free)"
+        )
+    return f"{words}; the paper does not say"
+
+
+def free_run(model: GreyBox, run: Run, step: float, *, start: int = 0, end: int | None = None) -> Array:
+    """Return the velocity (T, 6) of a model that runs free from row `start` on the run's commands alone.
+
+    A run that diverges holds its last sound state, as everywhere.
+    """
+    rows = slice(start, end)
+    command = run.command
+    assert command is not None and run.position is not None
+    eta0 = torch.tensor(np.concatenate([run.position[start], run.quaternion[start]]))
+    with torch.no_grad():
+        found = model.rollout(
+            eta0,
+            torch.tensor(run.nu[start]),
+            torch.tensor(command[rows]),
+            torch.tensor(run.t[rows]),
+            max_step=step,
+        )
+    return found.nu.numpy()
+
+
+def over_range(model: Array, plant: Array) -> Array:
+    """Return the root mean square of the velocity's error over the range of the plant's velocity, (6,).
+
+    Raises:
+        AuvnnError: a degree of freedom of the plant does not move.
+    """
+    spread = np.ptp(plant, axis=0)
+    if not (spread > 1e-9).all():
+        still = [AXES[i] for i in np.flatnonzero(spread <= 1e-9)]
+        raise AuvnnError(f"the plant does not move in {', '.join(still)}: give a manoeuvre that excites them")
+    return np.sqrt(np.mean((model - plant) ** 2, axis=0)) / spread
+
+
+def by_axis(name: str, values: Array) -> dict[str, float]:
+    """Return a metric and its worst degree of freedom by name."""
+    out = {f"{name}_{axis}": float(v) for axis, v in zip(AXES, values, strict=True)}
+    return {f"{name}_worst": float(np.max(values)), **out}
