@@ -13,6 +13,7 @@ __all__ = [
     "GreyBox",
     "Log",
     "Vehicle",
+    "adapt",
     "add",
     "check",
     "compare",
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from auvnn.logs import Log
     from auvnn.logs.quality import Quality
     from auvnn.models import GreyBox, load, remove
+    from auvnn.online import adapt
     from auvnn.simulate import simulate
     from auvnn.training import train
     from auvnn.vehicle import Vehicle
@@ -39,6 +41,7 @@ _WHERE = {
     "GreyBox": "auvnn.models",
     "Log": "auvnn.logs",
     "Vehicle": "auvnn.vehicle",
+    "adapt": "auvnn.online",
     "add": "auvnn.diagnosis",
     "compare": "auvnn.diagnosis",
     "diagnose": "auvnn.diagnosis",

@@ -63,6 +63,7 @@ def driven(
     command: np.ndarray | None = None,
     noise: tuple[float, float] = (0.0, 0.0),
     seed: int = 0,
+    step: float = 0.05,
 ) -> Run:
     """A run of `before`, which becomes `after(before)` at a moment; noise of velocity and acceleration."""
     held = wrench(duration, rate, seed) if command is None else command
@@ -73,11 +74,11 @@ def driven(
     start = torch.tensor([0.5, 0.5, 5.0, 1.0, 0.0, 0.0, 0.0], dtype=torch.float64)
     with torch.no_grad():
         first = before.rollout(
-            start, torch.zeros(6).double(), commands[: cut + 1], times[: cut + 1], max_step=0.02
+            start, torch.zeros(6).double(), commands[: cut + 1], times[: cut + 1], max_step=step
         )
         eta, nu = first.eta, first.nu
         if cut < len(t) - 1:
-            rest = later.rollout(eta[-1], nu[-1], commands[cut:], times[cut:], max_step=0.02)
+            rest = later.rollout(eta[-1], nu[-1], commands[cut:], times[cut:], max_step=step)
             eta, nu = torch.cat([eta[:-1], rest.eta]), torch.cat([nu[:-1], rest.nu])
         rate_before = before(eta[:cut], nu[:cut], commands[:cut])
         nu_dot = torch.cat([rate_before, later(eta[cut:], nu[cut:], commands[cut:])]).numpy()

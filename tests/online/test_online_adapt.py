@@ -36,9 +36,9 @@ def test_a_restored_adapter_goes_on_bit_for_bit(scheme, tmp_path):
 def test_adapt_writes_all_that_it_promises(tmp_path):
     changed = driven(
         vehicle(), lambda m: m.with_effects({"quadratic_damping": dict.fromkeys("XYZKMN", 2.0)}),
-        when=5.0, duration=14.0, noise=(2e-3, 0.03),
+        when=4.0, duration=10.0, noise=(2e-3, 0.03),
     )  # fmt: skip
-    other = driven(vehicle(), duration=7.0, seed=4)
+    other = driven(vehicle(), duration=6.0, seed=4)
     runs = [changed, other.cut(slice(None), number=1)]
     log = Log.from_runs(runs, name="made")
     said = []
@@ -52,7 +52,7 @@ def test_adapt_writes_all_that_it_promises(tmp_path):
     assert metrics["samples_learned"] + skipped == log.samples
     assert data["changes"][0]["kind"] == "drag" and data["changes"][0]["run"] == 0
     assert "polynomial" in data["assumed"][0]
-    assert len(data["frozen"]) == 2 and len(data["frozen"][0]["t"]) == 10
+    assert len(data["frozen"]) == 2 and len(data["frozen"][0]["t"]) == 6
     assert (tmp_path / "report.html").stat().st_size > 10_000
     for name in ("prediction_error", "frozen_error", "movement", "skipped"):
         assert (tmp_path / "figures" / f"{name}.png").is_file()
@@ -82,5 +82,5 @@ def test_the_configs_state_the_defaults():
 def test_a_log_of_rest_changes_nothing(tmp_path):
     run = driven(vehicle(), command=np.zeros((41, 6)))
     adaptation = adapt(bare(), Log.from_runs([run]))
-    assert adaptation.metrics["samples_learned"] == 0 and "nothing was learned" in adaptation.warnings[0]
+    assert adaptation.metrics["samples_learned"] == 0 and "nothing was learned" in adaptation.warnings[-1]
     adaptation.write(tmp_path)

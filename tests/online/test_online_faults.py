@@ -91,12 +91,12 @@ def test_row_107_an_hour_at_rest_moves_nothing(run):
 
 def test_row_107_forgetting_does_not_wind_up():
     """Along a motion that never varies the filter forgets, but never beyond what it believed in calm."""
-    command = np.tile([60.0, 0.0, 0.0, 0.0, 0.0, 0.0], (301, 1))
+    command = np.tile([60.0, 0.0, 0.0, 0.0, 0.0, 0.0], (121, 1))
     run = driven(vehicle(), command=command, noise=(1e-3, 0.05))
-    adapter = Adapter(vehicle(), {"scheme": "rls", "forgetting": 1.0}, watch=False)
+    adapter = Adapter(vehicle(), {"scheme": "rls", "forgetting": 0.5}, watch=False)
     calm = torch.linalg.eigvalsh(adapter.scheme.state()["calm"])[:, -1]
     fed(adapter, run)
-    assert adapter.counts.adapted > 200
+    assert adapter.counts.adapted > 80
     largest = torch.linalg.eigvalsh(adapter.scheme.state()["covariance"])[:, -1]
     assert bool((largest <= calm * (1 + 1e-9)).all())
 
@@ -113,7 +113,8 @@ def test_row_108_a_spike_is_not_learned_and_a_lasting_change_is(run):
     )
     adapter = Adapter(vehicle(), watch=False)
     updates = fed(adapter, changed)
-    assert any(u.cause == "gated" for u in updates[60:]) and updates[-1].adapted
+    # Held back while it might be a fault of a sensor, believed when it lasts.
+    assert [u.cause for u in updates[60:63]] == ["gated"] * 3 and updates[63].adapted
 
 
 def test_row_108_a_gyro_that_contradicts_the_attitude_is_not_learned(run):
