@@ -207,6 +207,9 @@ def _curve(entry: Any) -> dict[str, Any]:
         out["covered"] = (finite(low), finite(high))
     elif low is not None and high is not None:
         out |= {"low": low, "high": high}
+    band = entry.get("band")
+    if band is not None and len(band) == 2:
+        out |= {"low": band[0], "high": band[1]}
     for key, names in (("nu", _VELOCITY), ("learned", _LEARNED)):
         value = next((entry[n] for n in names if entry.get(n) is not None), None)
         if value is not None:

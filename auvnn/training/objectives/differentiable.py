@@ -64,7 +64,7 @@ class Differentiable(Objective):
     def __init__(
         self,
         *,
-        window: float = 2.0,
+        window: float = 5.0,
         epochs: int = 60,
         learning_rate: float = 0.3,
         method: str = "rk4",

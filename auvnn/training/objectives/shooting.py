@@ -51,7 +51,7 @@ class Shooting(Objective):
     def __init__(
         self,
         *,
-        window: float = 2.0,
+        window: float = 5.0,
         iterations: int = 12,
         prior: float = 0.1,
         patience: int = 4,
