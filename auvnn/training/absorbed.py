@@ -6,8 +6,8 @@ heading, a Munk moment. Three looks at what was learned tell:
 - at rest: damping vanishes with the velocity, d(0) = 0;
 - power: damping takes energy, nu . d(nu) >= 0, wherever the log has been;
 - regression: along the log, d is laid out into what a drag can give (linear and quadratic laws with every
-  coupling, and fore and aft unlike), and beside that into the wrench that an effect would have had. An effect
-  that accounts for most of what no drag gives was learned in its place.
+  coupling, and fore and aft unlike), and beside that into what the subnetworks could take up of the wrench that
+  an effect would have had. An effect that accounts for most of what no drag gives was learned in its place.
 
 All three count only beyond what the log leaves open (`training.learned`).
 """
@@ -38,7 +38,9 @@ SURE, SIZE = 4.0, 0.05
 # Negative power counts from this share of the largest on, in at least this share of the samples.
 POWER, SAMPLES = 0.01, 0.005
 # Share of what no drag gives that an effect must account for; and of the best effect's share that makes a rival.
-SHARE, RIVAL = 0.5, 0.8
+SHARE, RIVAL, SAME = 0.4, 0.8, 0.9
+# The same of a force at rest, whose standard error leaves out that the form cannot bend to everything.
+REST_SURE, REST_SIZE = 5.0, 0.1
 # Share of an effect's own trace that no drag could imitate, below which the log cannot tell.
 TOLD = 0.01
 
@@ -89,14 +91,16 @@ class Absorption:
     @property
     def at_rest(self) -> list[int]:
         """Degrees of freedom in which there is a force at rest."""
-        sure = np.abs(self.rest) > SURE * self.rest_std
-        return np.flatnonzero(sure & (self.rest_share > SIZE)).tolist()
+        sure = np.abs(self.rest) > REST_SURE * self.rest_std
+        return np.flatnonzero(sure & (self.rest_share > REST_SIZE)).tolist()
 
     @property
     def named(self) -> list[Suspect]:
         """The effect that was learned in place of damping, and those that cannot be told from it; may be empty."""
         found = [s for s in self.suspects if s.found]
-        return [s for s in found if s.share >= RIVAL * found[0].share] if found else []
+        near = [s for s in found if s.share >= RIVAL * found[0].share]
+        # Of those that do equally well, the one with the fewest parameters claims least.
+        return sorted(near, key=lambda s: (s.share < SAME * near[0].share, len(s.parameters)))
 
     def words(self) -> list[str]:
         """Return what there is to warn of, in plain sentences; nothing where the subnetworks are honest drag."""
@@ -268,12 +272,12 @@ def _suspect(
     size: Array,
     left: Array,
 ) -> Suspect | None:
-    """Regress what no drag gives on one effect's trace; None where no drag could be told from it."""
+    """Regress what no drag gives on what could be taken up of one effect; None where a drag could give all of it."""
     trace, described = traces(model, log, how, name)
-    trace = trace[rows] / size[:, None]
+    trace = learned.within_reach(np.nan_to_num(trace[rows])) / size[:, None]
     scale = np.array([p.scale for p in described])
-    own = np.nan_to_num(_without(trace, basis)).reshape(-1, len(scale)) * scale
-    total = np.nan_to_num(trace).reshape(-1, len(scale)) * scale
+    own = _without(trace, basis).reshape(-1, len(scale)) * scale
+    total = trace.reshape(-1, len(scale)) * scale
     told = (own**2).sum(0) > TOLD * np.maximum((total**2).sum(0), 1e-12)
     told &= (total**2).sum(0) > 1e-12
     if not told.any():

@@ -26,6 +26,8 @@ MOST_BYTES = 256 * 1024**2
 # A residual below this share of the learned wrench is rounding, or what the form cannot bend to.
 FLOOR = 1e-3
 RIDGE = 1e-9
+# Directions in which the slopes are this much smaller than in the largest take weights out of their first order.
+REACH = 1e-4
 
 
 class Learned:
@@ -73,6 +75,21 @@ class Learned:
         at = torch.as_tensor(nu).to(self.bank.input_scale)
         slopes = vmap(jacrev(one), in_dims=(None, 0), chunk_size=2048)(parameters, at)
         return torch.cat([slopes[n].detach().flatten(2) for n in self.names], -1).double().numpy()
+
+    def within_reach(self, series: Array) -> Array:
+        """Return what the subnetworks could take up of wrenches along the log, (n, 6, k): the nearest they can give.
+
+        To first order they can give what lies in the span of their slopes, each degree of freedom on its own.
+        """
+        out = np.zeros_like(series)
+        for k in range(6):
+            columns = self.slope[:, k][:, np.any(self.slope[:, k] != 0, axis=0)]
+            if columns.shape[1]:
+                columns = columns / np.linalg.norm(columns, axis=0)
+                span, size, _ = np.linalg.svd(columns, full_matrices=False)
+                span = span[:, size > REACH * size[0]]
+                out[:, k] = span @ (span.T @ series[:, k])
+        return out
 
     def covariance(self, linear: Array) -> Array:
         """Return the covariance (k, k) of k linear functions of the weights, given as rows (k, P)."""

@@ -25,15 +25,15 @@ from auvnn.models import GreyBox, load
 from auvnn.simulate import simulate
 from auvnn.training import train
 
-VEHICLE, EXCITATION, RATE, RUNS, DURATION = "rov95", "multisine", 10.0, 4, 40.0
+VEHICLE, EXCITATION, RATE, RUNS, DURATION = "rov95", "multisine", 10.0, 4, 20.0
 TEST_SEED = 1000
 # What is trained, by name: options of `train`.
 WAYS: dict[str, dict[str, Any]] = {
     "one_step": {},
     "one_step_estimated": {"derivative": {"method": "local_polynomial"}},
-    "rollout": {"objective": {"objective": "rollout"}},
-    "rollout_torchdiffeq": {"objective": {"objective": "rollout_torchdiffeq", "epochs": 20}},
-    "rollout_given": {"objective": {"objective": "rollout", "start": "given"}},
+    "rollout": {"objective": {"objective": "rollout", "window": 4.0, "iterations": 8}},
+    "rollout_torchdiffeq": {"objective": {"objective": "rollout_torchdiffeq", "window": 4.0, "epochs": 15}},
+    "rollout_given": {"objective": {"objective": "rollout", "window": 4.0, "iterations": 8, "start": "given"}},
 }
 # Where no acceleration is measured, the one-step fit is on estimated ones anyway.
 WHERE = {"realistic": ("one_step", "rollout", "rollout_torchdiffeq"), "paper": tuple(WAYS),
@@ -73,7 +73,7 @@ def one(noise: str, seed: int, small: bool) -> list[dict[str, Any]]:
     log = made(noise, seed, runs, duration)
     tests = {
         "multisine": made("none", TEST_SEED + seed, 2, 30.0),
-        "survey": made("none", TEST_SEED + seed, 1, 60.0, "survey"),
+        "survey": made("none", TEST_SEED + seed, 1, 30.0, "survey"),
     }
     rows = []
     for way in WHERE[noise]:

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from auvnn.report.html import Table
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
+from auvnn.report.pages.training import learned_plots
 from auvnn.report.panels import NoData
 from auvnn.report.plots.parameters import parameters
 from auvnn.report.plots.ranking import brackets, improvement, ranking
@@ -95,6 +96,7 @@ class DiagnosisPage(Page):
                 "How alike the marks are that two effects leave on this log: 1 means that the log cannot "
                 "tell them apart, whatever the method. Framed pairs need another experiment.",
             ),
+            *learned_plots(view),
         ]
 
     def tables(self, view: View) -> list[Table]:
