@@ -24,6 +24,7 @@ DRAWERS = Catalogue(
         "training": "auvnn.report.pages.training:PAGE",
         "demo": "auvnn.report.pages.demo:PAGE",
         "benchmark": "auvnn.report.pages.benchmark:PAGE",
+        "uncertainties": "auvnn.report.pages.uncertainties:PAGE",
     },
     "auvnn.report_pages",
 )

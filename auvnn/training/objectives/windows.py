@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -138,14 +139,14 @@ class Shots:
             value = np.sqrt(sums.channel / np.maximum(sums.count - spent, 0.25 * sums.count))
         return np.where(sums.count > 0, np.maximum(value, self.floor), np.inf)
 
-    def sums(self, model: GreyBox, sigma: Array, *, weights: bool) -> Sums:
-        """Linearise towards the initial states and, if asked for, the subnetworks' weights."""
+    def sums(self, model: GreyBox, sigma: Array, *, weights: bool, names: Sequence[str] = ()) -> Sums:
+        """Linearise towards the initial states, effects' parameters and, if asked for, the subnetworks' weights."""
         used = np.flatnonzero(np.isfinite(sigma) & (self.windows.mask.sum((0, 1)).numpy() > 0))
         scale = torch.as_tensor(1.0 / sigma[used])
         parts = []
         for begin in range(0, len(self.windows), CHUNK):
             part = slice(begin, begin + CHUNK)
-            answer = respond(model, self.windows.pick(part), self.initial[part], (), weights=weights)
+            answer = respond(model, self.windows.pick(part), self.initial[part], names, weights=weights)
             parts.append(_projected(answer, used, scale))
         hessian, slope = sum(p[0] for p in parts), sum(p[1] for p in parts)
         channel = np.zeros(18)
