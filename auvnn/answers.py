@@ -27,6 +27,7 @@ DRAWERS = Catalogue(
         "demo": "auvnn.report.pages.demo:PAGE",
         "benchmark": "auvnn.report.pages.benchmark:PAGE",
         "study": "auvnn.report.pages.study:PAGE",
+        "uncertainties": "auvnn.report.pages.uncertainties:PAGE",
     },
     "auvnn.report_pages",
 )

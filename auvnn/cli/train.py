@@ -16,8 +16,9 @@ def _run(job: Job) -> Answering:
         shutil.rmtree(job.checkpoint, ignore_errors=True)
     try:
         training = train(
-            model, log, job["scheme"], job["damping"], test=test, seed=job["seed"],
-            derivative=job["derivative"], checkpoint=job.checkpoint, resume=job["resume"] or False, force=job["force"],
+            model, log, job["scheme"], job["damping"], objective=job["objective"], test=test, seed=job["seed"],
+            derivative=job["derivative"], checkpoint=job.checkpoint, resume=job["resume"] or False,
+            force=job["force"],
             progress=job.say.progress,
         )  # fmt: skip
     except KeyboardInterrupt as end:
@@ -34,6 +35,9 @@ def _run(job: Job) -> Answering:
         scores = {name: data["metrics"][f"held_out_r2_{name}_{when}"] for name in _ACCELERATIONS}
         shown = ", ".join(f"{n} {'unknown' if v is None else format(v, '.3f')}" for n, v in scores.items())
         job.say(f"result    held-out one-step R2 {when}: {shown}")
+    free = [data["metrics"].get(f"held_out_rollout_5_s_total_{when}") for when in ("one_step", "after")]
+    if None not in free:
+        job.say(f"result    held-out free running over 5 s: {free[0]:.4g} one step, {free[1]:.4g} rollout")
     return training
 
 

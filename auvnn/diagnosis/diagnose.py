@@ -21,6 +21,7 @@ from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log
 from auvnn.metrics.windows import CHANNELS, Windows, cut_windows
 from auvnn.models import GreyBox
+from auvnn.training.absorbed import Absorption, absorption
 from auvnn.training.prediction_error import (
     TRUST,
     Statistics,
@@ -65,6 +66,12 @@ class Diagnosis(Answer):
     similarity: tuple[list[str], Array] = field(default_factory=lambda: ([], np.eye(0)))
     explanation: Explanation | None = None
     residual_tests: dict[str, Any] = field(default_factory=dict)
+    absorbed: Absorption | None = None
+
+    @property
+    def surfaces(self) -> list[dict[str, Any]]:
+        """The learned damping by degree of freedom, and the range that the log covered; empty without any."""
+        return [] if self.absorbed is None else self.absorbed.surfaces
 
     @property
     def story(self) -> list[str]:
@@ -93,7 +100,10 @@ class Diagnosis(Answer):
             "residual_tests",
             "story",
         )
-        return plain({"schema": "auvnn/diagnosis/1", **{n: getattr(self, n) for n in names}})
+        absorbed = None if self.absorbed is None else self.absorbed.to_dict()
+        return plain(
+            {"schema": "auvnn/diagnosis/1", **{n: getattr(self, n) for n in names}, "absorbed": absorbed}
+        )
 
 
 def candidates_for(
@@ -188,7 +198,12 @@ def diagnose(
         raise InputError(f"{log.name} gives only {len(windows)} windows of free running: {cure}")
     layout = lay_out(model, usable)
     search = _Search(layout, windows, usable, say, advice)
-    return search.run(model, log, needs, max_effects)
+    found = search.run(model, log, needs, max_effects)
+    # A subnetwork that has swallowed an effect leaves nothing of it for the tests above to see.
+    found.absorbed = absorption(model, log)
+    if found.absorbed is not None:
+        found.warnings += found.absorbed.words()
+    return found
 
 
 class _Search:

@@ -30,6 +30,7 @@ def solve(
     method: str,
     *,
     warmup: int = 0,
+    offset: Tensor | None = None,
     **tolerances: float,
 ) -> tuple[Tensor, Tensor]:
     """Integrate interval by interval, so that no step crosses a jump of the held inputs.
@@ -44,6 +45,7 @@ def solve(
         times: (warmup + T,), s, shared by all trajectories.
         method: one of torchdiffeq's.
         warmup: rows of history, from which the actuators' state is worked out.
+        offset: (...), s, added to `times` of each trajectory wherever an effect depends on the time.
         **tolerances: `rtol` (1e-7) and `atol` (1e-9) of adaptive methods.
 
     Returns:
@@ -69,8 +71,9 @@ def solve(
     prepared = None if model.time_varying else model.prepare()
     lagging = model.using("respond")
     command = inputs.command
+    late = torch.zeros((), dtype=command.dtype) if offset is None else offset.to(command)
     for effect in model.using("command"):
-        command = effect.command(command, times.to(command).expand(command.shape[:-1]))
+        command = effect.command(command, (times.to(command) + late.unsqueeze(-1)).expand(command.shape[:-1]))
     demand = model.actuators.static(command)
     rows, demands = inputs.each(), demand.unbind(-2)
     thrust = demands[0]
@@ -109,7 +112,9 @@ def solve(
                 [
                     (rotation @ nu[..., :3].unsqueeze(-1)).squeeze(-1),
                     quat_derivative(y[..., 3:7], nu[..., 3:]),
-                    model.nu_dot(y[..., :3], rotation, nu, now, row, t.to(y).expand(nu.shape[:-1]), prepared),
+                    model.nu_dot(
+                        y[..., :3], rotation, nu, now, row, (t.to(y) + late).expand(nu.shape[:-1]), prepared
+                    ),
                 ],
                 dim=-1,
             )

@@ -37,6 +37,7 @@ class Fit:
         held_out_rmse: (6,) on the held-out runs, or None.
         warnings: sentences about what the fit could not decide, and what looks wrong.
         scheme: name and options of the scheme, plain data.
+        energy: those of the warnings that say that the damping adds energy.
     """
 
     history: History
@@ -48,6 +49,7 @@ class Fit:
     held_out_rmse: tuple[float, ...] | None
     warnings: tuple[str, ...] = ()
     scheme: dict[str, Any] = field(default_factory=dict)
+    energy: tuple[str, ...] = ()
 
 
 def build_scheme(description: str | Mapping[str, Any] | Scheme) -> Scheme:
@@ -162,6 +164,7 @@ def fit_damping(
     errors, held_errors = chosen.errors()
     unit = spread * working.output_scale.cpu().double()
     bank.load_state_dict(result.state_dict())
+    energy = tuple(energy_warnings(bank, train))
     return Fit(
         history=history,
         iterations=iterations,
@@ -170,8 +173,9 @@ def fit_damping(
         rmse=tuple((errors * unit).tolist()),
         relative_rmse=tuple(errors.tolist()),
         held_out_rmse=None if held_errors is None else tuple((held_errors * unit).tolist()),
-        warnings=(*notes, *chosen.warnings, *energy_warnings(bank, train)),
+        warnings=(*notes, *chosen.warnings, *energy),
         scheme=described,
+        energy=energy,
     )
 
 

@@ -116,10 +116,11 @@ def output_error(model: GreyBox, windows: Windows, initial: Tensor) -> Tensor:
     """Return measured minus predicted outputs, (B, L, 18); zero where nothing was measured."""
     with torch.no_grad():
         eta, nu = predict(model, windows, initial)
-        return _error(model, windows, eta, nu)
+        return window_error(model, windows, eta, nu)
 
 
-def _error(model: GreyBox, windows: Windows, eta: Tensor, nu: Tensor) -> Tensor:
+def window_error(model: GreyBox, windows: Windows, eta: Tensor, nu: Tensor) -> Tensor:
+    """Return measured minus predicted outputs of runs (B, L, 7) and (B, L, 6), (B, L, 18); differentiable."""
     rate = None
     if windows.nu_dot is not None:
         _, thrust = _Thrust(model)(windows, _substeps(windows))
@@ -148,7 +149,13 @@ def _substeps(windows: Windows) -> int:
 
 
 def respond(
-    model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str], chunk: int = 2048
+    model: GreyBox,
+    windows: Windows,
+    initial: Tensor,
+    names: Sequence[str],
+    chunk: int = 2048,
+    *,
+    weights: bool = False,
 ) -> Response:
     """Return prediction error and sensitivities of windows.
 
@@ -158,14 +165,18 @@ def respond(
         initial: (B, 13).
         names: effects whose parameters, in this order, make up the P columns.
         chunk: points differentiated at a time, which bounds the memory.
+        weights: let the weights of the damping subnetworks follow as further columns, in the order of
+            `model.damping.parameters()`.
     """
     with torch.no_grad():
         eta, nu = predict(model, windows, initial)
-        error = _error(model, windows, eta, nu)
+        error = window_error(model, windows, eta, nu)
     count, length = nu.shape[:2]
     order = [model.effect_names.index(name) for name in names]
     thetas = {f"model.effects.{k}.theta": model.members[k].theta.detach() for k in order}
-    sizes = [thetas[f"model.effects.{k}.theta"].shape[0] for k in order]
+    if weights and model.damping is not None:
+        thetas |= {f"model.damping.{n}": p.detach() for n, p in model.damping.named_parameters()}
+    sizes = [theta.numel() for theta in thetas.values()]
     total = sum(sizes)
     times = windows.times[:, windows.warmup :]
     inputs = windows.inputs.rows(windows.warmup)
@@ -205,7 +216,8 @@ def _thrusts(
     with torch.no_grad():
         mean, start = module(windows, substeps)
     acting = {id(e) for hook in ("command", "respond") for e in model.using(hook)}
-    keys = [k for k in thetas if id(model.members[int(k.split(".")[2])]) in acting]
+    effects = [k for k in thetas if k.startswith("model.effects.")]
+    keys = [k for k in effects if id(model.members[int(k.split(".")[2])]) in acting]
     if not keys:
         return mean, start, None, None
     slopes = jacfwd(lambda some: functional_call(module, some, (windows, substeps)))(
@@ -253,7 +265,7 @@ def _differentiate(
         time.flatten(),
         inputs,
     )
-    return [*(x.detach() for x in by[:4]), *(by[4][k].detach() for k in thetas)]
+    return [*(x.detach() for x in by[:4]), *(by[4][k].detach().flatten(2) for k in thetas)]
 
 
 def _flatten_inputs(i: Inputs) -> tuple[list, None]:

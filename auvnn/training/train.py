@@ -1,37 +1,36 @@
-"""Train the damping subnetworks of a model on a log, offline, on one-step residuals."""
+"""Train the damping subnetworks of a model on a log, offline: one step ahead, and from there on free running."""
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
 
 from auvnn.answers import Answer, plain
 from auvnn.damping.bank import DampingBank
-from auvnn.errors import InputError
 from auvnn.logs import Log
-from auvnn.logs.derivatives import LocalPolynomial
 from auvnn.logs.overlap import leakage
 from auvnn.metrics.one_step import (
     Derivative,
     OneStep,
-    accelerations,
     choose_derivative,
-    inertia_of,
-    integrated,
     one_step,
     scores,
 )
+from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
+from auvnn.training.absorbed import Absorption, absorption
 from auvnn.training.fit_damping import Fit, fit_damping
 from auvnn.training.history import Record
+from auvnn.training.objectives.base import build_objective
 from auvnn.training.problem import DampingProblem
+from auvnn.training.targets import targets
 
 Array = NDArray[np.float64]
 AXES = ("X", "Y", "Z", "K", "M", "N")
@@ -57,12 +56,15 @@ class Training(Answer):
     model: GreyBox
     warnings: list[str] = field(default_factory=list)
     surfaces: list[dict[str, Any]] = field(default_factory=list)
+    objective: dict[str, Any] = field(default_factory=lambda: {"objective": "one_step"})
+    absorbed: Absorption | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
         names = (
             "log",
             "test",
+            "objective",
             "scheme",
             "damping",
             "seed",
@@ -73,46 +75,13 @@ class Training(Answer):
             "warnings",
         )
         return plain(
-            {"schema": "auvnn/training/1", "model": self.name, **{n: getattr(self, n) for n in names}}
+            {
+                "schema": "auvnn/training/1",
+                "model": self.name,
+                **{n: getattr(self, n) for n in names},
+                "absorbed": None if self.absorbed is None else self.absorbed.to_dict(),
+            }
         )
-
-
-class _Recorder(nn.Module):
-    """Stands in the place of the subnetworks, adds nothing, and remembers what they would have been given."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.seen: Tensor | None = None
-
-    def forward(self, nu_r: Tensor) -> Tensor:
-        self.seen = nu_r.detach().clone()
-        return torch.zeros_like(nu_r)
-
-
-def targets(model: GreyBox, log: Log, derivative: Derivative) -> tuple[Array, Array, Array]:
-    """Return what the subnetworks should give: velocities, damping wrench and run numbers, over all samples.
-
-    d(nu) = D(nu) nu = M (nu_dot of the model without it - nu_dot measured): equation 14 of Van de Ven, Flanagan
-    and Toal (2004). Where accelerations are estimated, velocity and wrench have passed the same filter.
-
-    Returns:
-        nu (N, 6) through the water; target (N, 6), NaN where a sample is missing; run (N,).
-    """
-    recorder = _Recorder()
-    bare = GreyBox(model.vehicle, model.copied_effects(), cast(DampingBank, recorder), model.actuation)
-    velocities, wrenches, numbers = [], [], []
-    for run in log.runs:
-        measured, predicted = accelerations(bare, run, derivative)
-        assert recorder.seen is not None
-        nu = recorder.seen.numpy()
-        nu = np.where(run.valid[:, None], nu, np.nan)
-        if derivative.method != "measured":
-            # The slope of its integral: what the same filter makes of a force that is linear in the velocity.
-            nu = LocalPolynomial(run.t, derivative.half_width, derivative.order)(integrated(run.t, nu))[1]
-        velocities.append(nu)
-        wrenches.append((predicted - measured) @ inertia_of(bare, run).T)
-        numbers.append(np.full(run.samples, run.number))
-    return np.concatenate(velocities), np.concatenate(wrenches), np.concatenate(numbers)
 
 
 def train(
@@ -121,6 +90,7 @@ def train(
     scheme: str | Mapping[str, Any] = "levenberg_marquardt",
     damping: str | Mapping[str, Any] = "mlp",
     *,
+    objective: str | Mapping[str, Any] = "one_step",
     test: Log | None = None,
     seed: int = 0,
     derivative: Mapping[str, Any] | None = None,
@@ -139,6 +109,8 @@ def train(
         log: what to fit on.
         scheme: name of a training scheme, or its options with `scheme`.
         damping: form of the subnetworks, or options with `form`.
+        objective: what the subnetworks shall be right about: `one_step`, or from that fit on free running,
+            `rollout` or `rollout_torchdiffeq`; or options with `objective`.
         test: held out; by default the last run of `log`, or the last 30 % of a single one.
         seed: of initial weights.
         derivative: how accelerations are obtained where they were not measured.
@@ -151,6 +123,7 @@ def train(
         ConfigError: an unknown scheme, form or option.
         InputError: nothing to fit, the same data on both sides, or a log that contradicts itself.
     """
+    goal = build_objective(objective)
     if test is None:
         log, test, held_words = log.split()
     else:
@@ -161,37 +134,56 @@ def train(
     how = choose_derivative(log, derivative)
     # What decides when to stop is a part of the log itself: the test log is for judging alone.
     fitted, stopping, stop_words = log.split(STOPPING)
-    nu, target, run = targets(model, fitted, how)
-    nu_stop, target_stop, _ = targets(model, stopping, how)
-    held = int(run.max()) + 1
-    problem = DampingProblem(
-        torch.tensor(np.concatenate([nu, nu_stop])),
-        torch.tensor(np.concatenate([target, target_stop])),
-        run=torch.tensor(np.concatenate([run, np.full(len(nu_stop), held)])),
-    )
     bank = DampingBank.from_description(damping, seed)
 
     def told(record: Record) -> None:
         if progress is not None and record.iteration % 10 == 0:
             progress(f"iteration {record.iteration}: worst relative error {record.worst:.3g}")
 
-    fit = fit_damping(
-        bank,
-        problem,
-        scheme=scheme,
-        held_out=[held],
-        seed=seed,
-        callback=told,
-        checkpoint_folder=checkpoint,
-        resume=resume,
-    )
-    bank.requires_grad_(True)
-    trained = GreyBox(model.vehicle, model.copied_effects(), bank, model.actuation)
+    def one_step_fit(how: Derivative, folder: str | Path | None) -> tuple[GreyBox, Fit, Array, int]:
+        problem, held, nu, held_samples = _problem(model, fitted, stopping, how)
+        own = copy.deepcopy(bank)
+        fit = fit_damping(
+            own,
+            problem,
+            scheme=scheme,
+            held_out=[held],
+            seed=seed,
+            callback=told,
+            checkpoint_folder=folder,
+            resume=resume if folder is not None else False,
+        )
+        own.requires_grad_(True)
+        return GreyBox(model.vehicle, model.copied_effects(), own, model.actuation), fit, nu, held_samples
+
+    trained, fit, nu, held_samples = one_step_fit(how, checkpoint)
+    # Whether the damping adds energy is judged below, with what the log leaves open.
+    warnings = [*model.vehicle.warnings, *log.quality().reservations, *(w for w in fit.warnings if w not in fit.energy)]
+    start, begun = trained, "the one-step fit"
+    if goal.estimated_start and how.method == "measured":
+        other = choose_derivative(log, {"method": "local_polynomial"})
+        candidates = [trained, one_step_fit(other, None)[0]]
+        if goal.choose(candidates, stopping):
+            start, begun = candidates[1], "a one-step fit on accelerations estimated from the velocities"
+    refined = goal.refine(start, fitted, stopping, progress)
+    warnings += refined.warnings
+    one_step_model, trained = trained, refined.model
     before, after = scores(one_step(model, test, how)), scores(one_step(trained, test, how))
-    warnings = [*model.vehicle.warnings, *log.quality().reservations, *fit.warnings]
     worse = [n for n in after if after[n]["rmse"] > before[n]["rmse"] * (1 + 1e-9)]
     if worse:
         warnings.append(f"held out, one step ahead, {', '.join(worse)} got worse by the training")
+    absorbed = absorption(trained, fitted, how)
+    warnings += [] if absorbed is None else absorbed.words()
+    metrics = _metrics(fit, before, after, len(nu), held_samples)
+    history, stopped = _history(fit), fit.stopped_because
+    if refined.stopped:
+        metrics |= _free_running({"before": model, "one_step": one_step_model, "after": trained}, test)
+        history["rollout"] = {
+            "train": list(refined.train),
+            "held_out": list(refined.held_out),
+            "start": begun,
+        }
+        stopped = f"one step: {stopped}; rollout, from {begun}: {refined.stopped}"
     dt = float(np.median([r.dt for r in log.runs]))
     return Training(
         model.vehicle.name,
@@ -200,14 +192,41 @@ def train(
         fit.scheme,
         bank.describe(),
         seed,
-        _metrics(fit, before, after, len(nu), len(nu_stop)),
-        _history(fit),
-        fit.stopped_because,
+        metrics,
+        history,
+        stopped,
         {**how.describe(dt), "held_out": held_words, "stopping": stop_words},
         trained,
         warnings,
-        _curves(trained, nu),
+        [] if absorbed is None else absorbed.surfaces,
+        {"objective": goal.name, **goal.options()},
+        absorbed,
     )
+
+
+def _problem(
+    model: GreyBox, fitted: Log, stopping: Log, how: Derivative
+) -> tuple[DampingProblem, int, Array, int]:
+    """Return the one-step problem, the run number of what decides when to stop, velocities, and its samples."""
+    nu, target, run = targets(model, fitted, how)
+    nu_stop, target_stop, _ = targets(model, stopping, how)
+    held = int(run.max()) + 1
+    problem = DampingProblem(
+        torch.tensor(np.concatenate([nu, nu_stop])),
+        torch.tensor(np.concatenate([target, target_stop])),
+        run=torch.tensor(np.concatenate([run, np.full(len(nu_stop), held)])),
+    )
+    return problem, held, nu, len(nu_stop)
+
+
+def _free_running(models: Mapping[str, GreyBox], test: Log) -> dict[str, Any]:
+    """Return the held-out free-running error over 5 s of several models: see `metrics.rollouts`."""
+    scale = scale_of(test)
+    found: dict[str, Any] = {}
+    for name, model in models.items():
+        rolled = roll(model, test, "5", scale)
+        found[f"held_out_rollout_5_s_total_{name}"] = None if rolled is None else rolled.total(scale)
+    return found
 
 
 def _metrics(fit: Fit, before: dict, after: dict, samples: int, held: int) -> dict[str, Any]:
@@ -244,25 +263,6 @@ def _history(fit: Fit) -> dict[str, Any]:
         "step": "iteration",
         "error": "error over the target's spread (1)",
     }
-
-
-def _curves(model: GreyBox, nu: Array) -> list[dict[str, Any]]:
-    """Return what the subnetworks make of each velocity alone, over half as much again as the log covered."""
-    out = []
-    assert model.damping is not None
-    for k in range(6):
-        column = nu[np.isfinite(nu[:, k]), k]
-        if not len(column):
-            raise InputError(f"velocity {'uvwpqr'[k]} has no usable sample")
-        low, high = float(column.min()), float(column.max())
-        reach = 1.5 * max(abs(low), abs(high), 1e-6)
-        grid = np.linspace(-reach, reach, 121)
-        states = np.zeros((len(grid), 6))
-        states[:, k] = grid
-        with torch.no_grad():
-            force = model.damping(torch.tensor(states)).numpy()[:, k]
-        out.append({"nu": grid, "learned": force, "low": low, "high": high})
-    return out
 
 
 __all__ = ["OneStep", "Training", "targets", "train"]

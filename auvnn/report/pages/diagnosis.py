@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from auvnn.report.html import Table
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
+from auvnn.report.pages.training import learned_plots
 from auvnn.report.panels import NoData
 from auvnn.report.plots.parameters import parameters
 from auvnn.report.plots.ranking import brackets, improvement, ranking
@@ -103,6 +104,7 @@ class DiagnosisPage(Page):
                 "Autocorrelation of what free running leaves, initial states estimated. Grey: where white noise of the "
                 "sensors would lie, 99 % of it, after the same estimation. What leaves the band is not noise.",
             ),
+            *learned_plots(view),
         ]
 
     def tables(self, view: View) -> list[Table]:

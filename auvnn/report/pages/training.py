@@ -78,13 +78,8 @@ class TrainingPage(Page):
                 "Error on the fitted and on the held-out data; the circle marks the best held-out step. "
                 "Where the two part, the fit begins to learn the data by heart.",
             ),
-            Plot(
-                "damping_curves",
-                "What damping was found",
-                lambda: _damping(view),
-                "Force and moment opposing each velocity, the other five at zero. Only inside the shaded "
-                "range has the log anything to say; outside, the curve is extrapolation.",
-            ),
+            *_rollout_plots(view),
+            *(learned_plots(view) or [Plot("damping_curves", "What damping was found", lambda: _damping(view), "")]),
         ]
 
     def tables(self, view: View) -> list[Table]:
@@ -108,6 +103,41 @@ class TrainingPage(Page):
             ("Damping", _described(view.get("damping"))),
             ("Seed", view.text("seed")),
         ]
+
+
+def learned_plots(view: View) -> list[Plot]:
+    """Return the figure of the learned damping, if the answer holds any."""
+    if not len(view.get("surfaces") or ()):
+        return []
+    words = (
+        "Force and moment opposing each velocity, the other five at zero. Only inside the shaded range has the "
+        "log anything to say; outside, the curve is extrapolation."
+    )
+    if any(isinstance(c, Mapping) and c.get("band") is not None for c in view.get("surfaces")):
+        words += " The band is what the log leaves open, 95 %. Damping passes through zero at rest."
+    return [Plot("damping_curves", "What damping was found", lambda: _damping(view), words)]
+
+
+def _rollout_plots(view: View) -> list[Plot]:
+    """Return the figure of the training on free running, if there was any."""
+    found = view.mapping("history").get("rollout")
+    if not isinstance(found, Mapping) or not found.get("held_out"):
+        return []
+
+    def draw() -> Figure:
+        # The fitted windows' weights follow the errors, so only the error left out tells a course.
+        held = np.asarray([np.nan if finite(v) is None else v for v in found["held_out"]], dtype=float)
+        return history(np.zeros(0), held, step="look", error="error over that of the one-step fit")
+
+    return [
+        Plot(
+            "rollout_history",
+            "How free running went on from there",
+            draw,
+            f"Error of free runs over windows left out, from {found.get('start', 'the one-step fit')} on; the "
+            "circle marks the weights that are kept.",
+        )
+    ]
 
 
 def _course(errors: np.ndarray, words: str, step: str, numbers: np.ndarray) -> list[str]:
@@ -207,6 +237,9 @@ def _curve(entry: Any) -> dict[str, Any]:
         out["covered"] = (finite(low), finite(high))
     elif low is not None and high is not None:
         out |= {"low": low, "high": high}
+    band = entry.get("band")
+    if band is not None and len(band) == 2:
+        out |= {"low": band[0], "high": band[1]}
     for key, names in (("nu", _VELOCITY), ("learned", _LEARNED)):
         value = next((entry[n] for n in names if entry.get(n) is not None), None)
         if value is not None:

@@ -1,0 +1,344 @@
+"""Several uncertainties at once: which can be identified together, on which manoeuvre, and what stays confounded.
+
+Damping, added mass and restoring are all badly known. For each manoeuvre of equal length the study works out
+
+- what free running tells: the information matrix of all parameters, the windows' initial states projected out,
+  under the noise of good sensors. A parameter's standard error with everything else known, with all else
+  uncertain too, and with damping not even of a known law but six networks, each against what was known before;
+  what is correlated with what;
+- what six networks of the velocity would swallow: the wrench by which each effect betrays itself along the
+  motion, and the share of it that damping subnetworks can be trained to give.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from auvnn.answers import Answer, plain
+from auvnn.damping.bank import DampingBank
+from auvnn.diagnosis.diagnose import windows_for
+from auvnn.diagnosis.nuisance import Layout, lay_out
+from auvnn.effects import effect_class
+from auvnn.errors import ConfigError
+from auvnn.logs import Log
+from auvnn.metrics.one_step import choose_derivative
+from auvnn.models import GreyBox, load
+from auvnn.simulate import simulate
+from auvnn.training.absorbed import traces
+from auvnn.training.fit_damping import fit_damping
+from auvnn.training.objectives.windows import Shots
+from auvnn.training.problem import DampingProblem
+from auvnn.training.targets import targets
+
+Array = NDArray[np.float64]
+# Standard deviations of good sensors (noise=realistic), in the order of the windows' channels; no accelerations.
+SIGMA = np.array([0.05, 0.05, 0.01, 0.003, 0.003, 0.008] + [0.006] * 3 + [0.003] * 3 + [np.inf] * 6)
+GROUPS = {
+    "damping": ("linear_damping", "quadratic_damping"),
+    "added mass": ("added_mass",),
+    "restoring": ("net_buoyancy", "cg_offset"),
+}
+# Wrenches are compared in these units, N and N m, so that no degree of freedom drowns the others.
+WRENCH = np.array([5.0, 5.0, 5.0, 1.0, 1.0, 1.0])
+SWALLOWED = ("linear_damping", "quadratic_damping", "added_mass", "net_buoyancy", "cg_offset", "ocean_current",
+             "thruster_lag")  # fmt: skip
+# Known this much better than before counts as identified; correlated more than this as confounded.
+IDENTIFIED, CONFOUNDED = 0.5, 0.9
+SCHEME = {"scheme": "levenberg_marquardt", "restarts": 1, "max_iterations": 60}
+# Standard deviation of the networks' weights beforehand, in their scaled numbers: next to nothing is known.
+WEIGHT = 3.0
+
+
+@dataclass
+class Uncertainties(Answer):
+    """What each manoeuvre can tell of several uncertainties at once."""
+
+    kind = "uncertainties"
+    model: str
+    prior: float
+    seconds: float
+    manoeuvres: dict[str, dict[str, Any]]
+    metrics: dict[str, Any] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def story(self) -> list[str]:
+        """The answer as a few plain sentences."""
+        out = []
+        for name, found in self.manoeuvres.items():
+            count = len(found["parameters"])
+            known = sum(p["verdict"] == "identified" for p in found["parameters"])
+            mixed = sum(p["verdict"] == "confounded" for p in found["parameters"])
+            out.append(
+                f"{name}: {known} of {count} parameters are identified together, {mixed} more would be if the "
+                "others were known"
+            )
+            free = [p for p in found["parameters"] if p["verdict_with_networks"] is not None]
+            if free:
+                left = sum(p["verdict_with_networks"] == "identified" for p in free)
+                out[-1] += f"; with networks as damping {left} of the {len(free)} that are not damping"
+            if found["swallowed"]:
+                out.append(
+                    f"{name}: networks of the velocity can be trained to give {_listed(found['swallowed'])}"
+                )
+        return out
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON answer."""
+        names = ("model", "prior", "seconds", "manoeuvres", "metrics", "warnings", "story")
+        return plain({"schema": "auvnn/uncertainties/1", **{n: getattr(self, n) for n in names}})
+
+
+def uncertainties(
+    model: str | GreyBox = "rov95",
+    manoeuvres: Sequence[str] = ("paper", "multisine", "survey"),
+    *,
+    runs: int = 4,
+    duration: float = 30.0,
+    rate: float = 10.0,
+    prior: float = 0.5,
+    seed: int = 0,
+    networks: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> Uncertainties:
+    """Say what each manoeuvre tells of damping, added mass and restoring when all three are uncertain.
+
+    Args:
+        model: a vehicle with its damping, as it really is.
+        manoeuvres: names of excitations.
+        runs: of each; the paper's input has no random part, so its runs are alike.
+        duration: of each run, s.
+        rate: samples per second.
+        prior: relative standard deviation of every coefficient beforehand; buoyancy and centre of gravity are
+            uncertain by their plausible scales.
+        seed: of the manoeuvres and of the networks.
+        networks: whether to train networks on each effect's trace as well, which takes most of the time.
+        progress: told in words what is being done.
+
+    Raises:
+        ConfigError: an option is out of range.
+    """
+    say = progress or (lambda words: None)
+    if not prior > 0:
+        raise ConfigError(f"prior={prior!r}: give a positive relative standard deviation")
+    vehicle = load(model) if isinstance(model, str) else model
+    logs = {}
+    for name in dict.fromkeys(manoeuvres):
+        how = {"runs": runs, "duration": duration, "rate": rate, "max_step": 0.025}
+        logs[name] = simulate(vehicle, name, "none", None, seed, **how).log
+    found: dict[str, dict[str, Any]] = {}
+    for name, log in logs.items():
+        say(f"{name}: what free running tells")
+        found[name] = information(vehicle, log, prior, networks)
+        shares: dict[str, Any] = {}
+        if networks:
+            # What was learned on the paper's single curve is held against a motion that goes everywhere.
+            other = logs.get("multisine") if name == "paper" else None
+            # All runs of the paper's input are the same; two of the others are enough to train on.
+            few = log.select([run.number for run in log.runs[: 1 if name == "paper" else 2]])
+            for effect in SWALLOWED:
+                if effect not in vehicle.effect_names:
+                    say(f"{name}: training networks on the trace of {effect}")
+                    shares[effect] = swallowed(vehicle, few, effect, seed, other)
+        found[name]["swallowed"] = shares
+    return Uncertainties(
+        vehicle.vehicle.name, prior, runs * duration, found, _metrics(found), list(vehicle.vehicle.warnings)
+    )
+
+
+def _listed(shares: Mapping[str, Any]) -> str:
+    rows = [(n, s["share"]) for n, s in shares.items() if s["share"] is not None]
+    return ", ".join(f"{100 * v:.0f} % of {n}" for n, v in sorted(rows, key=lambda r: -r[1]))
+
+
+def information(model: GreyBox, log: Log, prior: float, networks: bool = True) -> dict[str, Any]:
+    """Return standard errors, correlations and confused groups of all parameters on one log.
+
+    Args:
+        model: the vehicle with its damping.
+        log: noise-free, with accelerations.
+        prior: relative standard deviation of the coefficients beforehand.
+        networks: whether to work out as well what is left where the damping is six networks.
+    """
+    names = [n for group in GROUPS.values() for n in group if n not in model.effect_names]
+    layout = lay_out(model, names)
+    shots = Shots(layout.model, windows_for(model, log))
+    labels, before = _parameters(layout, names, prior)
+    total = shots.sums(layout.model, SIGMA, weights=False, names=names).hessian
+    total = total * before[:, None] * before  # in units of what was known before
+    alone = 1.0 / np.sqrt(np.diag(total) + 1.0)
+    covariance = np.linalg.inv(total + np.eye(len(before)))
+    joint = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(joint, joint)
+    open_ = _with_networks(model, log, [n for n in names if n not in GROUPS["damping"]], prior, networks)
+    rows = []
+    for k, (effect, name, unit) in enumerate(labels):
+        free = open_.get((effect, name))
+        near = int(np.argmax(np.abs(correlation[k] - np.eye(len(before))[k] * correlation[k])))
+        rows.append(
+            {
+                "effect": effect,
+                "parameter": name,
+                "unit": unit,
+                "prior_std": before[k],
+                "std_alone": alone[k] * before[k],
+                "std_together": joint[k] * before[k],
+                "alone_over_prior": alone[k],
+                "together_over_prior": joint[k],
+                "with_networks_over_prior": free,
+                "verdict": _verdict(alone[k], joint[k]),
+                "verdict_with_networks": None if free is None else _verdict(alone[k], free),
+                "most_like": f"{labels[near][0]} {labels[near][1]}",
+                "correlation": correlation[k, near],
+            }
+        )
+    pairs = [
+        {
+            "first": " ".join(labels[i][:2]),
+            "second": " ".join(labels[j][:2]),
+            "correlation": correlation[i, j],
+        }
+        for i in range(len(before))
+        for j in range(i)
+        if abs(correlation[i, j]) > CONFOUNDED
+    ]
+    of = {g: [k for k, (e, _, _) in enumerate(labels) if e in members] for g, members in GROUPS.items()}
+    return {
+        "parameters": rows,
+        "confounded_pairs": sorted(pairs, key=lambda p: -abs(p["correlation"])),
+        "groups": {g: _left(total, of, g) for g in GROUPS},
+        "condition_number": float(np.linalg.cond(total + np.eye(len(before)))),
+    }
+
+
+def _with_networks(
+    model: GreyBox, log: Log, names: Sequence[str], prior: float, wanted: bool
+) -> dict[tuple[str, str], float]:
+    """Return standard errors over the prior's where the damping is six networks of which nothing is known."""
+    if not wanted:
+        return {}
+    vehicle = replace(model.vehicle, damping_elements=(), linear_damping=None, quadratic_damping=None)
+    bare = GreyBox(vehicle, model.copied_effects(), None, model.actuation)
+    nu, target, _ = targets(bare, log, choose_derivative(log))
+    bank = DampingBank.from_description("mlp", 0)
+    fit_damping(bank, DampingProblem(torch.tensor(nu), torch.tensor(target)), scheme=SCHEME)
+    effects = [effect_class(n).build(vehicle, model.actuation) for n in names]
+    learned = GreyBox(vehicle, [*model.copied_effects(), *effects], bank, model.actuation)
+    shots = Shots(learned, windows_for(learned, log))
+    before = np.array(
+        [prior if p.null == 1.0 else p.scale for n in names for p in learned.effect(n).parameters_of]
+    )
+    total = shots.sums(learned, SIGMA, weights=True, names=names).hessian
+    k, free = len(before), np.concatenate([before, np.full(len(total) - len(before), WEIGHT)])
+    total = total * free[:, None] * free + np.eye(len(free))
+    std = np.sqrt(np.diag(np.linalg.inv(total))[:k])
+    labels = [(n, p.name) for n in names for p in learned.effect(n).parameters_of]
+    return dict(zip(labels, std.tolist(), strict=True))
+
+
+def _parameters(
+    layout: Layout, names: Sequence[str], prior: float
+) -> tuple[list[tuple[str, str, str]], Array]:
+    labels, before = [], []
+    for name in names:
+        for parameter in layout.model.effect(name).parameters_of:
+            labels.append((name, parameter.name, parameter.unit))
+            before.append(prior if parameter.null == 1.0 else parameter.scale)
+    return labels, np.array(before)
+
+
+def _verdict(alone: float, joint: float) -> str:
+    if joint < IDENTIFIED:
+        return "identified"
+    return "confounded" if alone < IDENTIFIED else "not excited"
+
+
+def _left(total: Array, of: Mapping[str, list[int]], group: str) -> dict[str, float]:
+    """Return the share of a group's information that is its own, and what each other group imitates of it."""
+    own = of[group]
+    whole = max(float(np.trace(total[np.ix_(own, own)])), 1e-300)
+
+    def imitated(others: list[int]) -> float:
+        cross = total[np.ix_(own, others)]
+        inner = total[np.ix_(others, others)] + np.eye(len(others))
+        return float(np.clip(np.trace(cross @ np.linalg.solve(inner, cross.T)) / whole, 0.0, 1.0))
+
+    rest = [k for name, columns in of.items() if name != group for k in columns]
+    return {"own": 1.0 - imitated(rest), **{n: imitated(c) for n, c in of.items() if n != group}}
+
+
+def swallowed(
+    model: GreyBox, log: Log, effect: str, seed: int = 0, elsewhere: Log | None = None
+) -> dict[str, Any]:
+    """Return the share of an effect's trace in a log that six networks of the velocity can be trained to give.
+
+    For each parameter the trace is the wrench that a model without it lacks, sample by sample; networks of the
+    paper's size are fitted to it, and the share is R2 in units of 5 N and 1 N m, without a mean taken off.
+
+    Args:
+        model: the vehicle with its damping.
+        log: noise-free, with accelerations.
+        effect: name.
+        seed: of the networks.
+        elsewhere: a log of another manoeuvre on which to judge the same networks.
+
+    Returns:
+        `share`, the mean over parameters that leave any trace; `each` of them; `elsewhere`, the share there.
+    """
+    trace, described = traces(model, log, choose_derivative(log), effect)
+    nu = np.concatenate([run.nu for run in log.runs])
+    far = None
+    if elsewhere is not None:
+        far = (
+            traces(model, elsewhere, choose_derivative(elsewhere), effect)[0],
+            np.concatenate([run.nu for run in elsewhere.runs]),
+        )
+    each, away = {}, {}
+    for k, parameter in enumerate(described):
+        wanted = trace[..., k] * parameter.scale
+        size = np.sqrt(np.mean((wanted / WRENCH) ** 2, axis=0))
+        # A trace below a hundredth of the largest in its wrench is integration error.
+        if not size.max() > 1e-4:
+            continue
+        bank = DampingBank.from_description("mlp", seed)
+        learned = np.where(size > 1e-6 * size.max(), wanted, 0.0)
+        fit_damping(bank, DampingProblem(torch.tensor(nu), torch.tensor(learned)), scheme=SCHEME, seed=seed)
+        each[parameter.name] = _share(bank, nu, wanted)
+        if far is not None:
+            away[parameter.name] = _share(bank, far[1], far[0][..., k] * parameter.scale)
+    return {
+        "share": float(np.mean(list(each.values()))) if each else None,
+        "each": each,
+        "elsewhere": float(np.median(list(away.values()))) if away else None,
+    }
+
+
+def _share(bank: DampingBank, nu: Array, wanted: Array) -> float:
+    with torch.no_grad():
+        given = bank(torch.tensor(nu)).numpy()
+    left = np.sum(((wanted - given) / WRENCH) ** 2)
+    return float(1.0 - left / np.sum((wanted / WRENCH) ** 2))
+
+
+def _metrics(found: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    out: dict[str, Any] = {}
+    for name, one in found.items():
+        for verdict in ("identified", "confounded", "not excited"):
+            key = f"{name}_{verdict.replace(' ', '_')}_parameters"
+            out[key] = sum(p["verdict"] == verdict for p in one["parameters"])
+        free = [
+            p["verdict_with_networks"] for p in one["parameters"] if p["verdict_with_networks"] is not None
+        ]
+        if free:
+            out[f"{name}_identified_beside_networks_parameters"] = free.count("identified")
+        out[f"{name}_confounded_pairs"] = len(one["confounded_pairs"])
+        out[f"{name}_condition_number"] = one["condition_number"]
+        for effect, share in one["swallowed"].items():
+            out[f"{name}_swallowed_share_{effect}"] = share["share"]
+    return out
