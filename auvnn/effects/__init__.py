@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from auvnn.catalogue import Catalogue
 
 if TYPE_CHECKING:
-    from auvnn.effects.base import Body, Effect, Moment, Parameter, Response, Sensed
+    from auvnn.effects.base import HOOKS, Body, Effect, Moment, Parameter, Response, Sensed
 
 EFFECTS = Catalogue(
     "effect",
@@ -16,10 +16,12 @@ EFFECTS = Catalogue(
         "added_mass": "auvnn.effects.added_mass:AddedMass",
         "linear_damping": "auvnn.effects.linear_damping:LinearDamping",
         "quadratic_damping": "auvnn.effects.quadratic_damping:QuadraticDamping",
+        "coupled_damping": "auvnn.effects.coupled_damping:CoupledDamping",
         "cg_offset": "auvnn.effects.cg_offset:CgOffset",
         "net_buoyancy": "auvnn.effects.net_buoyancy:NetBuoyancy",
         "thruster_gain": "auvnn.effects.thruster_gain:ThrusterGain",
         "thruster_lag": "auvnn.effects.thruster_lag:ThrusterLag",
+        "actuation_delay": "auvnn.effects.actuation_delay:ActuationDelay",
         "constant_force": "auvnn.effects.constant_force:ConstantForce",
         "velocity_lever_arm": "auvnn.effects.velocity_lever_arm:VelocityLeverArm",
     },
@@ -41,7 +43,7 @@ def effect_class(name: str) -> type[Effect]:
     return EFFECTS.get(name)
 
 
-__all__ = ["EFFECTS", "Body", "Effect", "Moment", "Parameter", "Response", "Sensed", "effect_class"]
+__all__ = ["EFFECTS", "HOOKS", "Body", "Effect", "Moment", "Parameter", "Response", "Sensed", "effect_class"]
 
 
 def __getattr__(name: str) -> Any:

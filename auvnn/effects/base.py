@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
@@ -88,6 +89,9 @@ class Moment:
         fins: fin angles, rad, (..., m), or None.
         voltage: V, (...), or None.
         altitude: m, (...), or None.
+        thrust: what the actuators give, N (or the wrench, where it is commanded), (..., n); in `wrench` only.
+        drag: everything that resists motion through the water, damping subnetworks included, as a wrench on
+            the body, N and N m, (..., 6); in `wrench` only.
     """
 
     time: Tensor
@@ -100,6 +104,8 @@ class Moment:
     fins: Tensor | None = None
     voltage: Tensor | None = None
     altitude: Tensor | None = None
+    thrust: Tensor | None = None
+    drag: Tensor | None = None
 
 
 @dataclass(frozen=True)
@@ -138,7 +144,8 @@ class Effect(nn.Module):
     is one question for all of them: how the residual changes with the parameters at the null.
 
     Hooks, along the signal path:
-        `command`: the commands of a whole stretch, before the thruster curves (dead band, delay).
+        `command`: the commands of a whole stretch, before the thruster curves (dead band).
+        `delay`: by how much the thrust comes late; at most one effect has it.
         `respond`: dynamics between the demanded and the actual thrust (lag); at most one effect has it.
         `thrust`: the thrust of each actuator (gain, voltage, loss by inflow).
         `water`: velocity and acceleration of the water, NED.
@@ -191,7 +198,21 @@ class Effect(nn.Module):
     @classmethod
     def build(cls, vehicle: Any, actuation: str, values: Mapping[str, float] | None = None) -> Effect:
         """Make the effect for a vehicle, at `values` and otherwise at the null."""
-        return cls(cls.describe(vehicle, actuation), values)
+        effect = cls(cls.describe(vehicle, actuation), values)
+        effect.settle(vehicle, actuation)
+        return effect
+
+    def settle(self, vehicle: Any, actuation: str) -> None:
+        """Keep (see `keep`) what the hooks need to know of the vehicle."""
+
+    def keep(self, name: str, value: Any) -> None:
+        """Keep known numbers as a buffer: they follow dtype and device, and are not part of the state."""
+        number = torch.tensor(np.array(value, dtype=np.float64))
+        self.register_buffer(name, number, persistent=False)
+
+    def kept(self, name: str) -> Tensor:
+        """Return a buffer."""
+        return self.get_buffer(name)
 
     def value(self, name: str) -> Tensor:
         """Return one parameter as a scalar tensor."""
@@ -209,6 +230,10 @@ class Effect(nn.Module):
     def command(self, command: Tensor, times: Tensor) -> Tensor:
         """Change the commands of a stretch: (..., T, n) held from `times` (..., T), to the same shape."""
         return command
+
+    def delay(self) -> Tensor:
+        """Return by how many seconds the thrust comes after its command, a scalar, not negative."""
+        return torch.zeros_like(self.theta[0])
 
     def respond(self, state: Tensor, demand: Tensor, step: Tensor) -> Response:
         """Return how the thrust goes from `state` under a constant demand over `step` seconds, (..., n).
@@ -240,7 +265,7 @@ class Effect(nn.Module):
         return sensed
 
 
-HOOKS = ("command", "respond", "thrust", "water", "body", "wrench", "sense")
+HOOKS = ("command", "delay", "respond", "thrust", "water", "body", "wrench", "sense")
 
 
 def axis_scale(factors: Tensor) -> Tensor:

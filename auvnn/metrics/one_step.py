@@ -188,7 +188,7 @@ class _Replay:
         with torch.no_grad():
             self.state = model.unsense(Sensed(eta[:, :3], eta[:, 3:], torch.tensor(np.nan_to_num(run.nu))))
             self.drive = model.actuators.drive(
-                self.inputs.command, self.times, model.using("command") + model.using("respond")
+                self.inputs.command, self.times, model.before_thrust
             )
 
     def accelerations(self, thrust: Callable[[Drive], torch.Tensor]) -> Array:

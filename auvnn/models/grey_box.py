@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from auvnn.effects import Body, Effect, Moment, Sensed, effect_class
+from auvnn.effects import HOOKS, Body, Effect, Moment, Sensed, effect_class
 from auvnn.errors import ConfigError
 from auvnn.models.actuators import Actuators
 from auvnn.models.inputs import Inputs
@@ -97,10 +97,7 @@ class GreyBox(nn.Module):
             if clash:
                 raise ConfigError(f"effects {effect.name} and {clash[0]} exclude each other: keep one")
         self.effects = nn.ModuleList(members)
-        self._by_hook = {
-            h: [e for e in members if h in e.hooks()]
-            for h in ("command", "respond", "thrust", "water", "body", "wrench", "sense")
-        }
+        self._by_hook = {h: [e for e in members if h in e.hooks()] for h in HOOKS}
         self.time_varying = any(e.time_varying for e in self._by_hook["body"])
         self._constants(vehicle)
 
@@ -139,6 +136,11 @@ class GreyBox(nn.Module):
     def using(self, hook: str) -> list[Effect]:
         """Return the effects that override a hook, in order of action."""
         return self._by_hook[hook]
+
+    @property
+    def before_thrust(self) -> list[Effect]:
+        """The effects that decide how thrust follows from commands over time, in order of action."""
+        return [e for hook in ("command", "delay", "respond") for e in self.using(hook)]
 
     @property
     def members(self) -> list[Effect]:
@@ -310,18 +312,7 @@ class GreyBox(nn.Module):
                 velocity, acceleration = velocity + more, acceleration + faster
             nu_c, nu_c_dot = water_velocity(rotation, nu[..., 3:], velocity, acceleration)
             nu_r = nu - nu_c
-            moment = Moment(
-                time,
-                position,
-                rotation,
-                nu,
-                nu_r,
-                nu_c_dot,
-                inputs.command,
-                inputs.fins,
-                inputs.voltage,
-                inputs.altitude,
-            )
+            moment = replace(moment, nu_r=nu_r, nu_c_dot=nu_c_dot)
         if prepared is None or self.time_varying:
             prepared = self.prepare(moment)
         body, terms = prepared.body, {}
@@ -357,6 +348,9 @@ class GreyBox(nn.Module):
                 self._known("fin_stall"),
                 float(self.vehicle.water_density),
             )
+        if self.using("wrench"):
+            drag = [terms[name] for name in DRAG_TERMS if name in terms]
+            moment = replace(moment, thrust=thrust, drag=sum(drag, torch.zeros_like(nu)))
         for effect in self.using("wrench"):
             terms[str(effect.name)] = effect.wrench(moment, body)
         return terms, prepared

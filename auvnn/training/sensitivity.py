@@ -96,7 +96,7 @@ class _Thrust(nn.Module):
         drive = model.actuators.drive(
             windows.inputs.command,
             windows.times,
-            model.using("command") + model.using("respond"),
+            model.before_thrust,
             substeps,
             windows.warmup,
         )
@@ -204,7 +204,7 @@ def _thrusts(
     module, substeps = _Thrust(model), _substeps(windows)
     with torch.no_grad():
         mean, start = module(windows, substeps)
-    acting = {id(e) for hook in ("command", "respond") for e in model.using(hook)}
+    acting = {id(e) for e in model.before_thrust}
     keys = [k for k in thetas if id(model.members[int(k.split(".")[2])]) in acting]
     if not keys:
         return mean, start, None, None
