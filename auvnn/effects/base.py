@@ -28,6 +28,8 @@ class Parameter:
         low: smallest admissible value.
         high: largest admissible value.
         probes: values at which to linearise instead, where the slope at the null says nothing.
+        shape: whether it says how the effect acts and not how much (an onset, a frequency, a place): with all
+            others at their nulls the effect vanishes whatever its value, so that nothing tells it there.
     """
 
     name: str
@@ -37,6 +39,24 @@ class Parameter:
     low: float
     high: float
     probes: tuple[float, ...] = ()
+    shape: bool = False
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How far a log reaches: what the starting values of shapes depend on.
+
+    Attributes:
+        begin: earliest time, s.
+        duration: from there to the latest time, s.
+        longest: duration of the longest run, s.
+        distance: median and largest distance from the origin of the positions, m; zeros without positions.
+    """
+
+    begin: float
+    duration: float
+    longest: float
+    distance: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -213,6 +233,20 @@ class Effect(nn.Module):
     def kept(self, name: str) -> Tensor:
         """Return a buffer."""
         return self.get_buffer(name)
+
+    @classmethod
+    def lacks(cls, vehicle: Any, actuation: str) -> tuple[str, ...]:
+        """Return what a vehicle's model file does not state and the effect cannot do without, in words."""
+        return ()
+
+    @classmethod
+    def starts(cls, parameters: tuple[Parameter, ...], extent: Extent) -> list[dict[str, float]]:
+        """Return values of shape parameters at which to ask whether the effect is there; by default the nulls.
+
+        At each of them the effect must still vanish exactly while all other parameters are at their nulls.
+        The test is corrected for taking the best of them.
+        """
+        return [{}]
 
     def value(self, name: str) -> Tensor:
         """Return one parameter as a scalar tensor."""
