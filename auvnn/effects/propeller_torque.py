@@ -43,7 +43,9 @@ class PropellerTorque(Effect):
         if actuation == "wrench":
             columns[3, 0] = -1.0 if sum(senses) < 0 else 1.0
         else:
-            columns[3:] = np.array([h * u.direction for h, u in zip(senses, vehicle.thrusters, strict=True)]).T
+            columns[3:] = np.array(
+                [h * u.direction for h, u in zip(senses, vehicle.thrusters, strict=True)]
+            ).T
         self.keep("columns", columns)
 
     def wrench(self, moment: Moment, body: Body) -> Tensor:

@@ -39,7 +39,9 @@ class ThrustInflowLoss(Effect):
         if actuation == "wrench":
             columns, full = np.diag([1.0, 1, 1, 0, 0, 0]), full_wrench(vehicle)
         else:
-            columns = np.array([[*u.direction, *np.cross(u.position, u.direction)] for u in vehicle.thrusters])
+            columns = np.array(
+                [[*u.direction, *np.cross(u.position, u.direction)] for u in vehicle.thrusters]
+            )
             full = np.ones(len(columns))
         self.keep("columns", columns)
         self.keep("full", full)
