@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.effects import effect_class
+from auvnn.effects import Parameter, effect_class
 from auvnn.models import GreyBox
 from auvnn.training.prediction_error import Priors
 
@@ -19,6 +19,7 @@ GROUPS = ("added_mass", "linear_damping", "quadratic_damping", "inertia")
 # An effect that is already part of the model was fitted or stated: it may move by its plausible scale.
 # A candidate is all but free, so that its prior neither pulls the estimate nor leaves it without bound.
 FREE = 10.0
+SHAPELESS = 1e4
 # A parameter whose standard error the log brings down by less than this share of its prior's is not determined.
 DETERMINED = 0.99
 
@@ -40,6 +41,13 @@ class Layout:
     columns: dict[str, NDArray[np.int64]]
     nuisance: tuple[str, ...]
     means: dict[str, Array]
+
+    def described(self, name: str) -> tuple[Parameter, ...]:
+        """Return the parameters of an effect, or of one of its stand-ins, `name@number`."""
+        effect, _, number = name.partition("@")
+        whole = self.model.effect(effect).parameters_of
+        size = len(self.columns[name])
+        return whole[size * int(number) : size * (int(number) + 1)] if number else whole
 
     def of(self, names: Sequence[str]) -> NDArray[np.int64]:
         """Return the columns of several effects, joined."""
@@ -94,12 +102,19 @@ def priors(layout: Layout, names: Sequence[str], free: Sequence[str] = ()) -> Pr
         if name in uncertain and name not in free:
             precision.append((uncertain[name] * np.maximum(np.abs(stated_values), 1e-3)) ** -2)
         else:
-            precision.append((FREE * scales(layout, name)) ** -2)
+            # A shape's null is only a place to start from: an onset may be anywhere in the log.
+            reach = np.where(shapes(layout, name), SHAPELESS, FREE)
+            precision.append((reach * scales(layout, name)) ** -2)
     return Priors(
         np.concatenate(mean) if mean else np.zeros(0), np.concatenate(precision) if mean else np.zeros(0)
     )
 
 
+def shapes(layout: Layout, name: str) -> NDArray[np.bool_]:
+    """Return which of an effect's parameters are shapes, (p,)."""
+    return np.array([p.shape for p in layout.described(name)])
+
+
 def scales(layout: Layout, name: str) -> Array:
     """Return the plausible departure of an effect's parameters from their nulls, (p,)."""
-    return np.array([p.scale for p in layout.model.effect(name).parameters_of])
+    return np.array([p.scale for p in layout.described(name)])

@@ -101,7 +101,8 @@ def score(
     by_window, gradient, information = project(statistics, layout, base, effect, free)
     factor = inflation(by_window, information, statistics.run)
     scale = scales(layout, effect)
-    now = parameters_of(layout.model, [effect])
+    # A stand-in is at its null, which the layout knows.
+    now = layout.means[effect] if "@" in effect else parameters_of(layout.model, [effect])
     # Work in units of the plausible scale, so that one threshold tells what the log says nothing about.
     values, vectors = np.linalg.eigh(information * scale[:, None] * scale)
     seen = values > max(TINY * values.max(initial=0.0), BLIND)

@@ -252,6 +252,12 @@ class Effect(nn.Module):
         """Return one parameter as a scalar tensor."""
         return self.theta[self._index[name]]
 
+    def absent(self) -> bool:
+        """Return whether the effect is at its null, whatever its shape, and so does nothing."""
+        null = torch.tensor([p.null for p in self.parameters_of], dtype=torch.float64)
+        shape = torch.tensor([p.shape for p in self.parameters_of])
+        return bool((shape | (self.theta.detach().cpu().double() == null)).all())
+
     def values(self) -> dict[str, float]:
         """Return the parameters by name."""
         return {p.name: float(v) for p, v in zip(self.parameters_of, self.theta.detach(), strict=True)}

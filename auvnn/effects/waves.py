@@ -45,14 +45,14 @@ class Waves(Effect):
 
     @classmethod
     def starts(cls, parameters: tuple[Parameter, ...], extent: Extent) -> list[dict[str, float]]:
-        """Return frequencies as close as the longest run resolves, each in two phases and four directions."""
+        """Return frequencies as close as the longest run resolves, each in two phases and three directions."""
         count = math.ceil((FASTEST - SLOWEST) * extent.longest / (2 * math.pi)) + 1
         step = (FASTEST - SLOWEST) / (min(max(count, 6), MOST) - 1)
         return [
-            {"omega": SLOWEST + k * step, "phase": phase, "direction": turn * math.pi / 2}
+            {"omega": SLOWEST + k * step, "phase": phase, "direction": turn * 2 * math.pi / 3}
             for k in range(min(max(count, 6), MOST))
             for phase in (0.0, math.pi / 2)
-            for turn in range(4)
+            for turn in range(3)
         ]
 
     def settle(self, vehicle: Any, actuation: str) -> None:

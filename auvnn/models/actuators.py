@@ -192,7 +192,10 @@ def _delayed(plain: Drive, signal: ThrustSignal, delay: Tensor, substeps: int, w
     """Return the drive that comes `delay` seconds later; without delay it is `plain` to the last bit."""
     times = signal.times[..., warmup:]
     rows = times.shape[-1]
-    steps = torch.cat([times[..., 1:] - times[..., :-1], torch.ones_like(times[..., :1])], dim=-1) / substeps
+    steps = times[..., 1:] - times[..., :-1]
+    # The last row is held for no time: a step like the one before stands in for it.
+    last = steps[..., -1:] if rows > 1 else torch.ones_like(times)
+    steps = torch.cat([steps, last], dim=-1) / substeps
     begin = times.unsqueeze(-1) + steps.unsqueeze(-1) * torch.arange(substeps, device=times.device)
     begin, length = begin.flatten(-2), steps.repeat_interleave(substeps, dim=-1)
     longest = 1.0 if times.is_meta else float(steps.max())

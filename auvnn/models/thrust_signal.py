@@ -24,7 +24,7 @@ class ThrustSignal:
     def __init__(self, demand: Tensor, state: Tensor, times: Tensor, lag: Effect | None) -> None:
         """Keep the pieces; times in double precision, because differences of them are what counts."""
         self.demand, self.gap, self.lag = demand, state - demand, lag
-        self.times = times.detach().double().expand(demand.shape[:-1]).contiguous()
+        self.times = _rising(times.detach().double().expand(demand.shape[:-1]).contiguous())
         ends = torch.full_like(self.times[..., :1], torch.inf)
         self.ends = torch.cat([self.times[..., 1:], ends], dim=-1)
 
@@ -112,3 +112,13 @@ class ThrustSignal:
             lean = step * step * gap * left.slope / 12.0
         area = step * mean
         return area, 0.5 * step * area + lean
+
+
+def _rising(times: Tensor) -> Tensor:
+    """Return times (..., T) whose repeated last rows, the padding of a short window, go on rising."""
+    steps = times[..., 1:] - times[..., :-1]
+    if times.is_meta or times.shape[-1] < 2 or bool((steps > 0).all()):
+        return times
+    usual = steps.amax().clamp_min(1e-3)
+    more = torch.cumsum(torch.where(steps > 0, torch.zeros_like(steps), usual), dim=-1)
+    return torch.cat([times[..., :1], times[..., 1:] + more], dim=-1)

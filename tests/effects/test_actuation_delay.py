@@ -88,3 +88,16 @@ def test_the_slope_at_the_null_is_that_of_a_short_delay(plain):
     speed = after_step(model).nu[-1, 0]
     (slope,) = torch.autograd.grad(speed, model.effects[0].theta)
     assert slope.item() == pytest.approx(-FORCE / MASS, 1e-12)
+
+
+def test_a_window_padded_with_its_last_row_is_that_window(plain):
+    """Rows repeated at an unchanged time, as shorter windows have them, are no motion and no fault."""
+    model = plain({"actuation_delay": {"delay": 0.13}, "thruster_lag": {"time_constant": 0.1}})
+    times = torch.tensor([0.0, 0.1, 0.2, 0.3, 0.3, 0.3], dtype=torch.float64)
+    commands = torch.zeros(6, 6, dtype=torch.float64)
+    commands[1:, 0] = FORCE
+    zero = torch.zeros(6, dtype=torch.float64)
+    padded = model.rollout(zero, zero, commands, times).nu
+    whole = model.rollout(zero, zero, commands[:4], times[:4]).nu
+    torch.testing.assert_close(padded[:4], whole, rtol=1e-12, atol=1e-15)
+    torch.testing.assert_close(padded[4:], whole[3:].expand(2, 6), rtol=1e-12, atol=1e-15)
