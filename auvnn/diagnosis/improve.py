@@ -16,7 +16,7 @@ from auvnn.diagnosis.compare import stitch
 from auvnn.diagnosis.diagnose import windows_for
 from auvnn.diagnosis.explain import Explanation, determined, explain, standard_errors
 from auvnn.diagnosis.nuisance import lay_out
-from auvnn.effects import EFFECTS
+from auvnn.effects import effect_class
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log
 from auvnn.logs.overlap import leakage
@@ -146,7 +146,8 @@ def add(
     accepted = bool(np.isfinite(gain) and gain > std)
     waterfall = [{"step": s, "error": results[s]["rollout"][key]["total"]} for s, _ in models]
     waterfall.append({"step": "noise floor", "error": noise_floor(final, rolled[last][key], test, scale)})
-    warnings = [*silent, *_warnings(layout, best, accepted, gain, std)]
+    said = [w for w in (final.effect(n).words() for n in names) if w]
+    warnings = [*said, *silent, *_warnings(layout, best, accepted, gain, std)]
     if key != "5":
         warnings.append(f"no held-out stretch is 5 s long: gain and waterfall are for horizon {key}")
     return Improvement(
@@ -184,7 +185,7 @@ def _check(model: GreyBox, names: list[str]) -> None:
     if not names:
         raise ConfigError("no effect to add: name one, for example effect=ocean_current")
     for name in names:
-        EFFECTS.get(name)
+        effect_class(name)
         if names.count(name) > 1:
             raise ConfigError(f"effect {name} is named twice: name it once")
         if name in model.effect_names:
@@ -269,11 +270,13 @@ def _silent(layout: Any, found: Explanation, names: Sequence[str], log: Log) -> 
         at += size
         if name not in names or known.all():
             continue
-        labels = ", ".join(
+        dark = [
             f"{name}.{p.name}"
             for p, k in zip(layout.model.effect(name).parameters_of, known, strict=True)
             if not k
-        )
+        ]
+        more = f" and {len(dark) - 8} more" if len(dark) > 8 else ""
+        labels = ", ".join(dark[:8]) + more
         if not known.any():
             raise InputError(
                 f"{log.name} says nothing about {labels}: nothing in it depends on them; fit on a log "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
 from auvnn.catalogue import Catalogue
@@ -51,7 +52,10 @@ EFFECTS = Catalogue(
 )
 
 # Known, so that a model that holds one can be saved and loaded, but not offered as a name for what is missing.
-_UNOFFERED = {"inertia": "auvnn.effects.inertia_factors:InertiaFactors"}
+_UNOFFERED = {
+    "inertia": "auvnn.effects.inertia_factors:InertiaFactors",
+    "residual_force": "auvnn.effects.residual_force:ResidualForce",
+}
 
 
 def effect_class(name: str) -> type[Effect]:
@@ -61,7 +65,8 @@ def effect_class(name: str) -> type[Effect]:
         ConfigError: there is no such effect.
     """
     if name in _UNOFFERED:
-        return Catalogue("effect", _UNOFFERED, "auvnn.unoffered_effects").get(name)
+        module, _, attribute = _UNOFFERED[name].partition(":")
+        return getattr(importlib.import_module(module), attribute)
     return EFFECTS.get(name)
 
 

@@ -258,6 +258,10 @@ class Effect(nn.Module):
         shape = torch.tensor([p.shape for p in self.parameters_of])
         return bool((shape | (self.theta.detach().cpu().double() == null)).all())
 
+    def words(self) -> str:
+        """Return what the effect has to say of itself once it is fitted, beyond its parameters; or nothing."""
+        return ""
+
     def values(self) -> dict[str, float]:
         """Return the parameters by name."""
         return {p.name: float(v) for p, v in zip(self.parameters_of, self.theta.detach(), strict=True)}

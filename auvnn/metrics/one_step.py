@@ -179,8 +179,8 @@ class _Replay:
         self.inputs = Inputs(
             torch.tensor(np.where(np.expand_dims(known, 1), command, 0.0)),
             tensor(run.fins),
-            tensor(run.voltage),
-            tensor(run.altitude),
+            tensor(run.filled("voltage")),
+            tensor(run.filled("altitude")),
         )
         self.times = torch.tensor(run.t)
         # A missing position or attitude must not make the rest of the row a missing number.

@@ -98,6 +98,8 @@ class GreyBox(nn.Module):
                 raise ConfigError(f"effects {effect.name} and {clash[0]} exclude each other: keep one")
         self.effects = nn.ModuleList(members)
         self._by_hook = {h: [e for e in members if h in e.hooks()] for h in HOOKS}
+        # Depth of a flat bottom, m: gives the altitude to a simulated vehicle that has no altimeter to go by.
+        self.bottom: float | None = None
         self.time_varying = any(e.time_varying for e in self._by_hook["body"])
         self._constants(vehicle)
 
@@ -302,6 +304,9 @@ class GreyBox(nn.Module):
         time: Tensor,
         prepared: Prepared | None,
     ) -> tuple[dict[str, Tensor], Prepared]:
+        altitude = inputs.altitude
+        if altitude is None and self.bottom is not None:
+            altitude = self.bottom - position[..., 2]
         moment = Moment(
             time,
             position,
@@ -312,7 +317,7 @@ class GreyBox(nn.Module):
             inputs.command,
             inputs.fins,
             inputs.voltage,
-            inputs.altitude,
+            altitude,
         )
         nu_r, moving = nu, self.using("water")
         if moving:
