@@ -16,6 +16,7 @@ from auvnn.diagnosis.compare import stitch
 from auvnn.diagnosis.diagnose import windows_for
 from auvnn.diagnosis.explain import Explanation, determined, explain, standard_errors
 from auvnn.diagnosis.nuisance import lay_out
+from auvnn.diagnosis.probes import start_at
 from auvnn.effects import effect_class
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log
@@ -123,7 +124,10 @@ def add(
     models, fits = [("as given", model), ("coefficients refitted", baked(model, layout, nothing))], [nothing]
     for count in range(1, len(names) + 1):
         say(f"fitting with {', '.join(names[:count])}")
-        found = explain(layout, windows, base, names[:count], start=fits[-1].fitted)
+        # Where a shape is asked for, its null is no place to start from.
+        shaped = any(p.shape for p in layout.model.effect(names[count - 1]).parameters_of)
+        guess = start_at(layout, windows, fits[-1], base, names[count - 1]) if shaped else None
+        found = explain(layout, windows, base, names[:count], start=fits[-1].fitted, guess=guess)
         fits.append(found)
         models.append((names[count - 1], baked(model, layout, found)))
     final, best = models[-1][1], fits[-1]

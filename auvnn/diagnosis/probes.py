@@ -20,14 +20,32 @@ from scipy.special import logsumexp
 from torch import Tensor, nn
 from torch.func import functional_call, vmap
 
+from auvnn.diagnosis.explain import Explanation
 from auvnn.diagnosis.nuisance import Layout
 from auvnn.diagnosis.score import Score, score
 from auvnn.effects import Body, Effect, Extent, Moment, Sensed, effect_class
 from auvnn.metrics.windows import POSITION, Windows
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import Statistics
+from auvnn.training.prediction_error import Statistics, answers, reduce, set_parameters
 
 Array = NDArray[np.float64]
+
+
+def start_at(layout: Layout, windows: Windows, found: Explanation, base: Sequence[str], name: str) -> Layout:
+    """Return the layout at a fit, with an effect that is still absent set to the best of its shapes."""
+    model = layout.model.rebuilt(layout.model.copied_effects())
+    set_parameters(model, found.names, found.fitted.theta)
+    at = replace(layout, model=model)
+    asked = probed(at, [name], extent_of(windows))
+    held = [*base, *(e for e in found.effects if e not in base)]
+    sums, _, _ = reduce(
+        windows,
+        answers(asked.layout.model, windows, found.fitted.initial, asked.layout.model.effect_names),
+        found.fitted.sigma,
+    )
+    best, _ = asked.score(sums, held, name, found.effects)
+    set_parameters(model, [name], best.estimate)
+    return at
 
 
 def extent_of(windows: Windows) -> Extent:
@@ -156,7 +174,8 @@ class Probed:
         if name not in self.starts:
             return score(statistics, self.layout, base, name, free), name
         found = {s: score(statistics, self.layout, base, s, free) for s in self.starts[name]}
-        best = max(found, key=lambda s: (found[s].degrees > 0, found[s].evidence))
+        # The best shape is the likeliest; its own scores' variance says how sure it is, not which it is.
+        best = max(found, key=lambda s: (found[s].degrees > 0, found[s].gain - found[s].degrees))
         return self._whole(name, found[best], self.starts[name][best], list(found.values())), best
 
     def _whole(self, name: str, best: Score, shape: dict[str, float], all_of_them: list[Score]) -> Score:

@@ -38,7 +38,7 @@ class Waves(Effect):
         """Return amplitude, angular frequency, phase and direction."""
         return (
             Parameter("amplitude", "m", 0.0, 0.3, -10.0, 10.0),
-            Parameter("omega", "1/s", 0.9, 0.3, 0.05, 10.0, shape=True),
+            Parameter("omega", "rad/s", 0.9, 0.3, 0.05, 10.0, shape=True),
             Parameter("phase", "rad", 0.0, 1.0, -50.0, 50.0, shape=True),
             Parameter("direction", "rad", 0.0, 1.0, -50.0, 50.0, shape=True),
         )
