@@ -109,9 +109,9 @@ class StandIns(Effect):
         self.theta = nn.Parameter(start[:, live].flatten())
         # The hooks that are not touched must cost nothing here either.
         self._touched = tuple(h for h in kind.hooks() if h in self.HOOKS)
-        self.__class__ = type(
-            f"{kind.__name__}StandIns", (StandIns,), {h: getattr(StandIns, f"_{h}") for h in self._touched}
-        )
+        hooks = {h: getattr(StandIns, f"_{h}") for h in self._touched}
+        made = type(f"{kind.__name__}StandIns", (StandIns,), hooks)
+        self.__class__ = made  # pyright: ignore[reportAttributeAccessIssue]
 
     def _shapes(self) -> Tensor:
         """Return all parameters of all stand-ins, (S, p)."""
