@@ -26,7 +26,7 @@ def _run(job: Job) -> Answering:
     made = simulate(
         model, job["excitation"], job["noise"], hidden, job["seed"],
         runs=job["runs"], duration=job["duration"], rate=job["rate"], coefficients=job["coefficients"],
-        actuation=job["actuation"], accelerations=job["accelerations"], max_step=job["max_step"],
+        actuation=job["actuation"], accelerations=job["accelerations"], max_step=job["max_step"], bottom=job["bottom"],
     )  # fmt: skip
     made.log.write(job.folder / "log.parquet")
     truth = _Truth(made.truth)

@@ -13,8 +13,9 @@ from auvnn.answers import Answer
 from auvnn.diagnosis.advise import advise
 from auvnn.diagnosis.explain import Explanation, explain, standard_errors, weigh
 from auvnn.diagnosis.nuisance import Layout, lay_out, stated
+from auvnn.diagnosis.probes import Probed, extent_of, probed
 from auvnn.diagnosis.residual_tests import residual_tests
-from auvnn.diagnosis.score import Score, inflation, score, similarity
+from auvnn.diagnosis.score import Score, inflation, similarity
 from auvnn.diagnosis.unknown import depends_on
 from auvnn.effects import EFFECTS
 from auvnn.errors import ConfigError, InputError
@@ -118,6 +119,7 @@ def candidates_for(
     for name in names:
         kind = EFFECTS.get(name)
         absent = [c for c in kind.channels if not _has(log, c)]
+        absent += kind.lacks(model.vehicle, model.actuation)
         needs[name] = absent
         if not absent and (name not in model.effect_names):
             usable.append(name)
@@ -224,17 +226,20 @@ class _Search:
         self.base = [n for n in layout.names if n not in usable or n in layout.nuisance]
         self.floor = TRUST * motion(windows) + 1e-9
         self.silent: list[str] = []
+        self.extent = extent_of(windows)
 
-    def statistics(self, found: Explanation) -> tuple[Statistics, Layout]:
-        """Linearise towards every parameter at a fit."""
+    def statistics(self, found: Explanation, remaining: list[str]) -> tuple[Statistics, Layout, Probed]:
+        """Linearise towards every parameter at a fit, those of the remaining effects at several shapes."""
         model = self.layout.model.rebuilt(self.layout.model.copied_effects())
         set_parameters(model, found.names, found.fitted.theta)
+        at = replace(self.layout, model=model)
+        asked = probed(at, remaining, self.extent)
         sums, _, _ = reduce(
             self.windows,
-            answers(model, self.windows, found.fitted.initial, self.layout.names),
+            answers(asked.layout.model, self.windows, found.fitted.initial, asked.layout.model.effect_names),
             found.fitted.sigma,
         )
-        return sums, replace(self.layout, model=model)
+        return sums, at, asked
 
     def run(self, model: GreyBox, log: Log, needs: dict[str, list[str]], most: int) -> Diagnosis:
         """Search for one effect after the other."""
@@ -248,13 +253,14 @@ class _Search:
         while True:
             remaining = [n for n in self.usable if n not in chosen]
             self.say(f"testing {len(remaining)} effects at the null")
-            sums, at = self.statistics(current)
+            sums, at, asked = self.statistics(current, remaining)
             base = [*self.base, *[c for c in chosen if c not in self.base]]
-            scores = {n: score(sums, at, base, n, chosen) for n in remaining}
+            asked_at = {n: asked.score(sums, base, n, chosen) for n in remaining}
+            scores = {n: found for n, (found, _) in asked_at.items()}
             p_value = _together([s.p_value for s in scores.values() if s.degrees])
             if not table:
                 global_p = p_value
-                similar = (remaining, similarity(sums, at, base, remaining))
+                similar = (remaining, similarity(sums, asked.layout, base, [k for _, k in asked_at.values()]))
                 table = self._table(scores, current, similar, needs)
                 self.silent = [n for n in remaining if not scores[n].degrees]
             missing_something = p_value < ALPHA

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.nuisance import DETERMINED, Layout, priors, scales, stated
+from auvnn.diagnosis.nuisance import DETERMINED, Layout, priors, scales, shapes, stated
 from auvnn.diagnosis.score import inflation
 from auvnn.metrics.windows import Windows
 from auvnn.training.prediction_error import Fitted, Priors, Statistics, fit
@@ -140,6 +140,8 @@ def weigh(layout: Layout, explanation: Explanation, factor: float) -> Explanatio
     # With nothing uncertain and nothing asked for, there is nothing to weigh but the data.
     size = np.concatenate([np.zeros(0), *prior])
     away = (fitted.theta - np.concatenate([np.zeros(0), *means])) / size
+    # Where it begins and how often it swings is as likely in one place as in another.
+    away[np.concatenate([np.zeros(0, dtype=bool), *(shapes(layout, n) for n in explanation.names)])] = 0.0
     data = float(fitted.statistics.cost.sum()) / factor
     information = fitted.statistics.hessian.sum(0) * size[:, None] * size / factor
     volume = np.linalg.slogdet(information + np.eye(len(size)))[1]

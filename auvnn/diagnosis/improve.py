@@ -18,7 +18,8 @@ from auvnn.diagnosis.diagnose import windows_for
 from auvnn.diagnosis.explain import Explanation, determined, explain, standard_errors
 from auvnn.diagnosis.nuisance import Layout, lay_out
 from auvnn.diagnosis.one_step_fit import explain_one_step, left_out_gain
-from auvnn.effects import EFFECTS
+from auvnn.diagnosis.probes import start_at
+from auvnn.effects import effect_class
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log
 from auvnn.logs.overlap import leakage
@@ -26,11 +27,10 @@ from auvnn.metrics.noise import attitude_noise, white
 from auvnn.metrics.one_step import choose_derivative, one_step, scores
 from auvnn.metrics.rollouts import HORIZONS, Rolled, Scale, scale_of, table
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import Fitted
 
 Array = NDArray[np.float64]
 # Layout, effects that are free anyway, effects asked for, the fit to start from.
-Fit = Callable[[Layout, Sequence[str], Sequence[str], Fitted | None], Explanation]
+Fit = Callable[[Layout, Sequence[str], Sequence[str], Explanation | None], Explanation]
 BLOCKS = 20
 OBJECTIVES = ("rollout", "one_step")
 
@@ -153,7 +153,7 @@ def add(
     models, fits = [("as given", model), ("coefficients refitted", baked(model, layout, nothing))], [nothing]
     for count in range(1, len(names) + 1):
         say(f"fitting with {', '.join(names[:count])}")
-        found = fit(layout, base, names[:count], fits[-1].fitted)
+        found = fit(layout, base, names[:count], fits[-1])
         fits.append(found)
         models.append((names[count - 1], baked(model, layout, found)))
     final, best = models[-1][1], fits[-1]
@@ -178,7 +178,8 @@ def add(
     accepted = bool(np.isfinite(gain) and gain > std)
     waterfall = [{"step": s, "error": results[s]["rollout"][key]["total"]} for s, _ in models]
     waterfall.append({"step": "noise floor", "error": noise_floor(final, rolled[last][key], test, scale)})
-    warnings = [*log.quality().reservations, *silent, *_warnings(layout, best, accepted, gain, std)]
+    said = [w for w in (final.effect(n).words() for n in names) if w]
+    warnings = [*log.quality().reservations, *said, *silent, *_warnings(layout, best, accepted, gain, std)]
     if key != "5":
         warnings.append(f"no held-out stretch is 5 s long: gain and waterfall are for horizon {key}")
     return Improvement(
@@ -227,19 +228,41 @@ def add(
 
 def _by_windows(model: GreyBox, log: Log, window: float | None) -> Fit:
     windows = windows_for(model, log, window)
-    return lambda layout, base, effects, start: explain(layout, windows, base, effects, start=start)
+
+    def fit(
+        layout: Layout, base: Sequence[str], effects: Sequence[str], before: Explanation | None
+    ) -> Explanation:
+        # Where a shape is asked for, its null is no place to start from.
+        shaped = bool(effects) and any(p.shape for p in layout.model.effect(effects[-1]).parameters_of)
+        guess = start_at(layout, windows, before, base, effects[-1]) if before and shaped else None
+        start = None if before is None else before.fitted
+        return explain(layout, windows, base, effects, start=start, guess=guess)
+
+    return fit
 
 
 def _by_one_step(log: Log, derivative: dict[str, Any] | None) -> Fit:
     how = choose_derivative(log, derivative)
-    return lambda layout, base, effects, start: explain_one_step(layout, log, base, effects, how, start=start)
+
+    def fit(
+        layout: Layout, base: Sequence[str], effects: Sequence[str], before: Explanation | None
+    ) -> Explanation:
+        for name in effects:
+            if any(p.shape for p in layout.model.effect(name).parameters_of):
+                raise ConfigError(
+                    f"{name} has a time or a shape to be found, which objective=one_step cannot: take objective=rollout"
+                )
+        start = None if before is None else before.fitted
+        return explain_one_step(layout, log, base, effects, how, start=start)
+
+    return fit
 
 
 def _check(model: GreyBox, names: list[str]) -> None:
     if not names:
         raise ConfigError("no effect to add: name one, for example effect=ocean_current")
     for name in names:
-        EFFECTS.get(name)
+        effect_class(name)
         if names.count(name) > 1:
             raise ConfigError(f"effect {name} is named twice: name it once")
         if name in model.effect_names:
@@ -324,11 +347,13 @@ def _silent(layout: Any, found: Explanation, names: Sequence[str], log: Log) -> 
         at += size
         if name not in names or known.all():
             continue
-        labels = ", ".join(
+        dark = [
             f"{name}.{p.name}"
             for p, k in zip(layout.model.effect(name).parameters_of, known, strict=True)
             if not k
-        )
+        ]
+        more = f" and {len(dark) - 8} more" if len(dark) > 8 else ""
+        labels = ", ".join(dark[:8]) + more
         if not known.any():
             raise InputError(
                 f"{log.name} says nothing about {labels}: nothing in it depends on them; fit on a log "

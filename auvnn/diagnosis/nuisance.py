@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.effects import effect_class
+from auvnn.effects import Parameter, effect_class
 from auvnn.models import GreyBox
 from auvnn.training.prediction_error import Priors
 
@@ -22,6 +22,7 @@ FREE = 10.0
 # What is merely uncertain stays within this many of its stated standard deviations. Without that limit a stated
 # coefficient takes on absurd values to imitate what is missing, and the missing effect finds nothing left to explain.
 REACH = 4.0
+SHAPELESS = 1e4
 # A parameter whose standard error the log brings down by less than this share of its prior's is not determined.
 DETERMINED = 0.99
 
@@ -43,6 +44,13 @@ class Layout:
     columns: dict[str, NDArray[np.int64]]
     nuisance: tuple[str, ...]
     means: dict[str, Array]
+
+    def described(self, name: str) -> tuple[Parameter, ...]:
+        """Return the parameters of an effect, or of one of its stand-ins, `name@number`."""
+        effect, _, number = name.partition("@")
+        whole = self.model.effect(effect).parameters_of
+        size = len(self.columns[name])
+        return whole[size * int(number) : size * (int(number) + 1)] if number else whole
 
     def of(self, names: Sequence[str]) -> NDArray[np.int64]:
         """Return the columns of several effects, joined."""
@@ -99,11 +107,18 @@ def priors(layout: Layout, names: Sequence[str], free: Sequence[str] = ()) -> Pr
             precision.append(spread**-2)
             reach.append(REACH * spread)
         else:
-            precision.append((FREE * scales(layout, name)) ** -2)
+            # A shape's null is only a place to start from: an onset may be anywhere in the log.
+            loose = np.where(shapes(layout, name), SHAPELESS, FREE)
+            precision.append((loose * scales(layout, name)) ** -2)
             reach.append(np.full(len(stated_values), np.inf))
     return Priors(np.concatenate(mean), np.concatenate(precision), np.concatenate(reach))
 
 
+def shapes(layout: Layout, name: str) -> NDArray[np.bool_]:
+    """Return which of an effect's parameters are shapes, (p,)."""
+    return np.array([p.shape for p in layout.described(name)])
+
+
 def scales(layout: Layout, name: str) -> Array:
     """Return the plausible departure of an effect's parameters from their nulls, (p,)."""
-    return np.array([p.scale for p in layout.model.effect(name).parameters_of])
+    return np.array([p.scale for p in layout.described(name)])

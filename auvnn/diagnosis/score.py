@@ -78,10 +78,30 @@ def project(
     return by_window, gradient, 0.5 * (information + information.T)
 
 
-def inflation(by_window: Array, information: Array, run: NDArray[np.int64]) -> float:
+def _explained(
+    statistics: Statistics, layout: Layout, base: Sequence[str], effect: str, free: Sequence[str], step: Array
+) -> Array:
+    """Return what of the scores by window (B, p) a step of the effect's parameters explains, the base following."""
+    others = [n for n in base if n != effect]
+    f, c = layout.of(others), layout.columns[effect]
+    total = statistics.hessian.sum(0)
+    inner = total[np.ix_(f, f)] + np.diag(priors(layout, others, free).precision)
+    carry = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
+    both = np.concatenate([c, f])
+    moved = statistics.hessian[:, both[:, None], both] @ np.concatenate([step, -carry.T @ step])
+    return moved[:, : len(c)] - moved[:, len(c) :] @ carry.T
+
+
+def inflation(by_window: Array, information: Array, run: NDArray[np.int64], spent: int = 1) -> float:
     """Return how much more the scores vary from window to window than white noise would have it, at least one.
 
     Neighbouring windows of a run count with Bartlett's weight of one half.
+
+    Args:
+        by_window: scores (B, p).
+        information: (p, p) of all windows.
+        run: run of each window (B,).
+        spent: degrees of freedom that have gone into the scores' mean.
     """
     centred = by_window - by_window.mean(0)
     spread = centred.T @ centred
@@ -94,7 +114,7 @@ def inflation(by_window: Array, information: Array, run: NDArray[np.int64]) -> f
         return 1.0
     white = vectors[:, keep] / np.sqrt(values[keep])
     count = len(by_window)
-    ratio = np.trace(white.T @ spread @ white) / keep.sum() * count / max(count - 1, 1)
+    ratio = np.trace(white.T @ spread @ white) / keep.sum() * count / max(count - spent, 1)
     return float(max(1.0, ratio))
 
 
@@ -103,19 +123,22 @@ def score(
 ) -> Score:
     """Test one effect at the fitted null; see the module's text."""
     by_window, gradient, information = project(statistics, layout, base, effect, free)
-    factor = inflation(by_window, information, statistics.run)
     scale = scales(layout, effect)
-    now = parameters_of(layout.model, [effect])
+    # A stand-in is at its null, which the layout knows.
+    now = layout.means[effect] if "@" in effect else parameters_of(layout.model, [effect])
     # Work in units of the plausible scale, so that one threshold tells what the log says nothing about.
     values, vectors = np.linalg.eigh(information * scale[:, None] * scale)
     seen = values > max(TINY * values.max(initial=0.0), BLIND)
     if not seen.any():
         size = len(scale)
-        return Score(effect, 1.0, 0.0, 0, factor, now, np.full(size, np.nan), -0.0, 0.0)
+        return Score(effect, 1.0, 0.0, 0, 1.0, now, np.full(size, np.nan), -0.0, 0.0)
     posterior = vectors**2 @ (1.0 / (np.maximum(values, 0.0) + FREE**-2))
     unseen = FREE**2 * (vectors[:, ~seen] ** 2).sum(1)
     values, vectors = values[seen], vectors[:, seen]
     along = vectors.T @ (gradient * scale) / values  # one-step estimate, in scales
+    # An effect that shows in few windows makes their scores differ; that is no noise, and is taken out first.
+    left = by_window - _explained(statistics, layout, base, effect, free, scale * (vectors @ along))
+    factor = inflation(left, information, statistics.run, 1 + len(values))
     spread = factor / values
     prior = _prior_variance(layout, effect, vectors)
     if prior is None:

@@ -2,35 +2,63 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
 from auvnn.catalogue import Catalogue
 
 if TYPE_CHECKING:
-    from auvnn.effects.base import Body, Effect, Moment, Parameter, Response, Sensed
+    from auvnn.effects.base import HOOKS, Body, Effect, Extent, Moment, Parameter, Response, Sensed
 
 EFFECTS = Catalogue(
     "effect",
     {
         "ocean_current": "auvnn.effects.ocean_current:OceanCurrent",
+        "current_shear": "auvnn.effects.current_shear:CurrentShear",
+        "waves": "auvnn.effects.waves:Waves",
+        "bottom_proximity": "auvnn.effects.bottom_proximity:BottomProximity",
+        "surface_proximity": "auvnn.effects.surface_proximity:SurfaceProximity",
+        "compressibility": "auvnn.effects.compressibility:Compressibility",
         "added_mass": "auvnn.effects.added_mass:AddedMass",
+        "trapped_water": "auvnn.effects.trapped_water:TrappedWater",
         "linear_damping": "auvnn.effects.linear_damping:LinearDamping",
         "quadratic_damping": "auvnn.effects.quadratic_damping:QuadraticDamping",
+        "coupled_damping": "auvnn.effects.coupled_damping:CoupledDamping",
+        "cross_flow_drag": "auvnn.effects.cross_flow_drag:CrossFlowDrag",
+        "body_lift": "auvnn.effects.body_lift:BodyLift",
+        "munk_moment": "auvnn.effects.munk_moment:MunkMoment",
+        "biofouling": "auvnn.effects.biofouling:Biofouling",
         "cg_offset": "auvnn.effects.cg_offset:CgOffset",
         "net_buoyancy": "auvnn.effects.net_buoyancy:NetBuoyancy",
+        "payload": "auvnn.effects.payload:Payload",
+        "flooding": "auvnn.effects.flooding:Flooding",
         "thruster_gain": "auvnn.effects.thruster_gain:ThrusterGain",
+        "thruster_deadband": "auvnn.effects.thruster_deadband:ThrusterDeadband",
         "thruster_lag": "auvnn.effects.thruster_lag:ThrusterLag",
         "thrust_overshoot": "auvnn.effects.thrust_overshoot:ThrustOvershoot",
         "turning_forces": "auvnn.effects.turning_forces:TurningForces",
         "tilted_vertical": "auvnn.effects.tilted_vertical:TiltedVertical",
+        "actuation_delay": "auvnn.effects.actuation_delay:ActuationDelay",
+        "thrust_inflow_loss": "auvnn.effects.thrust_inflow_loss:ThrustInflowLoss",
+        "voltage_droop": "auvnn.effects.voltage_droop:VoltageDroop",
+        "propeller_torque": "auvnn.effects.propeller_torque:PropellerTorque",
+        "fin_stall": "auvnn.effects.fin_stall:FinStall",
+        "tether": "auvnn.effects.tether:Tether",
         "constant_force": "auvnn.effects.constant_force:ConstantForce",
+        "gyro_bias": "auvnn.effects.gyro_bias:GyroBias",
+        "accelerometer_tilt": "auvnn.effects.accelerometer_tilt:AccelerometerTilt",
+        "velocity_misalignment": "auvnn.effects.velocity_misalignment:VelocityMisalignment",
         "velocity_lever_arm": "auvnn.effects.velocity_lever_arm:VelocityLeverArm",
+        "velocity_scale": "auvnn.effects.velocity_scale:VelocityScale",
     },
     "auvnn.effects",
 )
 
 # Known, so that a model that holds one can be saved and loaded, but not offered as a name for what is missing.
-_UNOFFERED = {"inertia": "auvnn.effects.inertia_factors:InertiaFactors"}
+_UNOFFERED = {
+    "inertia": "auvnn.effects.inertia_factors:InertiaFactors",
+    "residual_force": "auvnn.effects.residual_force:ResidualForce",
+}
 
 
 def effect_class(name: str) -> type[Effect]:
@@ -40,11 +68,23 @@ def effect_class(name: str) -> type[Effect]:
         ConfigError: there is no such effect.
     """
     if name in _UNOFFERED:
-        return Catalogue("effect", _UNOFFERED, "auvnn.unoffered_effects").get(name)
+        module, _, attribute = _UNOFFERED[name].partition(":")
+        return getattr(importlib.import_module(module), attribute)
     return EFFECTS.get(name)
 
 
-__all__ = ["EFFECTS", "Body", "Effect", "Moment", "Parameter", "Response", "Sensed", "effect_class"]
+__all__ = [
+    "EFFECTS",
+    "HOOKS",
+    "Body",
+    "Effect",
+    "Extent",
+    "Moment",
+    "Parameter",
+    "Response",
+    "Sensed",
+    "effect_class",
+]
 
 
 def __getattr__(name: str) -> Any:

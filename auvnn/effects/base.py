@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
@@ -27,6 +28,8 @@ class Parameter:
         low: smallest admissible value.
         high: largest admissible value.
         probes: values at which to linearise instead, where the slope at the null says nothing.
+        shape: whether it says how the effect acts and not how much (an onset, a frequency, a place): with all
+            others at their nulls the effect vanishes whatever its value, so that nothing tells it there.
     """
 
     name: str
@@ -36,6 +39,24 @@ class Parameter:
     low: float
     high: float
     probes: tuple[float, ...] = ()
+    shape: bool = False
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How far a log reaches: what the starting values of shapes depend on.
+
+    Attributes:
+        begin: earliest time, s.
+        duration: from there to the latest time, s.
+        longest: duration of the longest run, s.
+        distance: median and largest distance from the origin of the positions, m; zeros without positions.
+    """
+
+    begin: float
+    duration: float
+    longest: float
+    distance: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -88,6 +109,9 @@ class Moment:
         fins: fin angles, rad, (..., m), or None.
         voltage: V, (...), or None.
         altitude: m, (...), or None.
+        thrust: what the actuators give, N (or the wrench, where it is commanded), (..., n); in `wrench` only.
+        drag: everything that resists motion through the water, damping subnetworks included, as a wrench on
+            the body, N and N m, (..., 6); in `wrench` only.
     """
 
     time: Tensor
@@ -100,6 +124,8 @@ class Moment:
     fins: Tensor | None = None
     voltage: Tensor | None = None
     altitude: Tensor | None = None
+    thrust: Tensor | None = None
+    drag: Tensor | None = None
 
 
 @dataclass(frozen=True)
@@ -138,7 +164,8 @@ class Effect(nn.Module):
     is one question for all of them: how the residual changes with the parameters at the null.
 
     Hooks, along the signal path:
-        `command`: the commands of a whole stretch, before the thruster curves (dead band, delay).
+        `command`: the commands of a whole stretch, before the thruster curves (dead band).
+        `delay`: by how much the thrust comes late; at most one effect has it.
         `respond`: dynamics between the demanded and the actual thrust (lag); at most one effect has it.
         `thrust`: the thrust of each actuator (gain, voltage, loss by inflow).
         `water`: velocity and acceleration of the water, NED.
@@ -191,11 +218,49 @@ class Effect(nn.Module):
     @classmethod
     def build(cls, vehicle: Any, actuation: str, values: Mapping[str, float] | None = None) -> Effect:
         """Make the effect for a vehicle, at `values` and otherwise at the null."""
-        return cls(cls.describe(vehicle, actuation), values)
+        effect = cls(cls.describe(vehicle, actuation), values)
+        effect.settle(vehicle, actuation)
+        return effect
+
+    def settle(self, vehicle: Any, actuation: str) -> None:
+        """Keep (see `keep`) what the hooks need to know of the vehicle."""
+
+    def keep(self, name: str, value: Any) -> None:
+        """Keep known numbers as a buffer: they follow dtype and device, and are not part of the state."""
+        number = torch.tensor(np.array(value, dtype=np.float64))
+        self.register_buffer(name, number, persistent=False)
+
+    def kept(self, name: str) -> Tensor:
+        """Return a buffer."""
+        return self.get_buffer(name)
+
+    @classmethod
+    def lacks(cls, vehicle: Any, actuation: str) -> tuple[str, ...]:
+        """Return what a vehicle's model file does not state and the effect cannot do without, in words."""
+        return ()
+
+    @classmethod
+    def starts(cls, parameters: tuple[Parameter, ...], extent: Extent) -> list[dict[str, float]]:
+        """Return values of shape parameters at which to ask whether the effect is there; by default the nulls.
+
+        At each of them the effect must still vanish exactly while all other parameters are at their nulls.
+        The test is corrected for taking the best of them.
+        """
+        return [{}]
 
     def value(self, name: str) -> Tensor:
         """Return one parameter as a scalar tensor."""
         return self.theta[self._index[name]]
+
+    def absent(self) -> bool:
+        """Return whether the effect is at its null, whatever its shape, and so does nothing."""
+        null = torch.tensor([p.null for p in self.parameters_of], dtype=torch.float64)
+        shape = torch.tensor([p.shape for p in self.parameters_of])
+        return bool((shape | (self.theta.detach().cpu().double() == null)).all())
+
+    def words(self) -> str:
+        """Return what the effect has to say of itself once it is fitted, beyond its parameters; or nothing."""
+        return ""
 
     def values(self) -> dict[str, float]:
         """Return the parameters by name."""
@@ -209,6 +274,10 @@ class Effect(nn.Module):
     def command(self, command: Tensor, times: Tensor) -> Tensor:
         """Change the commands of a stretch: (..., T, n) held from `times` (..., T), to the same shape."""
         return command
+
+    def delay(self) -> Tensor:
+        """Return by how many seconds the thrust comes after its command, a scalar, not negative."""
+        return torch.zeros_like(self.theta[0])
 
     def respond(self, state: Tensor, demand: Tensor, step: Tensor) -> Response:
         """Return how the thrust goes from `state` under a constant demand over `step` seconds, (..., n).
@@ -240,7 +309,7 @@ class Effect(nn.Module):
         return sensed
 
 
-HOOKS = ("command", "respond", "thrust", "water", "body", "wrench", "sense")
+HOOKS = ("command", "delay", "respond", "thrust", "water", "body", "wrench", "sense")
 
 
 def axis_scale(factors: Tensor) -> Tensor:

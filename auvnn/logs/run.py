@@ -115,6 +115,14 @@ class Run:
         """The thruster commands where there are any, else the wrench."""
         return self.thrusters if self.thrusters is not None else self.wrench
 
+    def filled(self, name: str) -> Array | None:
+        """Return `altitude` or `voltage` without gaps, (N,): linear in time between samples, held at the ends."""
+        value = getattr(self, name)
+        if value is None or np.isfinite(value).all():
+            return value
+        seen = np.isfinite(value)
+        return np.interp(self.t, self.t[seen], value[seen]) if seen.any() else None
+
     @cached_property
     def euler(self) -> Array:
         """Roll, pitch, yaw (ZYX), rad, (N, 3); NaN where the attitude is missing."""

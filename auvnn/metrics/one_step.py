@@ -177,8 +177,8 @@ class Replay:
         self.inputs = Inputs(
             torch.tensor(np.where(np.expand_dims(known, 1), command, 0.0)),
             tensor(run.fins),
-            tensor(run.voltage),
-            tensor(run.altitude),
+            tensor(run.filled("voltage")),
+            tensor(run.filled("altitude")),
         )
         self.t = run.t
         self.times = torch.tensor(run.t)
@@ -208,7 +208,7 @@ class Replay:
         model = self.model
         with torch.no_grad():
             drive = model.actuators.drive(
-                self.inputs.command, self.times, model.using("command") + model.using("respond")
+                self.inputs.command, self.times, model.before_thrust
             )
         self.start = torch.stack(drive.start)
         self.mean = torch.stack([part[0] for part in drive.mean])

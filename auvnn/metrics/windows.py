@@ -176,9 +176,10 @@ def cut_windows(
         return np.stack([get(run, command)[i] for (run, command, *_), i in zip(pieces, index, strict=True)])
 
     def optional(name: str) -> np.ndarray | None:
-        if any(getattr(run, name) is None for run, *_ in pieces):
+        known = {run.number: run.fins if name == "fins" else run.filled(name) for run, *_ in pieces}
+        if any(value is None for value in known.values()):
             return None
-        return gather(lambda run, _: getattr(run, name))
+        return gather(lambda run, _: np.asarray(known[run.number]))
 
     times = gather(lambda run, _: run.t)
     # Repeated history gets times of its own, so that the actuators have time to settle in it.

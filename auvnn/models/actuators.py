@@ -9,8 +9,9 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from auvnn.effects import Effect
+from auvnn.effects import Effect, Response
 from auvnn.errors import ConfigError
+from auvnn.models.thrust_signal import ThrustSignal
 from auvnn.physics.thrusters import allocation_matrix, quadratic_thrust, table_thrust
 from auvnn.vehicle import Vehicle
 
@@ -95,6 +96,20 @@ class Actuators(nn.Module):
             columns[index] = table_thrust(command[..., index], grid, getattr(self, f"table_thrust_{index}"))
         return torch.stack(columns, dim=-1)
 
+    def demand(self, command: Tensor, times: Tensor, effects: Sequence[Effect]) -> Tensor:
+        """Return the settled thrust (..., T, n) of held commands, after the effects on commands."""
+        for effect in effects:
+            if "command" in effect.hooks():
+                command = effect.command(command, times.to(command))
+        return self.static(command)
+
+    def signal(self, command: Tensor, times: Tensor, effects: Sequence[Effect]) -> ThrustSignal:
+        """Return the thrust as a function of time, a delay left out; shapes as in `drive`."""
+        demand = self.demand(command, times, effects)
+        lag = _only(effects, "respond")
+        states = demand if lag is None else _states(demand, times, lag, 1)[0]
+        return ThrustSignal(demand, states, times, lag)
+
     def drive(
         self, command: Tensor, times: Tensor, effects: Sequence[Effect], substeps: int = 1, warmup: int = 0
     ) -> Drive:
@@ -113,21 +128,32 @@ class Actuators(nn.Module):
         Returns:
             The thrust over the T - 1 intervals of the stretch, and at its last row.
         """
-        for effect in effects:
-            if "command" in effect.hooks():
-                command = effect.command(command, times.to(command))
-        demand = self.static(command)
-        lagging = [e for e in effects if "respond" in e.hooks()]
-        if not lagging:
+        demand = self.demand(command, times, effects)
+        lag, late = _only(effects, "respond"), _only(effects, "delay")
+        if lag is None:
             rows = list(demand[..., warmup:, :].unbind(-2))
-            return Drive([[row] * substeps for row in rows], None, rows)
-        if len(lagging) > 1:
-            names = " and ".join(e.name for e in lagging)
-            raise ConfigError(f"{names} both give the actuators dynamics: keep one of them")
-        return _lagged(demand, times, lagging[0], substeps, warmup)
+            plain = Drive([[row] * substeps for row in rows], None, rows)
+            states = demand
+        else:
+            states, answer = _states(demand, times, lag, substeps)
+            plain = _lagged(demand, states, answer, substeps, warmup)
+        if late is None:
+            return plain
+        signal = ThrustSignal(demand, states, times, lag)
+        return _delayed(plain, signal, late.delay(), substeps, warmup)
 
 
-def _lagged(demand: Tensor, times: Tensor, effect: Effect, substeps: int, warmup: int) -> Drive:
+def _only(effects: Sequence[Effect], hook: str) -> Effect | None:
+    """Return the effect that has a hook which only one may have."""
+    found = [e for e in effects if hook in e.hooks()]
+    if len(found) > 1:
+        names = " and ".join(e.name for e in found)
+        raise ConfigError(f"{names} both give the actuators dynamics: keep one of them")
+    return found[0] if found else None
+
+
+def _states(demand: Tensor, times: Tensor, effect: Effect, substeps: int) -> tuple[Tensor, Response]:
+    """Return the thrust as each row begins, (..., T, n), and the answer to a unit gap over each step."""
     # The last row has no interval of its own; its thrust is needed only at its very start.
     steps = torch.cat([times[..., 1:] - times[..., :-1], torch.zeros_like(times[..., :1])], dim=-1)
     h = steps.to(demand).unsqueeze(-1) / substeps
@@ -141,12 +167,15 @@ def _lagged(demand: Tensor, times: Tensor, effect: Effect, substeps: int, warmup
     for row, left in zip(rows, over, strict=True):
         states.append(state)
         state = row + (state - row) * left
-    gap = (torch.stack(states, dim=-2) - demand)[..., warmup:, :]
-    demand, answer = (
-        demand[..., warmup:, :],
-        [x[..., warmup:, :] for x in (answer.end, answer.mean, answer.slope, answer.start)],
+    return torch.stack(states, dim=-2), answer
+
+
+def _lagged(demand: Tensor, states: Tensor, answer: Response, substeps: int, warmup: int) -> Drive:
+    gap = (states - demand)[..., warmup:, :]
+    demand = demand[..., warmup:, :]
+    end, mean, slope, start = (
+        x[..., warmup:, :] for x in (answer.end, answer.mean, answer.slope, answer.start)
     )
-    end, mean, slope, start = answer
     means, slopes = [], []
     for part in range(substeps):
         now = gap * end**part
@@ -156,4 +185,32 @@ def _lagged(demand: Tensor, times: Tensor, effect: Effect, substeps: int, warmup
         [list(x) for x in zip(*means, strict=True)],
         [list(x) for x in zip(*slopes, strict=True)],
         list((demand + gap * start).unbind(-2)),
+    )
+
+
+def _delayed(plain: Drive, signal: ThrustSignal, delay: Tensor, substeps: int, warmup: int) -> Drive:
+    """Return the drive that comes `delay` seconds later; without delay it is `plain` to the last bit."""
+    times = signal.times[..., warmup:]
+    rows = times.shape[-1]
+    steps = times[..., 1:] - times[..., :-1]
+    # The last row is held for no time: a step like the one before stands in for it.
+    last = steps[..., -1:] if rows > 1 else torch.ones_like(times)
+    steps = torch.cat([steps, last], dim=-1) / substeps
+    begin = times.unsqueeze(-1) + steps.unsqueeze(-1) * torch.arange(substeps, device=times.device)
+    begin, length = begin.flatten(-2), steps.repeat_interleave(substeps, dim=-1)
+    longest = 1.0 if times.is_meta else float(steps.max())
+    late = delay.to(times)
+    mean, slope = signal.over(begin - late, length, longest)
+    # The same sums without delay take away their own rounding, so that a delay of zero changes nothing at all.
+    mean_now, slope_now = signal.over(begin, length, longest)
+    means = torch.stack([torch.stack(row, dim=-2) for row in plain.mean], dim=-3)
+    means = means + (mean - mean_now).unflatten(-2, (rows, substeps))
+    slopes = (slope - slope_now).unflatten(-2, (rows, substeps))
+    if plain.slope is not None:
+        slopes = slopes + torch.stack([torch.stack(row, dim=-2) for row in plain.slope], dim=-3)
+    start = torch.where(late > 0, signal.at(times - late), torch.stack(plain.start, dim=-2))
+    return Drive(
+        [list(row.unbind(-2)) for row in means.unbind(-3)],
+        [list(row.unbind(-2)) for row in slopes.unbind(-3)],
+        list(start.unbind(-2)),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from auvnn.effects import Body, Effect, Moment, Sensed, effect_class
+from auvnn.effects import HOOKS, Body, Effect, Moment, Sensed, effect_class
 from auvnn.errors import ConfigError
 from auvnn.models.actuators import Actuators
 from auvnn.models.inputs import Inputs
@@ -97,10 +97,9 @@ class GreyBox(nn.Module):
             if clash:
                 raise ConfigError(f"effects {effect.name} and {clash[0]} exclude each other: keep one")
         self.effects = nn.ModuleList(members)
-        self._by_hook = {
-            h: [e for e in members if h in e.hooks()]
-            for h in ("command", "respond", "thrust", "water", "body", "wrench", "sense")
-        }
+        self._by_hook = {h: [e for e in members if h in e.hooks()] for h in HOOKS}
+        # Depth of a flat bottom, m: gives the altitude to a simulated vehicle that has no altimeter to go by.
+        self.bottom: float | None = None
         self.time_varying = any(e.time_varying for e in self._by_hook["body"])
         self._constants(vehicle)
 
@@ -139,6 +138,11 @@ class GreyBox(nn.Module):
     def using(self, hook: str) -> list[Effect]:
         """Return the effects that override a hook, in order of action."""
         return self._by_hook[hook]
+
+    @property
+    def before_thrust(self) -> list[Effect]:
+        """The effects that decide how thrust follows from commands over time, in order of action."""
+        return [e for hook in ("command", "delay", "respond") for e in self.using(hook)]
 
     @property
     def members(self) -> list[Effect]:
@@ -180,6 +184,16 @@ class GreyBox(nn.Module):
         """Return a model with the same damping subnetworks (copied) but other effects or other numbers."""
         model = GreyBox(vehicle or self.vehicle, effects, copy.deepcopy(self.damping), self.actuation)
         return model.to(self._known("mass"))
+
+    def without_absent(self, keep: Sequence[str] = ()) -> GreyBox:
+        """Return the model without the effects that are at their nulls, but for those named in `keep`.
+
+        It predicts the same at less cost. Effects and subnetworks are shared with this model, not copied.
+        """
+        left = [e for e in self.members if e.name in keep or not e.absent()]
+        if len(left) == len(self.members):
+            return self
+        return GreyBox(self.vehicle, left, self.damping, self.actuation).to(self._known("mass"))
 
     def prepare(self, moment: Moment | None = None) -> Prepared:
         """Work out body and inertia matrices; `moment` is needed only where an effect varies in time."""
@@ -290,6 +304,9 @@ class GreyBox(nn.Module):
         time: Tensor,
         prepared: Prepared | None,
     ) -> tuple[dict[str, Tensor], Prepared]:
+        altitude = inputs.altitude
+        if altitude is None and self.bottom is not None:
+            altitude = self.bottom - position[..., 2]
         moment = Moment(
             time,
             position,
@@ -300,7 +317,7 @@ class GreyBox(nn.Module):
             inputs.command,
             inputs.fins,
             inputs.voltage,
-            inputs.altitude,
+            altitude,
         )
         nu_r, moving = nu, self.using("water")
         if moving:
@@ -310,18 +327,7 @@ class GreyBox(nn.Module):
                 velocity, acceleration = velocity + more, acceleration + faster
             nu_c, nu_c_dot = water_velocity(rotation, nu[..., 3:], velocity, acceleration)
             nu_r = nu - nu_c
-            moment = Moment(
-                time,
-                position,
-                rotation,
-                nu,
-                nu_r,
-                nu_c_dot,
-                inputs.command,
-                inputs.fins,
-                inputs.voltage,
-                inputs.altitude,
-            )
+            moment = replace(moment, nu_r=nu_r, nu_c_dot=nu_c_dot)
         if prepared is None or self.time_varying:
             prepared = self.prepare(moment)
         body, terms = prepared.body, {}
@@ -357,6 +363,9 @@ class GreyBox(nn.Module):
                 self._known("fin_stall"),
                 float(self.vehicle.water_density),
             )
+        if self.using("wrench"):
+            drag = [terms[name] for name in DRAG_TERMS if name in terms]
+            moment = replace(moment, thrust=thrust, drag=sum(drag, torch.zeros_like(nu)))
         for effect in self.using("wrench"):
             terms[str(effect.name)] = effect.wrench(moment, body)
         return terms, prepared

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from functools import partial
 from typing import TYPE_CHECKING
 
 import torch
@@ -69,43 +71,33 @@ def solve(
             raise ConfigError(f"{name}={value!r}: give a positive tolerance")
     rtol, atol = tolerances.get("rtol", 1e-7), tolerances.get("atol", 1e-9)
     prepared = None if model.time_varying else model.prepare()
-    lagging = model.using("respond")
-    command = inputs.command
-    late = torch.zeros((), dtype=command.dtype) if offset is None else offset.to(command)
-    for effect in model.using("command"):
-        command = effect.command(command, (times.to(command) + late.unsqueeze(-1)).expand(command.shape[:-1]))
-    demand = model.actuators.static(command)
-    rows, demands = inputs.each(), demand.unbind(-2)
-    thrust = demands[0]
-    for k in range(warmup if lagging else 0):
-        thrust = lagging[0].respond(thrust, demands[k], (times[k + 1] - times[k]).to(thrust)).end
+    shape = (*inputs.command.shape[:-1], 1)
+    since = torch.zeros((), dtype=times.dtype) if offset is None else offset.to(times)
+    clock = times.expand(shape[:-1]) + since.unsqueeze(-1)
+    signal = model.actuators.signal(inputs.command, clock, model.before_thrust)
+    late = next((e.delay() for e in model.using("delay")), torch.zeros(())).to(times)
+    # Delayed pieces of thrust change inside the intervals; where they do, the integration starts afresh.
+    jumps = (times + late).tolist() if model.using("delay") else []
+    rows = inputs.each()
     y = torch.cat(state, dim=-1)
     out = [y]
     lost = ~torch.isfinite(y).all(-1)
     at_rest = torch.nn.functional.pad(torch.ones_like(y[..., :1]), (3, 9))
     y = torch.where(lost.unsqueeze(-1), at_rest, y)
     for k in range(warmup, times.shape[0] - 1):
-        begin, end = times[k], times[k + 1]
-        entered, wanted, row, spent = thrust, demands[k], rows[k], 0
+        row, spent = rows[k], 0
+        begin, end = float(times[k]), float(times[k + 1])
+        cuts = [begin, *(t for t in jumps if begin < t < end), end]
 
-        def rate(
-            t: Tensor,
-            y: Tensor,
-            begin: Tensor = begin,
-            entered: Tensor = entered,
-            wanted: Tensor = wanted,
-            row: Inputs = row,
-        ) -> Tensor:
+        def rate(t: Tensor, y: Tensor, piece: Tensor, row: Inputs = row, begin: float = begin) -> Tensor:
             nonlocal lost, spent
             spent += 1
             if spent > MAX_EVALUATIONS:
                 raise ConfigError(
-                    f"torchdiffeq {method} gave up at t = {float(begin):g} s after "
+                    f"torchdiffeq {method} gave up at t = {begin:g} s after "
                     f"{MAX_EVALUATIONS} evaluations: loosen rtol and atol, or use solver=rk4"
                 )
-            now = wanted
-            if lagging:
-                now = lagging[0].respond(entered, wanted, (t - begin).to(y)).end
+            now = signal.along(piece, (t - late + since).expand(shape[:-2]))
             rotation = quat_to_matrix(y[..., 3:7] / torch.linalg.norm(y[..., 3:7], dim=-1, keepdim=True))
             nu = y[..., 7:]
             change = torch.cat(
@@ -122,19 +114,21 @@ def solve(
             lost = lost | ~torch.isfinite(change).all(-1) | (nu.abs().amax(-1) > LIMIT)
             return torch.where(lost.unsqueeze(-1), torch.zeros_like(change), change)
 
-        try:
-            run = odeint(rate, y, torch.stack([begin, end]), method=method, rtol=rtol, atol=atol)
-        except AssertionError as problem:
-            raise ConfigError(
-                f"torchdiffeq {method} gave up at t = {float(begin):g} s ({problem or 'step too small'}): "
-                "loosen rtol and atol, or use solver=rk4"
-            ) from None
-        assert isinstance(run, Tensor)
-        y = run[-1]
+        for low, high in itertools.pairwise(cuts):
+            middle = torch.full(shape[:-2], 0.5 * (low + high), dtype=times.dtype)
+            piece = signal.piece(middle - late.detach().cpu() + since)
+            ends = torch.tensor([low, high], dtype=times.dtype, device=times.device)
+            try:
+                run = odeint(partial(rate, piece=piece), y, ends, method=method, rtol=rtol, atol=atol)
+            except AssertionError as problem:
+                raise ConfigError(
+                    f"torchdiffeq {method} gave up at t = {begin:g} s ({problem or 'step too small'}): "
+                    "loosen rtol and atol, or use solver=rk4"
+                ) from None
+            assert isinstance(run, Tensor)
+            y = run[-1]
         quaternion = y[..., 3:7] / torch.linalg.norm(y[..., 3:7], dim=-1, keepdim=True)
         y = torch.cat([y[..., :3], quaternion, y[..., 7:]], dim=-1)
         out.append(torch.where(lost.unsqueeze(-1), torch.full_like(y, torch.nan), y))
-        if lagging:
-            thrust = lagging[0].respond(entered, wanted, (end - begin).to(thrust)).end
     run = torch.stack(out, dim=-2)
     return run[..., :7], run[..., 7:]

@@ -2,6 +2,15 @@
 
 from auvnn.simulate.excitations import EXCITATIONS, Excitation, make_excitation
 from auvnn.simulate.noise import Noise, make_noise
-from auvnn.simulate.simulation import Simulation, simulate
+from auvnn.simulate.simulation import Simulation, bottom_below, simulate
 
-__all__ = ["EXCITATIONS", "Excitation", "Noise", "Simulation", "make_excitation", "make_noise", "simulate"]
+__all__ = [
+    "EXCITATIONS",
+    "Excitation",
+    "Noise",
+    "Simulation",
+    "bottom_below",
+    "make_excitation",
+    "make_noise",
+    "simulate",
+]

@@ -13,6 +13,7 @@ from auvnn.effects import Sensed
 from auvnn.errors import AuvnnError
 from auvnn.models import GreyBox, Inputs, Trajectory
 from auvnn.models.rollout import LIMIT, steps_per_interval
+from auvnn.models.thrust_signal import ThrustSignal
 from auvnn.physics.attitude import quat_derivative, quat_to_matrix
 from auvnn.simulate.cruise import over_ground
 from auvnn.simulate.excitations import Controller, Plan
@@ -85,6 +86,9 @@ class Stepper:
         self.etas: list[Tensor] = []
         self.nus: list[Tensor] = []
         self.lag = next(iter(model.using("respond")), None)
+        self.delay = max((float(e.delay()) for e in model.using("delay")), default=0.0)
+        self.demands: list[Tensor] = []
+        self.states: list[Tensor] = []
         self.actual: Tensor | None = None
 
     def hold(self, command: Tensor, fins: Tensor | None) -> None:
@@ -98,6 +102,8 @@ class Stepper:
         demand = self._demand(k)
         if self.actual is None:
             self.actual = demand
+        self.demands.append(demand)
+        self.states.append(self.actual if self.lag is not None else demand)
         row = Inputs(command, fins, None if self.voltage is None else self.voltage[:, k])
         last = k == len(self.t) - 1
         h = float(self.t[min(k + 1, len(self.t) - 1)] - self.t[min(k, len(self.t) - 2)]) / self.substeps
@@ -108,6 +114,8 @@ class Stepper:
                 mean, slope, start = answer.mean, answer.slope, answer.start
             else:
                 start = demand
+            if self.delay > 0:
+                mean, slope, start = self._delayed(k, part, h)
             if part == 0:
                 self.thrusts.append(start)
             if last:
@@ -116,6 +124,16 @@ class Stepper:
                 self.actual = answer.end
             self._step(mean, slope, row, float(self.t[k]) + part * h, h)
         self._check(k)
+
+    def _delayed(self, k: int, part: int, h: float) -> tuple[Tensor, Tensor, Tensor]:
+        """Return mean, rise and starting value of the thrust that was due `delay` seconds ago."""
+        times = self.t[: k + 1]
+        first = max(int(torch.searchsorted(times, times[k] - self.delay - h)) - 1, 0)
+        demand, state = (torch.stack(x[first:], dim=-2) for x in (self.demands, self.states))
+        signal = ThrustSignal(demand, state, times[first:], self.lag)
+        when = (times[k] + part * h - self.delay).expand(*demand.shape[:-2], 1)
+        mean, slope = signal.over(when, torch.full_like(when, h), h)
+        return mean.squeeze(-2), slope.squeeze(-2), signal.at(when).squeeze(-2)
 
     def _demand(self, k: int) -> Tensor:
         command = self.commands[k]

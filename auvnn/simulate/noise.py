@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 VOLTAGE = ("voltage",)
 CHANNELS = (*VELOCITY, *ACCELERATION, *ATTITUDE, *POSITION, *VOLTAGE)
+# Drawn on its own, so that a log with a bottom has the same noise elsewhere as one without.
+ALTITUDE = "altitude"
 SIZES = ("standard_deviation", "relative")
 AMPLITUDES = ("std", "uniform")
 
@@ -131,8 +133,8 @@ def _sizes(key: str, given: Any) -> dict[str, float]:
     if not isinstance(given, Mapping):
         raise ConfigError(f"noise.{key} = {given!r}: numbers by channel are needed, such as {{u: 0.006}}")
     for channel, value in given.items():
-        if channel not in CHANNELS:
-            raise ConfigError(unknown_name("channel of noise", str(channel), CHANNELS))
+        if channel not in (*CHANNELS, ALTITUDE):
+            raise ConfigError(unknown_name("channel of noise", str(channel), (*CHANNELS, ALTITUDE)))
         good = isinstance(value, (int, float)) and not isinstance(value, bool) and 0.0 <= value < np.inf
         if not good:
             raise ConfigError(f"noise.{key}.{channel} = {value!r}: a number from 0 up is needed")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.effects import EFFECTS, Sensed
+from auvnn.effects.sizes import radius
 from auvnn.errors import ConfigError
 from auvnn.logs import Log, Run
 from auvnn.models import GreyBox, Inputs, Trajectory
@@ -27,7 +28,7 @@ Array = NDArray[np.float64]
 COEFFICIENTS = ("exact", "drawn")
 # Every kind of random number has a stream of its own: another noise must not change the manoeuvre.
 STREAMS = ("excitation", "noise", "hidden", "voltage", "added_mass", "linear_damping", "quadratic_damping",
-           "inertia")  # fmt: skip
+           "inertia", "altitude")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ def simulate(
     accelerations: bool | None = None,
     actuation: str | None = None,
     max_step: float = 0.01,
+    bottom: float | None = None,
 ) -> Simulation:
     """Make a log: the model with effects hidden in it, driven and measured.
 
@@ -81,6 +83,8 @@ def simulate(
         accelerations: whether to log them; by default as the noise condition says.
         actuation: `thrusters` or `wrench`; by default the model's.
         max_step: longest step of the integrator (RK4), s.
+        bottom: depth of a flat bottom, m: the log gets an `altitude`. By default there is one, close below the
+            nominal model's deepest point, only where a hidden effect needs it.
 
     Returns:
         Log, truth and plant.
@@ -96,17 +100,23 @@ def simulate(
     condition = make_noise(noise)
     model = _actuated(model, actuation)
     truth_hidden: dict[str, dict[str, float]] = {}
+    near = False
     for name, values in as_hidden(hidden).items():
         if values is None:
             # Its own stream by its name: the order of the effects must not matter.
             generator = _generator(seed, "hidden", zlib.crc32(name.encode()))
             values = typical_values(EFFECTS.get(name).describe(model.vehicle, model.actuation), generator)
         truth_hidden[name] = values
+        _can_be_hidden(model, name)
+        near = near or "altitude" in EFFECTS.get(name).channels
+    if bottom is None and near:
+        bottom = bottom_below(model, excitation, seed, runs=runs, duration=duration, rate=rate)
     factors = {}
     if coefficients == "drawn":
-        streams = {s: _generator(seed, s, 0) for s in STREAMS[4:]}
+        streams = {s: _generator(seed, s, 0) for s in STREAMS[4:8]}
         factors = drawn_factors(model.vehicle, list(truth_hidden), streams)
     plant = make_plant(model, truth_hidden, factors)
+    plant.bottom = bottom
 
     t = np.arange(round(duration * rate) + 1) / rate
     with torch.inference_mode():
@@ -116,7 +126,13 @@ def simulate(
         trajectory, inputs = _moved(plant, plan, draws, voltage, torch.tensor(t), max_step)
         logged = condition.accelerations if accelerations is None else accelerations
         sensed = _sensed(plant, trajectory, inputs, logged)
-        made = _runs(t, sensed, inputs, draws, model.actuation)
+        altitude = None
+        if bottom is not None:
+            size = condition.standard_deviation.get("altitude", 0.0)
+            streams = [_generator(seed, "altitude", i) for i in range(runs)]
+            noisy = np.stack([size * g.standard_normal(len(t)) for g in streams])
+            altitude = bottom - trajectory.eta[..., 2].numpy() + noisy
+        made = _runs(t, sensed, inputs, draws, model.actuation, altitude)
     log = Log.from_runs(made, name=f"{model.vehicle.name}-{manner.name}-{seed}")
     truth = {
         "schema": "auvnn/truth/1",
@@ -134,10 +150,34 @@ def simulate(
             "duration": float(duration),
             "rate": float(rate),
             "max_step": float(max_step),
+            "bottom": bottom,
         },
         "notes": list(plan.notes),
     }
     return Simulation(log, truth, plant, plan.set_points)
+
+
+def bottom_below(
+    model: GreyBox, excitation: str | Mapping[str, Any], seed: int, *, runs: int, duration: float, rate: float
+) -> float:
+    """Return the depth, m, of a bottom that the nominal model comes close to: 1.3 of its radii below.
+
+    The radius is that of the sphere of the vehicle's volume.
+    """
+    nominal = simulate(
+        model, excitation, "none", None, seed, runs=runs, duration=duration, rate=rate, max_step=0.025
+    )
+    deepest = max(float(run.eta[:, 2].max()) for run in nominal.log.runs)
+    return deepest + 1.3 * radius(model.vehicle)
+
+
+def _can_be_hidden(model: GreyBox, name: str) -> None:
+    lacking = EFFECTS.get(name).lacks(model.vehicle, model.actuation)
+    if lacking:
+        raise ConfigError(
+            f"{name} cannot be hidden in a log of {model.vehicle.name}: its model file states no "
+            f"{lacking[0]}; state it, or choose another vehicle"
+        )
 
 
 def _check(seed: int, runs: int, duration: float, rate: float, coefficients: str, max_step: float) -> None:
@@ -201,7 +241,9 @@ def _sensed(plant: GreyBox, run: Trajectory, inputs: Inputs, accelerations: bool
     return plant.sense(Sensed(position, quaternion, run.nu, rate))
 
 
-def _runs(t: Array, sensed: Sensed, inputs: Inputs, draws: Draws, actuation: str) -> list[Run]:
+def _runs(
+    t: Array, sensed: Sensed, inputs: Inputs, draws: Draws, actuation: str, altitude: Array | None
+) -> list[Run]:
     position, nu = draws.added("x", sensed.position.numpy()), draws.added("u", sensed.nu.numpy())
     quaternion = draws.turned(sensed.quaternion.numpy())
     rate = None if sensed.nu_dot is None else draws.added("du", sensed.nu_dot.numpy())
@@ -216,6 +258,7 @@ def _runs(t: Array, sensed: Sensed, inputs: Inputs, draws: Draws, actuation: str
             wrench=command[i] if actuation == "wrench" else None,
             thrusters=command[i] if actuation == "thrusters" else None,
             voltage=None if voltage is None else voltage[i],
+            altitude=None if altitude is None else altitude[i],
         )
         for i in range(len(nu))
     ]  # fmt: skip

@@ -149,11 +149,13 @@ def _errors(row: Mapping[str, Any]) -> dict[str, dict[str, float]]:
     out = {}
     if not truth:
         return out
-    null = {p.name: p.null for p in EFFECTS.get(row["hidden"]).describe(*_described(row["vehicle"]))}
-    size = max(np.sqrt(sum((v - null[n]) ** 2 for n, v in truth.items())), 1e-300)
+    described = EFFECTS.get(row["hidden"]).describe(*_described(row["vehicle"]))
+    # A shape has no distance from its null.
+    null = {p.name: p.null for p in described if not p.shape}
+    size = max(np.sqrt(sum((truth[n] - v) ** 2 for n, v in null.items())), 1e-300)
     for name, value in truth.items():
         found = row["parameters"].get(name)
-        if found is None or found["value"] is None:
+        if name not in null or found is None or found["value"] is None:
             continue
         gap = found["value"] - value
         out[name] = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 from auvnn.catalogue import unknown_name
 from auvnn.diagnosis.diagnose import windows_for
 from auvnn.diagnosis.nuisance import lay_out, stated
+from auvnn.diagnosis.probes import extent_of
+from auvnn.effects import Effect, Parameter
 from auvnn.errors import ConfigError
 from auvnn.logs import Log
 from auvnn.metrics.free_run import initial_states, moved
+from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
-from auvnn.simulate import simulate
-from auvnn.training.prediction_error import answers, reduce
+from auvnn.simulate import bottom_below, simulate
+from auvnn.training.prediction_error import answers, reduce, set_parameters
 
 Array = NDArray[np.float64]
 
@@ -27,18 +30,44 @@ SIZES = {"small": 5.0, "medium": 10.0, "large": 30.0}
 BEYOND = {"small": 2.5, "medium": 4.0, "large": 6.0}
 
 
-def oracle_information(model: GreyBox, log: Log, name: str, sigma: Array) -> Array:
+def oracle_information(
+    model: GreyBox, log: Log, name: str, sigma: Array, shape: Mapping[str, float] | None = None
+) -> Array:
     """Return the information (p, p) that a log holds on one effect when everything else is known.
 
-    The initial state of each window is not known; noise has the given standard deviations (18,).
+    The initial state of each window is not known; noise has the given standard deviations (18,). An effect
+    with a shape is taken at the given one, otherwise at its null.
     """
     layout = lay_out(model, [name])
+    member = layout.model.effect(name)
+    values = np.array([(shape or {}).get(p.name, p.null) for p in member.parameters_of])
+    set_parameters(layout.model, [name], values)
     windows = windows_for(model, log)
     states = initial_states(layout.model, windows)
     for _ in range(2):
         sums, change, _ = reduce(windows, answers(layout.model, windows, states, [name]), sigma)
         states = moved(states, torch.as_tensor(change))
     return sums.hessian.sum(0)
+
+
+def _shape(
+    kind: type[Effect], described: Sequence[Parameter], log: Log, generator: np.random.Generator
+) -> dict[str, float]:
+    """Return a plausible shape: between the ones that the diagnosis starts from, else near the null."""
+    if not any(p.shape for p in described):
+        return {}
+    starts = kind.starts(tuple(described), extent_of(cut_windows(log, 5.0, partial=True)))
+    # Between two of them: an onset then lies well inside the log.
+    one, other = (starts[k % len(starts)] for k in generator.choice(max(len(starts), 2), 2, replace=False))
+    share = generator.uniform()
+    shape = {}
+    for p in described:
+        if p.shape:
+            value = p.null + 0.5 * p.scale * generator.normal()
+            if p.name in one:
+                value = share * one[p.name] + (1 - share) * other[p.name]
+            shape[p.name] = float(np.clip(value, p.low, p.high))
+    return shape
 
 
 def sized(
@@ -79,6 +108,7 @@ def sized(
     layout = lay_out(model, [effect])
     described = layout.model.effect(effect).parameters_of
     scale = np.array([p.scale for p in described])
+    fixed = np.array([p.shape for p in described])
     generator = np.random.default_rng(np.random.SeedSequence(int(seed), spawn_key=(101,)))
     direction = generator.normal(size=len(described))
     direction = np.where([p.low == p.null for p in described], np.abs(direction), direction)
@@ -87,16 +117,22 @@ def sized(
         direction = np.clip(direction / np.sqrt(np.mean(direction**2)), -1.5, 1.5)
         factors = np.exp(BEYOND[size] * uncertain[effect] * direction)
         return {p.name: float(f) for p, f in zip(described, factors, strict=True)}
+    bottom = None
+    if "altitude" in type(layout.model.effect(effect)).channels:
+        bottom = bottom_below(model, excitation, seed, runs=runs, duration=duration, rate=rate)
     made = simulate(
-        model, excitation, "realistic", None, seed, runs=runs, duration=duration, rate=rate, max_step=0.025
-    )
+        model, excitation, "realistic", None, seed,
+        runs=runs, duration=duration, rate=rate, max_step=0.025, bottom=bottom,
+    )  # fmt: skip
     sigma = np.array([0.05, 0.05, 0.01, 0.003, 0.003, 0.008] + [0.006] * 3 + [0.003] * 3 + [np.inf] * 6)
-    information = oracle_information(model, made.log, effect, sigma)
-    step = direction * scale
+    shape = _shape(type(layout.model.effect(effect)), described, made.log, generator)
+    information = oracle_information(model, made.log, effect, sigma, shape)
+    step = np.where(fixed, 0.0, direction * scale)
     distance = float(np.sqrt(step @ information @ step))
     if not distance > 1e-9:
         raise ConfigError(
             f"{effect} leaves no trace on {model.vehicle.name} under this excitation: choose another"
         )
-    values = np.array([p.null for p in described]) + step * (SIZES[size] / distance)
+    at = np.array([shape.get(p.name, p.null) for p in described])
+    values = at + step * (SIZES[size] / distance)
     return {p.name: float(np.clip(v, p.low, p.high)) for p, v in zip(described, values, strict=True)}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from auvnn.effects import Effect
+from auvnn.effects import Effect, Extent
 from auvnn.effects.base import HOOKS
 from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
@@ -60,6 +60,10 @@ def describes_itself(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "t
         require(math.isfinite(p.scale) and p.scale > 0, f"{where}: scale {p.scale} is not positive")
         require(p.low <= p.null <= p.high and p.low < p.high, f"{where}: not {p.low} <= {p.null} <= {p.high}")
         require(all(p.low <= x <= p.high for x in p.probes), f"{where}: a probe is out of bounds")
+    require(not all(p.shape for p in described), f"{name}: every parameter is a shape, none says how much")
+    shapes = {p.name for p in described if p.shape}
+    for start in kind.starts(described, Extent(0.0, 60.0, 60.0, (3.0, 8.0))):
+        require(set(start) <= shapes, f"{name}: starts name {sorted(start)}, shapes are {sorted(shapes)}")
     built = kind.build(vehicle, actuation)
     require(built.values() == {p.name: p.null for p in described}, f"{name} does not start at its null")
     values = typical_values(kind, vehicle, actuation)
@@ -87,15 +91,24 @@ def refuses(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters"
 
 
 def vanishes(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
-    """Check that at the null nothing changes, to rounding: acceleration, free run and sensors."""
+    """Check that at the null nothing changes, to rounding: acceleration, free run and sensors.
+
+    Neither does it where parameters of shape have other values, those of `starts` among them.
+    """
     scene = make_scene(vehicle, actuation)
     plain = Predictor(GreyBox(vehicle, actuation=actuation))
-    null = Predictor(GreyBox(vehicle, [kind.build(vehicle, actuation)], actuation=actuation))
+    described = kind.describe(vehicle, actuation)
+    shapes = [{}, *kind.starts(described, Extent(0.0, 1.0, 1.0, (3.0, 5.0)))[:4]]
+    shapes.append({p.name: v for p in described if p.shape for v in (p.probes or (p.null + 0.3 * p.scale,))})
     with torch.no_grad():
-        expected, found = plain(scene), null(scene)
-    for output, value in expected.items():
-        for a, b in zip(found[output].flatten(0, -2), value.flatten(0, -2), strict=True):
-            require_close(a, b, 1e-15, f"{kind.name} at its null changes {output}")
+        expected = plain(scene)
+    for shape in shapes:
+        null = Predictor(GreyBox(vehicle, [kind.build(vehicle, actuation, shape)], actuation=actuation))
+        with torch.no_grad():
+            found = null(scene)
+        for output, value in expected.items():
+            for a, b in zip(found[output].flatten(0, -2), value.flatten(0, -2), strict=True):
+                require_close(a, b, 1e-15, f"{kind.name} at its null {shape or ''} changes {output}")
 
 
 def batches(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:

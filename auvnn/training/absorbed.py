@@ -164,7 +164,7 @@ def absorption(model: GreyBox, log: Log, derivative: Derivative | None = None) -
     how = derivative or choose_derivative(log)
     nu, target, run = targets(model, log, how)
     good = np.isfinite(nu).all(1) & np.isfinite(target).all(1)
-    learned = Learned(bank, nu[good], target[good], run[good])
+    learned = Learned(bank, nu[good], target[good], run[good].astype(np.int64))
     if not np.any(learned.wrench):
         return None
     size = np.sqrt(np.mean(learned.wrench**2, axis=0))

@@ -31,7 +31,8 @@ LOOSE = np.array([10.0] * 3 + [1.0] * 3 + [2.0] * 3 + [2.0] * 3)
 # A channel is never trusted beyond this share of its own motion: the integrator's error and the logging's last
 # digits must not pass for information.
 TRUST = 1e-4
-CHUNK = 48
+# Windows worked out at a time, as long as there are no more parameters than columns: this bounds the memory.
+CHUNK, COLUMNS = 48, 80
 
 
 @dataclass(frozen=True)
@@ -196,8 +197,11 @@ def motion(windows: Windows) -> Array:
 
 def answers(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str]) -> Iterator[Response]:
     """Yield the windows' answers chunk by chunk."""
-    for begin in range(0, len(windows), CHUNK):
-        part = slice(begin, begin + CHUNK)
+    model = model.without_absent(names)
+    columns = sum(len(model.effect(n).parameters_of) for n in names)
+    size = max(CHUNK * COLUMNS // max(columns, COLUMNS), 1)
+    for begin in range(0, len(windows), size):
+        part = slice(begin, begin + size)
         yield respond(model, windows.pick(part), initial[part], names)
 
 

@@ -96,7 +96,7 @@ class _Thrust(nn.Module):
         drive = model.actuators.drive(
             windows.inputs.command,
             windows.times,
-            model.using("command") + model.using("respond"),
+            model.before_thrust,
             substeps,
             windows.warmup,
         )
@@ -169,8 +169,10 @@ def respond(
             `model.damping.parameters()`.
     """
     with torch.no_grad():
-        eta, nu = predict(model, windows, initial)
-        error = window_error(model, windows, eta, nu)
+        # What is not there yet is differentiated below; the run itself is the same without it.
+        there = model.without_absent()
+        eta, nu = predict(there, windows, initial)
+        error = window_error(there, windows, eta, nu)
     count, length = nu.shape[:2]
     order = [model.effect_names.index(name) for name in names]
     thetas = {f"model.effects.{k}.theta": model.members[k].theta.detach() for k in order}
@@ -215,7 +217,7 @@ def _thrusts(
     module, substeps = _Thrust(model), _substeps(windows)
     with torch.no_grad():
         mean, start = module(windows, substeps)
-    acting = {id(e) for hook in ("command", "respond") for e in model.using(hook)}
+    acting = {id(e) for e in model.before_thrust}
     effects = [k for k in thetas if k.startswith("model.effects.")]
     keys = [k for k in effects if id(model.members[int(k.split(".")[2])]) in acting]
     if not keys:
@@ -330,13 +332,20 @@ def _outputs(
         full = torch.nn.functional.pad(sensitivity, (0, 0, 0, 6))
         return full[..., :12], full[..., 12:]
     what = "sense and rate" if measured_rate else "sense"
+    sizes, acting = {k: theta.shape[0] for k, theta in thetas.items()}, thetas
+    if not measured_rate:
+        # The report itself depends on the sensor effects alone.
+        reporting = {id(e) for e in model.using("sense")}
+        acting = {k: t for k, t in thetas.items() if id(model.members[int(k.split(".")[2])]) in reporting}
     points = (eta[..., :3], eta[..., 3:], nu, start, times, inputs)
-    by = _differentiate(_Point(model), what, points, thetas, chunk)
+    by = _differentiate(_Point(model), what, points, acting, chunk)
     shape = sensitivity.shape[:2]
     by_state = torch.cat(by[:3], dim=-1).reshape(*shape, -1, 12)
     full = by_state @ sensitivity
     if thetas:
-        direct = torch.cat(by[4:], dim=-1).reshape(*shape, -1, sensitivity.shape[-1] - 12)
+        found = dict(zip(acting, by[4:], strict=True))
+        parts = [found[k] if k in found else by[0].new_zeros(*by[0].shape[:-1], n) for k, n in sizes.items()]
+        direct = torch.cat(parts, dim=-1).reshape(*shape, -1, sensitivity.shape[-1] - 12)
         if start_slope is not None:
             direct = direct + by[3].reshape(*shape, -1, start.shape[-1]) @ start_slope
         full = torch.cat([full[..., :12], full[..., 12:] + direct], dim=-1)

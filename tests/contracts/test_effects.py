@@ -34,7 +34,9 @@ def test_the_contract_under_a_commanded_wrench(kind, check):
 
 
 def test_parameters_come_back_from_data_of_the_surrogate(kind):
-    EFFECT_CHECKS["recovers"](kind, load_vehicle("rov95"))
+    vehicle = load_vehicle("rov95")
+    # What the surrogate has not got (fins, a battery) the example vehicle has.
+    EFFECT_CHECKS["recovers"](kind, *([] if kind.lacks(vehicle, "thrusters") else [vehicle]))
 
 
 @pytest.mark.parametrize("name", builtin_vehicles())
@@ -69,4 +71,5 @@ def test_the_readme_names_each_with_its_parameters_and_units():
     for name, row in rows.items():
         for p in EFFECTS.get(name).describe(vehicle, "wrench"):
             assert f"`{p.name}`" in row, f"{name}: {p.name}"
-            assert ("factor" if p.unit == "1" else p.unit) in row, f"{name}: {p.unit}"
+            words = ("factor", "share", "exponent") if p.unit == "1" else (p.unit,)
+            assert any(w in row for w in words), f"{name}: {p.unit}"

@@ -126,3 +126,13 @@ def test_kind_and_columns() -> None:
     assert isinstance(run, Run)
     assert run.command is not None
     assert run.command.shape == (800, 6)
+
+
+def test_gaps_of_voltage_and_altitude_are_bridged_in_time():
+    t = np.array([0.0, 1.0, 2.0, 4.0, 5.0])
+    voltage = np.array([np.nan, 10.0, np.nan, 16.0, np.nan])
+    run = Run(number=0, t=t, quaternion=np.tile([1.0, 0, 0, 0], (5, 1)), nu=np.zeros((5, 6)), voltage=voltage)
+    assert run.filled("voltage").tolist() == [10.0, 10.0, 12.0, 16.0, 16.0]
+    assert run.filled("altitude") is None
+    whole = np.arange(5.0)
+    assert np.array_equal(Run(0, t, run.quaternion, run.nu, altitude=whole).filled("altitude"), whole)

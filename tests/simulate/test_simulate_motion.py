@@ -188,8 +188,12 @@ def test_divergence_is_an_error_that_says_when_and_which_term(excitation):
     assert simulate(model, excitation, runs=1, duration=2.0, **COARSE).log.samples == 21
 
 
-def test_closed_loop_replayed_in_open_loop_is_the_same():
-    hidden = {"thruster_lag": {"time_constant": 0.3}, "ocean_current": {"v_north": 0.1}}
+LAG, DELAY = {"thruster_lag": {"time_constant": 0.3}}, {"actuation_delay": {"delay": 0.173}}
+
+
+@pytest.mark.parametrize("actuators", [LAG, DELAY, {**DELAY, **LAG}])
+def test_closed_loop_replayed_in_open_loop_is_the_same(actuators):
+    hidden = {**actuators, "ocean_current": {"v_north": 0.1}}
     made = simulate(model_of("bluerov2_heavy"), "survey", "none", hidden, runs=2, duration=6.0)
     t = torch.tensor(made.log.runs[0].t)
     with torch.no_grad():

@@ -1,0 +1,225 @@
+"""Effects of which the data say nothing at the null: asked for at several shapes, and corrected for the choice.
+
+An onset, a frequency or a slack length has no meaning while the effect is absent, so the test is made at a few
+values of it, each by a stand-in: the effect with its shape held and the rest free.
+
+Reference: Davies (1987), Biometrika 74, for nuisance parameters that are present only under the alternative;
+the correction here is Bonferroni's, which holds whatever the dependence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+from torch import Tensor, nn
+from torch.func import functional_call, vmap
+
+from auvnn.diagnosis.explain import Explanation
+from auvnn.diagnosis.nuisance import Layout
+from auvnn.diagnosis.score import Score, score
+from auvnn.effects import Body, Effect, Extent, Moment, Sensed, effect_class
+from auvnn.metrics.windows import POSITION, Windows
+from auvnn.models import GreyBox
+from auvnn.training.prediction_error import Statistics, answers, reduce, set_parameters
+
+Array = NDArray[np.float64]
+
+
+def start_at(layout: Layout, windows: Windows, found: Explanation, base: Sequence[str], name: str) -> Layout:
+    """Return the layout at a fit, with an effect that is still absent set to the best of its shapes."""
+    model = layout.model.rebuilt(layout.model.copied_effects())
+    set_parameters(model, found.names, found.fitted.theta)
+    at = replace(layout, model=model)
+    asked = probed(at, [name], extent_of(windows))
+    held = [*base, *(e for e in found.effects if e not in base)]
+    sums, _, _ = reduce(
+        windows,
+        answers(asked.layout.model, windows, found.fitted.initial, asked.layout.model.effect_names),
+        found.fitted.sigma,
+    )
+    best, _ = asked.score(sums, held, name, found.effects)
+    set_parameters(model, [name], best.estimate)
+    return at
+
+
+def extent_of(windows: Windows) -> Extent:
+    """Return how far a log reaches, by its windows."""
+    times = windows.times[:, windows.warmup :]
+    first, last = times[:, 0].numpy(), times[:, -1].numpy()
+    longest = max(
+        float(last[windows.run == run].max() - first[windows.run == run].min())
+        for run in np.unique(windows.run)
+    )
+    seen = windows.mask[..., POSITION].all(-1)
+    away = torch.linalg.vector_norm(windows.eta[..., :3], dim=-1)[seen].numpy()
+    distance = (float(np.median(away)), float(away.max())) if len(away) else (0.0, 0.0)
+    return Extent(float(first.min()), float(last.max() - first.min()), longest, distance)
+
+
+class _One(nn.Module):
+    """An effect as a function of its parameters."""
+
+    def __init__(self, effect: Effect) -> None:
+        super().__init__()
+        self.effect = effect
+
+    def forward(self, hook: str, *args: Any) -> Any:
+        return getattr(self.effect, hook)(*args)
+
+
+class StandIns(Effect):
+    """An effect at its null in several shapes at once, each with free parameters of its own.
+
+    What the shapes do is added up, which is exact to first order at the null, and all that is asked for there.
+
+    Args:
+        kind: the effect's class.
+        model: for which.
+        shapes: values of the shape parameters, one mapping per stand-in.
+        name: under which the model holds them.
+    """
+
+    HOOKS = ("thrust", "water", "body", "wrench", "sense")
+
+    def __init__(
+        self, kind: type[Effect], model: GreyBox, shapes: Sequence[Mapping[str, float]], name: str
+    ) -> None:
+        """Make the starting parameters, (S, live)."""
+        nn.Module.__init__(self)
+        every = [kind.build(model.vehicle, model.actuation, s) for s in shapes]
+        self.one, described = _One(every[0]), every[0].parameters_of
+        live = [i for i, p in enumerate(described) if not p.shape]
+        self.name = name  # pyright: ignore[reportAttributeAccessIssue]
+        self.excludes, self.time_varying = (), kind.time_varying  # pyright: ignore[reportAttributeAccessIssue]
+        self.parameters_of = tuple(
+            replace(described[i], name=f"{described[i].name}_{k}") for k in range(len(shapes)) for i in live
+        )
+        self._index = {p.name: i for i, p in enumerate(self.parameters_of)}
+        start = torch.stack([e.theta.detach() for e in every])
+        held = start.clone()
+        held[:, live] = 0.0
+        self.register_buffer("held", held, persistent=False)
+        self.register_buffer("place", torch.eye(len(described), dtype=torch.float64)[live], persistent=False)
+        self.theta = nn.Parameter(start[:, live].flatten())
+        # The hooks that are not touched must cost nothing here either.
+        self._touched = tuple(h for h in kind.hooks() if h in self.HOOKS)
+        hooks = {h: getattr(StandIns, f"_{h}") for h in self._touched}
+        made = type(f"{kind.__name__}StandIns", (StandIns,), hooks)
+        self.__class__ = made  # pyright: ignore[reportAttributeAccessIssue]
+
+    def _shapes(self) -> Tensor:
+        """Return all parameters of all stand-ins, (S, p)."""
+        held, place = self.get_buffer("held"), self.get_buffer("place")
+        return held + self.theta.unflatten(0, (len(held), -1)) @ place
+
+    def _all(self, hook: str, *args: Any) -> Any:
+        return vmap(lambda theta: functional_call(self.one, {"effect.theta": theta}, (hook, *args)))(
+            self._shapes()
+        )
+
+    def _thrust(self, thrust: Tensor, moment: Moment) -> Tensor:
+        return thrust + (self._all("thrust", thrust, moment) - thrust).sum(0)
+
+    def _water(self, moment: Moment) -> tuple[Tensor, Tensor]:
+        velocity, acceleration = self._all("water", moment)
+        return velocity.sum(0), acceleration.sum(0)
+
+    def _wrench(self, moment: Moment, body: Body) -> Tensor:
+        return self._all("wrench", moment, body).sum(0)
+
+    def _body(self, body: Body, moment: Moment | None) -> Body:
+        names = [f.name for f in fields(body) if getattr(body, f.name) is not None]
+        was = [getattr(body, n) for n in names]
+
+        def one(theta: Tensor) -> list[Tensor]:
+            new = functional_call(self.one, {"effect.theta": theta}, ("body", body, moment))
+            return [getattr(new, n) - w for n, w in zip(names, was, strict=True)]
+
+        more = vmap(one)(self._shapes())
+        return replace(body, **{n: w + m.sum(0) for n, w, m in zip(names, was, more, strict=True)})
+
+    def _sense(self, sensed: Sensed) -> Sensed:
+        names = [n for n in ("position", "quaternion", "nu", "nu_dot") if getattr(sensed, n) is not None]
+
+        def one(theta: Tensor) -> list[Tensor]:
+            new = functional_call(self.one, {"effect.theta": theta}, ("sense", sensed))
+            return [getattr(new, n) - getattr(sensed, n) for n in names]
+
+        more = vmap(one)(self._shapes())
+        return replace(sensed, **{n: getattr(sensed, n) + m.sum(0) for n, m in zip(names, more, strict=True)})
+
+
+@dataclass(frozen=True)
+class Probed:
+    """A layout in which stand-ins have taken the place of effects that have a shape.
+
+    Attributes:
+        layout: to be differentiated.
+        starts: effect to its stand-ins' names and shapes.
+    """
+
+    layout: Layout
+    starts: dict[str, dict[str, dict[str, float]]]
+
+    def score(
+        self, statistics: Statistics, base: Sequence[str], name: str, free: Sequence[str]
+    ) -> tuple[Score, str]:
+        """Test an effect; return the score, and the name under which the layout knows it at its best."""
+        if name not in self.starts:
+            return score(statistics, self.layout, base, name, free), name
+        found = {s: score(statistics, self.layout, base, s, free) for s in self.starts[name]}
+        # The best shape is the likeliest; its own scores' variance says how sure it is, not which it is.
+        best = max(found, key=lambda s: (found[s].degrees > 0, found[s].gain - found[s].degrees))
+        return self._whole(name, found[best], self.starts[name][best], list(found.values())), best
+
+    def _whole(self, name: str, best: Score, shape: dict[str, float], all_of_them: list[Score]) -> Score:
+        """Return the score of the effect, all parameters in it, corrected for having chosen the best shape."""
+        seen = [s for s in all_of_them if s.degrees]
+        kind = effect_class(name)
+        model = self.layout.model
+        described = kind.describe(model.vehicle, model.actuation)
+        estimate = np.array([shape.get(p.name, p.null) for p in described])
+        std = np.full(len(described), np.nan)
+        live = np.array([not p.shape for p in described])
+        estimate[live], std[live] = best.estimate, best.std
+        if not seen:
+            return replace(best, effect=name, estimate=estimate, std=std)
+        p_value = min(1.0, len(seen) * min(s.p_value for s in seen))
+        evidence = float(logsumexp([s.evidence for s in seen]) - np.log(len(seen)))
+        return replace(best, effect=name, p_value=p_value, evidence=evidence, estimate=estimate, std=std)
+
+
+def probed(layout: Layout, names: Sequence[str], extent: Extent) -> Probed:
+    """Put stand-ins in the place of those of the named effects whose shape has to be asked for."""
+    model = layout.model
+    starts: dict[str, dict[str, dict[str, float]]] = {}
+    effects: list[Effect] = []
+    columns: dict[str, NDArray[np.int64]] = {}
+    means = dict(layout.means)
+    at = 0
+    for effect in model.members:
+        name, described = str(effect.name), effect.parameters_of
+        if name not in names or not any(p.shape for p in described):
+            effects.append(effect)
+            columns[name] = np.arange(at, at + len(described))
+            at += len(described)
+            continue
+        kind = effect_class(name)
+        shapes = kind.starts(described, extent)
+        effects.append(StandIns(kind, model, shapes, name))
+        size = sum(not p.shape for p in described)
+        starts[name] = {f"{name}@{k}": shape for k, shape in enumerate(shapes)}
+        for label in starts[name]:
+            columns[label] = np.arange(at, at + size)
+            means[label] = np.array([p.null for p in described if not p.shape])
+            at += size
+    if not starts:
+        return Probed(layout, {})
+    whole = GreyBox(model.vehicle, effects, model.damping, model.actuation)
+    return Probed(Layout(whole, tuple(columns), columns, layout.nuisance, means), starts)

@@ -1,0 +1,49 @@
+"""Lift of the hull at an angle to the flow."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.sizes import volume
+
+
+class BodyLift(Effect):
+    """Lift and its moment in the relative velocity, with SNAME's signs.
+
+    Y = Y_uv u v, Z = Z_uw u w, M = M_uw u w, N = N_uv u v. Lift resists sideways motion, so Y_uv and Z_uw are
+    negative for u > 0; it acts aft, at x = -l, so that M_uw = l Z_uw < 0 and N_uv = -l Y_uv > 0, against the
+    Munk moment, from which nothing but a known added mass can tell it.
+    Reference: Prestero (2001), section 4.6; Hoerner and Borst (1985), chapter 19.
+    """
+
+    name = "body_lift"
+    cause = "the hull gives lift at an angle to the flow"
+    symbol = "Y_uv"
+    reference = "Prestero (2001), body lift; Hoerner and Borst (1985), Fluid-Dynamic Lift"
+
+    @classmethod
+    def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
+        """Return the coefficients; plausible is a lift coefficient of 0.5 of V^(2/3), 0.2 lengths aft."""
+        force = 0.25 * float(vehicle.water_density) * volume(vehicle) ** (2 / 3)
+        moment = 0.2 * float(vehicle.length) * force
+        return tuple(
+            Parameter(name, unit, 0.0, scale, -100 * scale, 100 * scale)
+            for name, unit, scale in (
+                ("Yuv", "kg/m", force),
+                ("Zuw", "kg/m", force),
+                ("Muw", "kg", moment),
+                ("Nuv", "kg", moment),
+            )
+        )
+
+    def wrench(self, moment: Moment, body: Body) -> Tensor:
+        """Return the lift."""
+        u, v, w = moment.nu_r[..., :3].unbind(-1)
+        side, up = u * v, u * w
+        a, b, c, d = self.theta.to(moment.nu).unbind(-1)
+        none = torch.zeros_like(side)
+        return torch.stack([none, a * side, b * up, none, c * up, d * side], dim=-1)

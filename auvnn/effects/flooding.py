@@ -1,0 +1,48 @@
+"""Water that leaks into the hull."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from auvnn.effects.base import Body, Effect, Moment, Parameter
+
+
+class Flooding(Effect):
+    """Mass and weight grow by a constant inflow at the centre of gravity: m(t) = m + rate t.
+
+    The water that comes in has to be brought to the vehicle's speed: force -rate v_r at that point. Buoyancy
+    stays, since the hull's volume does. Time is on the log's clock.
+    Reference: Fossen (2011), sections 3.3 and 4.1, with a growing mass.
+    """
+
+    name = "flooding"
+    cause = "water leaks into the hull"
+    symbol = "m_dot"
+    reference = "Fossen (2011), sections 3.3 and 4.1"
+    time_varying = True
+
+    @classmethod
+    def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
+        """Return the inflow; a tenth of a per cent of the mass per second is a bad leak."""
+        mass = float(vehicle.mass)
+        return (Parameter("rate", "kg/s", 0.0, 2e-4 * mass, 0.0, 0.1 * mass),)
+
+    def settle(self, vehicle: Any, actuation: str) -> None:
+        """Keep gravity."""
+        self.keep("gravity", vehicle.gravity)
+
+    def body(self, body: Body, moment: Moment | None) -> Body:
+        """Add the water that has come in."""
+        assert moment is not None
+        water = self.theta[0].to(moment.nu) * moment.time.to(moment.nu)
+        return body.but(mass=body.mass + water, weight=body.weight + self.kept("gravity").to(water) * water)
+
+    def wrench(self, moment: Moment, body: Body) -> Tensor:
+        """Return what it takes to carry the water along."""
+        v, omega = moment.nu_r[..., :3], moment.nu_r[..., 3:]
+        place = body.cg.expand_as(v)
+        force = -self.theta[0].to(v) * (v + torch.linalg.cross(omega, place))
+        return torch.cat([force, torch.linalg.cross(place, force)], dim=-1)

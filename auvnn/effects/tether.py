@@ -1,0 +1,70 @@
+"""A cable from the vehicle to a fixed point."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from auvnn.effects.base import Body, Effect, Extent, Moment, Parameter
+from auvnn.physics.products import matvec
+
+TINY = 1e-12
+"""Square of a length, in units of the vehicle's, below which a direction is no longer asked for."""
+
+
+class Tether(Effect):
+    """Pull beyond the slack length, half the cable's weight, and its drag; at the body origin.
+
+    With d = p - p_anchor and l = |d|, in the world: F = -k (1 - slack/l)+ d + [0 0 w l/2], and in the body
+    F = -c l |v_r| v_r, where c is drag per metre, about an eighth to a quarter of rho C_n times the diameter.
+    The weight is that in water, negative for a buoyant cable. The cable is straight and knows no history.
+    Reference: Driscoll, Lueck and Nahon (2000), Applied Ocean Research 22; von Benzon et al. (2022), JMSE 10.
+    """
+
+    name = "tether"
+    cause = "a cable pulls on the vehicle"
+    symbol = "F_t"
+    reference = "Driscoll, Lueck and Nahon (2000), Applied Ocean Research 22"
+    channels = ("x", "y", "z")
+
+    @classmethod
+    def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
+        """Return stiffness, slack, weight, drag and the anchor's place; by default the world's origin."""
+        weight = float(vehicle.mass) * float(vehicle.gravity)
+        length, density = float(vehicle.length), float(vehicle.water_density)
+        stiffness = 0.02 * weight / length
+        return (
+            Parameter("stiffness", "N/m", 0.0, stiffness, 0.0, 1e3 * stiffness),
+            Parameter("slack", "m", 0.0, 5.0 * length, 0.0, 1e4 * length, shape=True),
+            Parameter("weight", "N/m", 0.0, 2e-3 * weight / length, -weight / length, weight / length),
+            Parameter("drag", "N s2/m3", 0.0, 1e-3 * density * length, 0.0, density * length),
+            *(
+                Parameter(n, "m", 0.0, 5.0 * length, -1e4 * length, 1e4 * length, shape=True)
+                for n in ("north", "east", "down")
+            ),
+        )
+
+    @classmethod
+    def starts(cls, parameters: tuple[Parameter, ...], extent: Extent) -> list[dict[str, float]]:
+        """Return no slack, and as much as is taut on half of the log and on its outskirts."""
+        middle, far = extent.distance
+        return [{"slack": 0.0}, {"slack": middle}, {"slack": 0.5 * (middle + far)}]
+
+    def settle(self, vehicle: Any, actuation: str) -> None:
+        """Keep the smallest distance of which the direction counts."""
+        self.keep("tiny", TINY * float(vehicle.length) ** 2)
+
+    def wrench(self, moment: Moment, body: Body) -> Tensor:
+        """Return the cable's pull."""
+        theta, tiny = self.theta.to(moment.nu), self.kept("tiny").to(moment.nu)
+        stiffness, slack, weight, drag = theta[:4].unbind(-1)
+        away = moment.position - theta[4:]
+        length = torch.sqrt((away * away).sum(-1, keepdim=True) + tiny)
+        pull = -stiffness * torch.clamp(1 - slack / length, min=0.0) * away
+        pull = pull + torch.nn.functional.pad(0.5 * weight * length, (2, 0))
+        v = moment.nu_r[..., :3]
+        speed = torch.sqrt((v * v).sum(-1, keepdim=True) + 1e-30)
+        force = matvec(moment.rotation.mT, pull) - drag * length * speed * v
+        return torch.nn.functional.pad(force, (0, 3))

@@ -1,0 +1,1 @@
+"""Effects for auvnn from outside it."""

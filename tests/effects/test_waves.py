@@ -1,0 +1,73 @@
+"""Waves: against the equations that define them, and the orbits of what drifts in them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from auvnn.effects import Moment
+from auvnn.effects.waves import Waves
+from auvnn.testing import plain_vehicle
+
+VALUES = {"amplitude": 0.4, "omega": 1.1, "phase": 0.7, "direction": 2.0}
+
+
+def water(place, time, values=VALUES):
+    wave = Waves.build(plain_vehicle(), "wrench", values)
+    six = torch.zeros(*place.shape[:-1], 6, dtype=torch.float64)
+    moment = Moment(time, place, torch.eye(3, dtype=torch.float64), six, six, six, six)
+    return wave.water(moment)
+
+
+def test_the_water_is_incompressible_irrotational_and_obeys_laplace():
+    for place in torch.tensor(np.random.default_rng(0).uniform(1, 9, size=(5, 3))):
+        time = torch.tensor(3.3, dtype=torch.float64)
+        gradient = torch.autograd.functional.jacobian(lambda p, t=time: water(p, t)[0], place).numpy()
+        assert np.trace(gradient) == pytest.approx(0, abs=1e-15)
+        np.testing.assert_allclose(gradient, gradient.T, atol=1e-15)
+        rate = torch.autograd.functional.jacobian(lambda t, p=place: water(p, t)[0], time)
+        torch.testing.assert_close(water(place, time)[1].detach(), rate, rtol=1e-12, atol=1e-15)
+
+
+def test_the_surface_moves_as_the_elevation_says():
+    """At z = 0 the water rises as fast as a cos(k xi - omega t + phase): w = -d/dt of it, z being down."""
+    k, place = 1.1**2 / 9.81, np.array([3.0, -2.0, 0.0])
+    for t in (0.0, 1.3, 4.0):
+        angle = k * (place[0] * math.cos(2.0) + place[1] * math.sin(2.0)) - 1.1 * t + 0.7
+        velocity = water(torch.tensor(place), torch.tensor(t, dtype=torch.float64))[0].tolist()
+        assert velocity[2] == pytest.approx(-0.4 * 1.1 * math.sin(angle))
+        # Under a crest the water goes the way of the wave.
+        assert velocity[:2] == pytest.approx([0.44 * math.cos(angle) * f(2.0) for f in (math.cos, math.sin)])
+
+
+def test_it_dies_out_with_depth_by_the_wave_number():
+    time = torch.tensor(0.0, dtype=torch.float64)
+    shallow, deep = (water(torch.tensor([0.0, 0.0, z], dtype=torch.float64), time)[0] for z in (2.0, 12.0))
+    torch.testing.assert_close(deep, shallow * math.exp(-10 * 1.1**2 / 9.81), rtol=1e-12, atol=0)
+
+
+def test_a_body_as_heavy_as_water_moves_with_it(plain, vector, still):
+    """Neutral, with m = rho V, it takes the water's acceleration whatever its added mass, were it not to turn."""
+    model = plain({"waves": {**VALUES, "direction": 0.0}})
+    at = vector(1.0, 2.0, 4.0, 0, 0, 0)
+    velocity, acceleration = water(
+        at[:3], torch.tensor(2.0, dtype=torch.float64), {**VALUES, "direction": 0.0}
+    )
+    nu = torch.cat([velocity, torch.zeros(3, dtype=torch.float64)])
+    rate = model(at, nu, still, time=2.0)
+    torch.testing.assert_close(rate[:3], acceleration, rtol=1e-12, atol=1e-15)
+
+
+def test_a_fixed_body_feels_displaced_and_added_mass(plain, vector, still):
+    """At rest with enormous mass, F = (rho V + A) a by Morison's inertia term, less drag, which is none here."""
+    at = vector(1.0, 2.0, 4.0, 0, 0, 0)
+    bare, model = (plain(e, mass=5e8, buoyancy=490.5) for e in (None, {"waves": VALUES}))
+    time = 2.0
+    change = (model(at, still, still, time=time) - bare(at, still, still, time=time))[:3] * 5e8
+    acceleration = water(at[:3], torch.tensor(time, dtype=torch.float64))[1]
+    # Munk's moments turn it, but the force on a body that does not move also holds -C_A(nu_r) nu_r = 0 in front.
+    expected = (50 + torch.tensor([20.0, 30, 40], dtype=torch.float64)) * acceleration
+    torch.testing.assert_close(change, expected, rtol=1e-4, atol=1e-4)
