@@ -73,7 +73,7 @@ def test_frozen_ahead_draws_percent_on_a_log_axis():
 def test_structures_have_a_row_each_and_a_marker_for_each_training():
     figure = structures(study()["table"], {"multisine_rmse_over_range_worst": "held out"})
     (ax,) = figure.axes
-    assert [t.get_text() for t in ax.get_yticklabels()][0].startswith("known")
+    assert ax.get_yticklabels()[0].get_text().startswith("known")
     rich, manoeuvre = ax.lines
     np.testing.assert_allclose(rich.get_xdata(), [300, 17, 0.4, 0.2])
     np.testing.assert_allclose(np.asarray(manoeuvre.get_xdata()) / rich.get_xdata(), 30)
