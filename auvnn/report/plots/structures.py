@@ -37,7 +37,7 @@ def structures(rows: Sequence[Mapping[str, Any]], errors: Mapping[str, str]) -> 
             own = [r for r in rows if r["trained_on"] == trained and (finite(r.get(key)) or 0) > 0]
             x = [100.0 * float(r[key]) for r in own]
             y = [names.index(str(r["structure"])) + 0.14 * (k - (len(data) - 1) / 2) for r in own]
-            handles[f"trained on {trained}"] = ax.plot(
+            handles[f"trained on: {trained}"] = ax.plot(
                 x,
                 y,
                 ls="none",
@@ -47,6 +47,7 @@ def structures(rows: Sequence[Mapping[str, Any]], errors: Mapping[str, str]) -> 
                 mfc="white" if k else look.color,
             )[0]
         ax.set_xscale("log")
+        ax.margins(x=0.08)
         ax.set_xlabel("rms error (% of the range)")
         ax.set_title(label(title, 60), fontsize=8)
         style.show_grid(ax, "both")

@@ -69,6 +69,7 @@ def payload(options: Options, progress: Callable[[str], None]) -> Study:
     """
     plant, case = load_plant(options.model), options.case
     variant = word(case["variant"], "case.variant", VARIANTS)
+    _check_time(options)  # before minutes of training
     training = training_log(plant, options, "none")
     model, fit = six_networks(plant, options, training)
     progress(f"six networks on the empty vehicle: {fit.stopped}")
@@ -140,12 +141,7 @@ def pick_up(plant: GreyBox, options: Options, variant: str) -> Mission:
     """
     case, vehicle = options.case, plant.vehicle
     first = manoeuvre_log(plant, options).runs[0]
-    time = number(case["time"], "case.time")
-    row = int(np.searchsorted(first.t, time - 1e-9))
-    if not 2 <= row <= first.samples - 3:
-        raise ConfigError(
-            f"case.time={time:g} s: the pick-up must lie within the {options.duration:g} s of the run"
-        )
+    row = int(np.searchsorted(first.t, _check_time(options) - 1e-9))
     cylinder = Cylinder.build(
         number(case["mass"], "case.mass"),
         case["cylinder"],
@@ -178,6 +174,16 @@ def pick_up(plant: GreyBox, options: Options, variant: str) -> Mission:
     truth = _measured(first, eta, nu, plant, after, row)
     live = truth if case["noise"] == "none" else _noisy(truth, case["noise"], options)
     return Mission(truth, live, row, after, jump, factors)
+
+
+def _check_time(options: Options) -> float:
+    """Return the time of the pick-up, s, which leaves some samples on either side."""
+    time, margin = number(options.case["time"], "case.time"), 3.0 / options.rate
+    if not margin <= time <= options.duration - margin:
+        raise ConfigError(
+            f"case.time={time:g} s: the pick-up must lie within the {options.duration:g} s of the run"
+        )
+    return time
 
 
 def _measured(
