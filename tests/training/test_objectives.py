@@ -51,14 +51,14 @@ def clean():
 
 
 def test_slopes_of_free_running_by_the_weights_are_those_of_differences():
-    fine = make_log(GreyBox(VEHICLE), runs=1, duration=2.0, rate=40.0, seed=8)
+    fine = make_log(GreyBox(VEHICLE), runs=1, duration=2.0, rate=20.0, seed=8)
     model = GreyBox(BARE, (), DampingBank.from_description("mlp", 1))
-    windows = cut_windows(fine, 1.0, kind="thrusters").pick(slice(0, 2))
+    windows = cut_windows(fine, 1.0, kind="thrusters").pick(slice(0, 1))
     initial = initial_states(model, windows)
     answer = respond(model, windows, initial, (), weights=True)
     weights = get_weights(model)
     assert answer.parameters.shape[-1] == len(weights) == 426
-    for k in (0, 100, 300, 365, 425):
+    for k in (100, 365, 425):
         step = np.zeros(426)
         step[k] = 1e-4
         errors = []
@@ -66,7 +66,8 @@ def test_slopes_of_free_running_by_the_weights_are_those_of_differences():
             set_weights(model, weights + sign * step)
             errors.append(output_error(model, windows, initial))
         slope = (errors[1] - errors[0]) / 2e-4
-        assert float((answer.parameters[..., k] - slope).abs().max()) < 0.02 * float(slope.abs().max()) + 1e-7
+        # Exact up to the square of the time step, as for the effects' parameters.
+        assert float((answer.parameters[..., k] - slope).norm()) < 0.07 * float(slope.norm())
 
 
 def test_the_truth_leaves_nothing_and_stays(clean):
@@ -80,7 +81,7 @@ def test_the_truth_leaves_nothing_and_stays(clean):
 @pytest.mark.parametrize("name", ["rollout", "rollout_torchdiffeq"])
 def test_a_wrong_law_is_mended_and_free_running_held_out_gains(name, noisy, clean):
     model = learner(0.7)
-    few = {"iterations": 5, "prior": 100.0} if name == "rollout" else {"epochs": 25, "learning_rate": 3.0}
+    few = {"iterations": 3, "prior": 100.0} if name == "rollout" else {"epochs": 10, "learning_rate": 6.0}
     objective = build_objective({"objective": name, "window": 2.0, **few})
     found = objective.refine(model, noisy.select([0, 1]), noisy.select([2]))
     scale = scale_of(clean)
@@ -90,7 +91,7 @@ def test_a_wrong_law_is_mended_and_free_running_held_out_gains(name, noisy, clea
 
 
 def test_least_squares_finds_the_true_coefficients_from_clean_runs(clean):
-    found = Shooting(window=2.0, iterations=8, prior=1e3).refine(learner(0.8), clean, clean)
+    found = Shooting(window=2.0, iterations=5, prior=1e3).refine(learner(0.8), clean, clean)
     truth = get_weights(learner())
     np.testing.assert_allclose(get_weights(found.model), truth, rtol=0.02)
 
