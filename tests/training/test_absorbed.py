@@ -15,7 +15,7 @@ from auvnn.damping.bank import DampingBank
 from auvnn.metrics.one_step import choose_derivative
 from auvnn.models import GreyBox
 from auvnn.training import train
-from auvnn.training.absorbed import absorption, traces
+from auvnn.training.absorbed import _power, absorption, traces
 from auvnn.training.learned import Learned, correlated
 
 VEHICLE = small_vehicle()
@@ -38,7 +38,7 @@ def test_honest_damping_is_passed_over_in_silence(accelerations):
 
 
 def test_a_constant_force_is_named_with_its_value():
-    found, _ = trained({"constant_force": {"X": 6.0, "K": 0.5}})
+    found, _ = trained({"constant_force": {"X": 6.0, "K": 0.5}}, accelerations=True)
     first = found.absorbed.named[0]
     assert first.effect == "constant_force" and first.share > 0.8
     for name, value in (("X", 6.0), ("K", 0.5)):
@@ -53,7 +53,7 @@ def test_a_constant_force_is_named_with_its_value():
 
 
 def test_buoyancy_is_named_among_what_it_cannot_be_told_from():
-    found, _ = trained({"net_buoyancy": {"force": 6.0}}, seed=2)
+    found, _ = trained({"net_buoyancy": {"force": 6.0}}, runs=4, accelerations=True)
     names = [s.effect for s in found.absorbed.named]
     assert "net_buoyancy" in names
     force = next(s for s in found.absorbed.named if s.effect == "net_buoyancy").parameters["force"]
@@ -76,15 +76,24 @@ def test_a_current_on_one_heading_is_named():
     assert any("ocean_current" in w and "not damping" in w for w in found.warnings)
 
 
-def test_damping_that_drives_is_told():
-    log = make_log(TRUTH, runs=1, duration=10.0, accelerations=True)
+def test_damping_that_drives_is_told_with_where_and_how_much():
+    random = np.random.default_rng(4)
+    nu = random.normal(size=(400, 6))
     bank = DampingBank.from_description({"form": "polynomial", "coupled": False})
     with torch.no_grad():
         bank.groups()[0].linear.fill_(20.0)
-        bank.groups()[0].linear[1] = -20.0
-    found = absorption(GreyBox(BARE.vehicle, (), bank), log)
-    assert found.driving > 0.05 and found.worst[0] > 0
-    assert any("adds energy" in w for w in found.words())
+        bank.groups()[0].linear[1] = -60.0
+    truth = nu * [20, -60, 20, 20, 20, 20]
+    learned = Learned(bank, nu, truth + random.normal(size=nu.shape), np.zeros(400, dtype=int))
+    share, (power, where) = _power(learned)
+    lost = (nu * truth).sum(1)
+    assert share == pytest.approx(np.mean(lost < 0), abs=0.05)
+    assert power == pytest.approx(-lost.min()) and np.array_equal(where, nu[lost.argmin()])
+    # The same law of which the data leave everything open is not accused.
+    assert (
+        _power(Learned(bank, nu, truth + 3e3 * random.normal(size=nu.shape), np.zeros(400, dtype=int)))[0]
+        == 0
+    )
 
 
 def test_a_model_without_networks_has_learned_nothing():
