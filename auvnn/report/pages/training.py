@@ -79,7 +79,10 @@ class TrainingPage(Page):
                 "Where the two part, the fit begins to learn the data by heart.",
             ),
             *_rollout_plots(view),
-            *(learned_plots(view) or [Plot("damping_curves", "What damping was found", lambda: _damping(view), "")]),
+            *(
+                learned_plots(view)
+                or [Plot("damping_curves", "What damping was found", lambda: _damping(view), "")]
+            ),
         ]
 
     def tables(self, view: View) -> list[Table]:

@@ -34,9 +34,10 @@ class UncertaintiesPage(Page):
         """Return the figures."""
         found = _manoeuvres(view)
         shares = {
-            m: {e: s.get("share") for e, s in one["swallowed"].items()}
+            f"{m}, {words}": {e: s.get(key) for e, s in one["swallowed"].items()}
             for m, one in found.items()
             if one.get("swallowed")
+            for key, words in (("share", "fitted"), ("held_out", "held out"))
         }
         return [
             Plot(
@@ -45,7 +46,9 @@ class UncertaintiesPage(Page):
                 lambda: swallowed(shares),
                 "Share of the wrench by which an effect betrays itself that six networks of the paper's size can "
                 "be trained to give, from the velocity alone. Near 1 the networks fit whatever is wrong, and "
-                "agreement on that manoeuvre says nothing of the damping.",
+                "agreement on that manoeuvre says nothing of the damping. Fitted: on the runs that they were trained on; "
+                "held out: on other runs of the same manoeuvre (the paper's runs are all alike), where less than "
+                "nothing counts as 0.",
             ),
             Plot(
                 "identifiability",
