@@ -7,6 +7,13 @@ from typing import Any, ClassVar
 from auvnn.effects.base import AXES, Body, Effect, Moment, Parameter, axis_scale
 
 
+def actuators(vehicle: Any, actuation: str) -> tuple[str, ...]:
+    """Return the names of the actuators: thrusters, or the axes of a commanded wrench."""
+    if actuation == "wrench":
+        return AXES
+    return tuple(f"thruster_{i + 1}" for i in range(len(vehicle.thrusters)))
+
+
 class AxisFactors(Effect):
     """Six factors on the diagonal of a coefficient matrix; one everywhere changes nothing.
 

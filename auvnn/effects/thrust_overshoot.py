@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from auvnn.effects.base import Effect, Parameter
-from auvnn.effects.thruster_gain import actuators
+from auvnn.effects.factors import actuators
 
 # Rows whose filter is worked out as one product of matrices.
 CHUNK = 128

@@ -6,14 +6,8 @@ from typing import Any
 
 from torch import Tensor
 
-from auvnn.effects.base import AXES, Effect, Moment, Parameter
-
-
-def actuators(vehicle: Any, actuation: str) -> tuple[str, ...]:
-    """Return the names of the actuators: thrusters, or the axes of a commanded wrench."""
-    if actuation == "wrench":
-        return AXES
-    return tuple(f"thruster_{i + 1}" for i in range(len(vehicle.thrusters)))
+from auvnn.effects.base import Effect, Moment, Parameter
+from auvnn.effects.factors import actuators
 
 
 class ThrusterGain(Effect):
