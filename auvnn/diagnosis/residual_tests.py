@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 NAMES = ("u", "v", "w", "p", "q", "r")
 # Two-sided level of every band, draws of noise behind it, and the longest lag, s.
 LEVEL, DRAWS, LONGEST = 0.99, 200, 2.0
+# Windows behind the bands: more would make them no truer, only slower.
+SAMPLED = 10
 LAGS = 40
 # Windows taken at a time, which bounds the memory of the draws.
 CHUNK = 12
@@ -106,37 +108,69 @@ def residual_tests(explanation: Explanation, windows: Windows, draws: int = DRAW
     loose = torch.diag(torch.as_tensor(1.0 / LOOSE))
     wrench = _wrench(fitted.model, windows)
     wrench = wrench - wrench.mean((0, 1))
-    # One column for what was measured, the others for noise: all take the same way.
-    sums = torch.zeros(draws + 1, 6, count + 1, dtype=torch.float64)
-    crossed = torch.zeros(draws + 1, 6, 6, count, dtype=torch.float64)
-    drive = torch.zeros(6, 6, dtype=torch.float64)
+    measured, noise = _Sums(1, count), _Sums(draws, count)
+    # The bands come from a share of the windows; their width goes with the root of the number.
+    sampled = np.zeros(len(windows), dtype=bool)
+    sampled[np.linspace(0, len(windows) - 1, min(SAMPLED, len(windows))).astype(int)] = True
     for begin in range(0, len(windows), CHUNK):
         part = windows.pick(slice(begin, begin + CHUNK))
         answer = respond(fitted.model, part, fitted.initial[begin : begin + CHUNK], ())
-        size = len(part)
         mask = part.mask * (weight > 0)
-        state = (answer.state * weight[:, None]).reshape(size, length * 18, 12)
-        q = torch.linalg.qr(torch.cat([state, loose.expand(size, 12, 12)], dim=1))[0][:, :-12]
-        noise = torch.randn(size, length, 18, draws, generator=generator, dtype=torch.float64)
-        both = torch.cat([(answer.error * weight).unsqueeze(-1), noise], dim=-1) * mask.unsqueeze(-1)
-        flat = both.reshape(size, length * 18, draws + 1)
-        left = (flat - q @ (q.mT @ flat)).reshape(size, length, 18, draws + 1)
-        error = (left * mask.unsqueeze(-1))[:, :, VELOCITY]
+        state = (answer.state * weight[:, None]).reshape(len(part), length * 18, 12)
+        q = torch.linalg.qr(torch.cat([state, loose.expand(len(part), 12, 12)], dim=1))[0][:, :-12]
         tau = wrench[begin : begin + CHUNK]
-        for k in range(count + 1):
-            sums[:, :, k] += torch.einsum("blcd,blcd->dc", error[:, k:], error[:, : length - k])
-            if k:
-                crossed[..., k - 1] += torch.einsum("blcd,blj->dcj", error[:, k:], tau[:, : length - k])
-        drive += torch.einsum("blc,blj->cj", mask[:, :, VELOCITY], tau**2)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        energy = sums[:, :, :1]
-        auto = (sums[:, :, 1:] / energy).numpy()
-        cross = (crossed / torch.sqrt(energy.unsqueeze(-1) * drive.unsqueeze(-1))).numpy()
-    tail = 0.5 * (1.0 - LEVEL)
-    low, high = np.quantile(auto[1:], [tail, 1.0 - tail], axis=0).astype(np.float64)
-    below, above = np.quantile(cross[1:], [tail, 1.0 - tail], axis=0).astype(np.float64)
+        measured.add((answer.error * weight).unsqueeze(-1), q, mask, tau)
+        some = torch.as_tensor(sampled[begin : begin + CHUNK])
+        if some.any():
+            drawn = torch.randn(int(some.sum()), length, 18, draws, generator=generator, dtype=torch.float64)
+            noise.add(drawn, q[some], mask[some], tau[some])
+    auto, cross = measured.correlations()
+    narrower = float(np.sqrt(sampled.mean()))
+    bands = [_band(x, narrower) for x in noise.correlations()]
     lags = (step * np.arange(1, count + 1)).astype(np.float64)
-    return ResidualTests(lags, auto[0], low, high, cross[0], below, above)
+    return ResidualTests(lags, auto[0], *bands[0], cross[0], *bands[1])
+
+
+class _Sums:
+    """Sums of products over windows, for several series at once.
+
+    Args:
+        series: how many.
+        count: longest lag, samples.
+    """
+
+    def __init__(self, series: int, count: int) -> None:
+        self.own = torch.zeros(series, 6, count + 1, dtype=torch.float64)
+        self.with_drive = torch.zeros(series, 6, 6, count, dtype=torch.float64)
+        self.drive = torch.zeros(6, 6, dtype=torch.float64)
+
+    def add(self, series: Tensor, q: Tensor, mask: Tensor, tau: Tensor) -> None:
+        """Project series (B, L, 18, S) as the initial states do, and add what B windows give."""
+        size, length = series.shape[:2]
+        flat = (series * mask.unsqueeze(-1)).reshape(size, length * 18, -1)
+        left = (flat - q @ (q.mT @ flat)).reshape(size, length, 18, -1)
+        error = (left * mask.unsqueeze(-1))[:, :, VELOCITY]
+        for k in range(self.own.shape[-1]):
+            self.own[:, :, k] += torch.einsum("blcd,blcd->dc", error[:, k:], error[:, : length - k])
+            if k:
+                self.with_drive[..., k - 1] += torch.einsum(
+                    "blcd,blj->dcj", error[:, k:], tau[:, : length - k]
+                )
+        self.drive += torch.einsum("blc,blj->cj", mask[:, :, VELOCITY], tau**2)
+
+    def correlations(self) -> tuple[Array, Array]:
+        """Return autocorrelations (S, 6, K) and those with the wrench before, (S, 6, 6, K)."""
+        energy = self.own[:, :, :1]
+        auto = self.own[:, :, 1:] / energy
+        cross = self.with_drive / torch.sqrt(energy.unsqueeze(-1) * self.drive.unsqueeze(-1))
+        return auto.numpy(), cross.numpy()
+
+
+def _band(drawn: Array, narrower: float) -> tuple[Array, Array]:
+    tail = 0.5 * (1.0 - LEVEL)
+    middle = drawn.mean(axis=0)
+    low, high = np.quantile(drawn, [tail, 1.0 - tail], axis=0)
+    return middle + narrower * (low - middle), middle + narrower * (high - middle)
 
 
 def _wrench(model: GreyBox, windows: Windows) -> Tensor:
