@@ -19,6 +19,7 @@ class _Truth:
 
 
 def _run(job: Job) -> Answering:
+    from auvnn.logs.writing import write_commands
     from auvnn.simulate import simulate
 
     model = job.model()
@@ -29,6 +30,9 @@ def _run(job: Job) -> Answering:
         actuation=job["actuation"], accelerations=job["accelerations"], max_step=job["max_step"], bottom=job["bottom"],
     )  # fmt: skip
     made.log.write(job.folder / "log.parquet")
+    if job["commands"]:
+        write_commands(made.log, job.folder / "commands.csv")
+        job.say("result    commands.csv holds what the vehicle is told to do, row by row")
     truth = _Truth(made.truth)
     write_text(job.folder / "truth.json", json.dumps(truth.to_dict(), indent=1, allow_nan=False))
     for name, values in made.truth["hidden"].items():

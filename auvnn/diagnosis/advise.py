@@ -75,7 +75,8 @@ class Advice:
             )
         return (
             f"Drive {manoeuvre} ({WORDS.get(manoeuvre, 'see auvnn simulate')}) for {DURATION:g} s: it would tell "
-            f"{apart} apart by {errors:.0f} standard errors. `auvnn simulate excitation={manoeuvre}` makes the commands."
+            f"{apart} apart by {errors:.0f} standard errors. "
+            f"`auvnn simulate excitation={manoeuvre} commands=true` writes the commands."
         )
 
 

@@ -55,7 +55,23 @@ def write(log: Log, path: Path, overwrite: bool) -> Path:
         raise ConfigError(f"a log is written as .parquet or .csv, not as '{path.name}'")
     if path.exists() and not overwrite:
         raise InputError(f"{path} is there already; choose another name or overwrite it explicitly")
+    return _placed(to_frame(log), path)
+
+
+def write_commands(log: Log, path: Path) -> Path:
+    """Write what the vehicle was told, as a CSV file that a mission script can read: run, t, commands, fin angles.
+
+    Row k is held from its time to that of row k + 1.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
     frame = to_frame(log)
+    told = [n for n in frame.columns if n in ("run", "t") or n.startswith(("thruster_", "tau_", "fin_"))]
+    return _placed(frame.select(told), path)
+
+
+def _placed(frame: pl.DataFrame, path: Path) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")

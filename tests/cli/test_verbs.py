@@ -272,3 +272,13 @@ def refused_after(
         return line
 
     return run
+
+
+def test_a_manoeuvre_is_written_as_a_command_file(auvnn, tmp_path):
+    words = ["model=rov95", "excitation=pulses", "noise=none", "runs=2", "duration=4", "rate=5", "commands=true"]
+    status, _, err = auvnn("simulate", *words, f"out={tmp_path / 'made'}")
+    assert status == 0, err
+    told = np.genfromtxt(tmp_path / "made" / "commands.csv", delimiter=",", names=True)
+    log = Log.read(tmp_path / "made" / "log.parquet")
+    assert told.dtype.names[:3] == ("run", "t", "thruster_1") and len(told) == log.samples
+    np.testing.assert_allclose(told["thruster_2"][told["run"] == 1], log.runs[1].thrusters[:, 1])

@@ -99,7 +99,7 @@ class DiagnosisPage(Page):
             ),
             Plot(
                 "residual_tests",
-                "Is what is left white?",
+                "Whiteness of what is left",
                 lambda: _residual_tests(view),
                 "Autocorrelation of what free running leaves, initial states estimated. Grey: where white noise of the "
                 "sensors would lie, 99 % of it, after the same estimation. What leaves the band is not noise.",
