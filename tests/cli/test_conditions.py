@@ -38,6 +38,7 @@ def test_realistic_noise_is_that_of_the_contract():
         "y": 0.05,
         "z": 0.01,
         "voltage": 0.02,
+        "altitude": 0.02,
     }
     assert dict(noise.standard_deviation) == expected
 
