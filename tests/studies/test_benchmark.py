@@ -168,7 +168,7 @@ def test_an_unknown_standard_error_is_left_out_of_the_coverage():
 def test_a_fault_is_an_outcome_and_not_the_end(monkeypatch):
     import auvnn.diagnosis
 
-    def breaks(*_: Any) -> None:
+    def breaks(*_: Any, **__: Any) -> None:
         raise AuvnnError("the model diverges")
 
     monkeypatch.setattr(auvnn.diagnosis, "diagnose", breaks)

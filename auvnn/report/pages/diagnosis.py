@@ -97,13 +97,7 @@ class DiagnosisPage(Page):
                 "How alike the marks are that two effects leave on this log: 1 means that the log cannot "
                 "tell them apart, whatever the method. Framed pairs need another experiment.",
             ),
-            Plot(
-                "residual_tests",
-                "Whiteness of what is left",
-                lambda: _residual_tests(view),
-                "Autocorrelation of what free running leaves, initial states estimated. Grey: where white noise of the "
-                "sensors would lie, 99 % of it, after the same estimation. What leaves the band is not noise.",
-            ),
+            *_whiteness(view),
             *learned_plots(view),
         ]
 
@@ -154,7 +148,7 @@ class DiagnosisPage(Page):
             ),
             Table(
                 "What is left, against the commands",
-                ["velocity", "component", "correlation", "lag [s]", "in half-widths of the 99 % band"],
+                ["velocity", "component", "correlation", "lag, s", "in half-widths of the 99 % band"],
                 _with_commands(tested) if isinstance(tested, Mapping) else [],
                 "Largest correlation of each velocity's error with each component of the commanded wrench before it; "
                 "only what leaves its band. An actuator or inertia that is wrong shows here.",
@@ -284,6 +278,20 @@ def _similarity(view: View) -> Figure:
     if not isinstance(found, (list, tuple)) or len(found) != 2:
         raise NoData("the answer holds no similarities")
     return similarity([str(n) for n in found[0]], found[1])
+
+
+def _whiteness(view: View) -> list[Plot]:
+    if not view.mapping("residual_tests"):
+        return []
+    return [
+        Plot(
+            "residual_tests",
+            "Whiteness of what is left",
+            lambda: _residual_tests(view),
+            "Autocorrelation of what free running leaves, initial states estimated. Grey: where white noise of the "
+            "sensors would lie, 99 % of it, after the same estimation. What leaves the band is not noise.",
+        )
+    ]
 
 
 def _residual_tests(view: View) -> Figure:

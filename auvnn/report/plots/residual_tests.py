@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -27,7 +26,8 @@ def residual_tests(before: Mapping[str, Any], after: Mapping[str, Any]) -> Figur
     shown = {n: u for n, u in style.VELOCITY if n in (after.get("autocorrelation") or {})}
     if not shown:
         raise NoData("no velocity was measured")
-    figure, axes = plt.subplots(2, 3, figsize=(style.PAGE, 3.6), sharex=True, layout="constrained")
+    figure = style.new_figure(style.PAGE, 3.6)
+    axes = figure.subplots(2, 3, sharex=True)
     values = [before, after]
     curves = [
         {n: list(np.asarray(e["value"], dtype=float)) for n, e in (v.get("autocorrelation") or {}).items()}
@@ -56,7 +56,7 @@ def residual_tests(before: Mapping[str, Any], after: Mapping[str, Any]) -> Figur
         top = max(0.3, *(float(np.nanmax(np.abs(line.get_ydata()))) for line in axis.lines))
         axis.set_ylim(-min(0.35, top), min(1.0, 1.1 * top))
     for axis in axes[-1]:
-        axis.set_xlabel("lag [s]")
+        axis.set_xlabel("lag (s)")
     for axis in axes[:, 0]:
         axis.set_ylabel("autocorrelation")
     handles, labels = next(a for a in axes.flat if a.lines).get_legend_handles_labels()
