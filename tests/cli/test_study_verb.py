@@ -46,11 +46,9 @@ def test_each_case_composes_to_options(case, auvnn):
     assert smoke.duration < full.duration and smoke.scheme["restarts"] == 1
 
 
-# The other two take longer than a test should; the checks of the whole tree run all three from the command line.
-LONG = [pytest.param(c, marks=[] if c == "noise_free" else pytest.mark.long) for c in CASES.names()]
-
-
-@pytest.mark.parametrize("case", LONG)
+# Longer than a test should take; the checks of the whole tree run all three from the command line.
+@pytest.mark.long
+@pytest.mark.parametrize("case", CASES.names())
 def test_each_case_runs_and_leaves_what_it_says(case, auvnn):
     status, _, err = auvnn("study", f"case={case}", "effort=smoke", "out=out", *QUICK[case])
     assert status == 0 and "Traceback" not in err, err

@@ -65,7 +65,10 @@ def gap(found, expected):
     return ((found - expected).abs().amax((0, 1)) / (size + 1e-6 * float(size.max()))).numpy()
 
 
-@pytest.mark.parametrize(("accelerations", "uneven"), [(False, 0.6), (True, 0.0)])
+# The whole catalogue at once takes a while: the second of the two is for a run by hand.
+@pytest.mark.parametrize(
+    ("accelerations", "uneven"), [(True, 0.0), pytest.param(False, 0.6, marks=pytest.mark.long)]
+)
 def test_sensitivities_to_all_effects_at_once_and_to_the_start(model, accelerations, uneven):
     names = model.effect_names
     assert set(EFFECTS.names()) <= set(names)
