@@ -20,7 +20,7 @@ from auvnn.training.sensitivity import output_error, respond
 # A smaller perturbation loses digits, a larger one bends: in units of the parameters' plausible departures.
 STEP = 1e-4
 # Second order in the time step: positions after ten steps are good to a few per cent, see the test of the order.
-CLOSE = 0.05
+CLOSE = 0.03
 
 
 @pytest.fixture(scope="module")
@@ -72,8 +72,9 @@ def gap(found, expected):
 def test_sensitivities_to_all_effects_at_once_and_to_the_start(model, accelerations, uneven):
     names = model.effect_names
     assert set(EFFECTS.names()) <= set(names)
-    log = make_log(model, runs=1, duration=1.0, rate=40.0, accelerations=accelerations, uneven=uneven)
-    windows = cut_windows(log, 0.4, 0.6, warmup=0.3)
+    # So many effects at once make for a quick vehicle: the steps must be shorter than one effect would need.
+    log = make_log(model, runs=1, duration=0.7, rate=60.0, accelerations=accelerations, uneven=uneven)
+    windows = cut_windows(log, 0.25, 0.4, warmup=0.2)
     initial = initial_states(model, windows)
     found = respond(model, windows, initial, names)
     states, parameters = by_differences(model, windows, initial, names)
@@ -84,12 +85,13 @@ def test_sensitivities_to_all_effects_at_once_and_to_the_start(model, accelerati
     assert {n: w for n, w in worst.items() if w > CLOSE} == {}
     # Nothing of this may be trivial: every parameter moves some output, but for those of effects that this vehicle or
     # log has nothing for, and for a moment or a shape.
-    silent = {n for n, size in zip(labels, parameters.abs().amax((0, 1, 2)), strict=True) if size <= 1e-6}
     kinds = {n: type(model.effect(n)) for n in names}
-    absent = {n for n, kind in kinds.items() if kind.lacks(model.vehicle, "thrusters") or kind.channels}
-    shapes = {f"{n}.{p.name}" for n in names for p in model.effect(n).parameters_of if p.shape}
-    assert {n for n in silent if n.split(".")[0] not in absent} <= shapes and len(silent) < len(labels) / 4
-    assert bool((parameters[..., ACCELERATION, :].abs().amax((0, 1, 2)) > 0).any()) == accelerations
+    unlogged = {"altitude", "voltage"} | (set() if accelerations else {"du", "dv", "dw", "dp", "dq", "dr"})
+    absent = {n for n, k in kinds.items() if k.lacks(model.vehicle, "thrusters") or unlogged & set(k.channels)}
+    able = torch.tensor([n not in absent and not p.shape for n in names for p in model.effect(n).parameters_of])
+    assert able.sum() > 0.8 * len(labels)
+    assert (parameters[..., able].abs().amax((0, 1, 2)) > 1e-6).all()
+    assert (parameters[..., ACCELERATION, able].abs().amax((0, 1, 2)) > 0).all() == accelerations
     torch.testing.assert_close(found.error, output_error(model, windows, initial))
 
 
