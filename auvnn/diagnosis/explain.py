@@ -143,7 +143,7 @@ def weigh(layout: Layout, explanation: Explanation, factor: float) -> Explanatio
     # Where it begins and how often it swings is as likely in one place as in another.
     away[np.concatenate([np.zeros(0, dtype=bool), *(shapes(layout, n) for n in explanation.names)])] = 0.0
     data = float(fitted.statistics.cost.sum()) / factor
-    information = fitted.statistics.hessian.sum(0) * size[:, None] * size / factor
+    information = fitted.statistics.total * size[:, None] * size / factor
     volume = np.linalg.slogdet(information + np.eye(len(size)))[1]
     return replace(explanation, evidence=-0.5 * (data + float(away @ away) + volume))
 
@@ -172,7 +172,7 @@ def standard_errors(explanation: Explanation, columns: NDArray[np.int64]) -> tup
     statistics, fitted = explanation.fitted.statistics, explanation.fitted
     covariance = fitted.covariance()
     others = np.setdiff1d(np.arange(len(fitted.theta)), columns)
-    total = statistics.hessian.sum(0) + np.diag(fitted.priors.precision)
+    total = statistics.total + np.diag(fitted.priors.precision)
     carry = np.linalg.lstsq(total[np.ix_(others, others)], total[np.ix_(others, columns)], rcond=1e-12)[0]
     by_window = statistics.slope[:, columns] - statistics.slope[:, others] @ carry
     information = total[np.ix_(columns, columns)] - total[np.ix_(columns, others)] @ carry

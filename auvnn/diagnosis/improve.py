@@ -14,7 +14,7 @@ from auvnn.answers import Answer, plain
 from auvnn.catalogue import unknown_name
 from auvnn.diagnosis.bake import baked
 from auvnn.diagnosis.compare import stitch
-from auvnn.diagnosis.diagnose import windows_for
+from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.explain import Explanation, determined, explain, standard_errors
 from auvnn.diagnosis.nuisance import Layout, lay_out
 from auvnn.diagnosis.one_step_fit import explain_one_step, left_out_gain

@@ -9,8 +9,8 @@ the correction here is Bonferroni's, which holds whatever the dependence.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ import torch
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 from torch import Tensor, nn
-from torch.func import functional_call, vmap
+from torch.func import functional_call, jacfwd, vmap
 
 from auvnn.diagnosis.explain import Explanation
 from auvnn.diagnosis.nuisance import Layout
@@ -106,6 +106,7 @@ class StandIns(Effect):
         held[:, live] = 0.0
         self.register_buffer("held", held, persistent=False)
         self.register_buffer("place", torch.eye(len(described), dtype=torch.float64)[live], persistent=False)
+        self.register_buffer("start", start[:, live], persistent=False)
         self.theta = nn.Parameter(start[:, live].flatten())
         # The hooks that are not touched must cost nothing here either.
         self._touched = tuple(h for h in kind.hooks() if h in self.HOOKS)
@@ -113,46 +114,55 @@ class StandIns(Effect):
         made = type(f"{kind.__name__}StandIns", (StandIns,), hooks)
         self.__class__ = made  # pyright: ignore[reportAttributeAccessIssue]
 
-    def _shapes(self) -> Tensor:
-        """Return all parameters of all stand-ins, (S, p)."""
-        held, place = self.get_buffer("held"), self.get_buffer("place")
-        return held + self.theta.unflatten(0, (len(held), -1)) @ place
+    def _change(self, hook: str, args: Sequence[Any], pick: Callable[[Any], list[Tensor]]) -> list[Tensor]:
+        """Return what all shapes together change of a hook's answer, to first order in the parameters.
 
-    def _all(self, hook: str, *args: Any) -> Any:
-        return vmap(lambda theta: functional_call(self.one, {"effect.theta": theta}, (hook, *args)))(
-            self._shapes()
-        )
+        At the null an effect does nothing whatever the state, so that the state needs no derivative here; and
+        slopes from the few live parameters forwards cost far less than from all of an answer backwards.
+        """
+        start, place, args = self.get_buffer("start"), self.get_buffer("place"), list(map(_held, args))
+        held = self.get_buffer("held")
+        live = start.shape[1]
+
+        def one(values: Tensor, shape: Tensor) -> list[Tensor]:
+            theta = shape + values @ place
+            return pick(functional_call(self.one, {"effect.theta": theta}, (hook, *args)))
+
+        slopes = vmap(jacfwd(one))(start, held)
+        moved = (self.theta - start.flatten()).unflatten(0, (len(held), live))
+        return [torch.einsum("s...p,sp->...", slope, moved.to(slope)) for slope in slopes]
 
     def _thrust(self, thrust: Tensor, moment: Moment) -> Tensor:
-        return thrust + (self._all("thrust", thrust, moment) - thrust).sum(0)
+        return thrust + self._change("thrust", (thrust, moment), lambda new: [new])[0]
 
     def _water(self, moment: Moment) -> tuple[Tensor, Tensor]:
-        velocity, acceleration = self._all("water", moment)
-        return velocity.sum(0), acceleration.sum(0)
+        velocity, acceleration = self._change("water", (moment,), list)
+        return velocity, acceleration
 
     def _wrench(self, moment: Moment, body: Body) -> Tensor:
-        return self._all("wrench", moment, body).sum(0)
+        return self._change("wrench", (moment, body), lambda new: [new])[0]
 
     def _body(self, body: Body, moment: Moment | None) -> Body:
-        names = [f.name for f in fields(body) if getattr(body, f.name) is not None]
-        was = [getattr(body, n) for n in names]
-
-        def one(theta: Tensor) -> list[Tensor]:
-            new = functional_call(self.one, {"effect.theta": theta}, ("body", body, moment))
-            return [getattr(new, n) - w for n, w in zip(names, was, strict=True)]
-
-        more = vmap(one)(self._shapes())
-        return replace(body, **{n: w + m.sum(0) for n, w, m in zip(names, was, more, strict=True)})
+        # What the effect hands on untouched has no slope, and need not be asked for it.
+        new = self.one("body", body, moment)
+        names = [f.name for f in fields(body) if getattr(new, f.name) is not getattr(body, f.name)]
+        more = self._change("body", (body, moment), lambda new: [getattr(new, n) for n in names])
+        return replace(body, **{n: getattr(body, n) + m for n, m in zip(names, more, strict=True)})
 
     def _sense(self, sensed: Sensed) -> Sensed:
         names = [n for n in ("position", "quaternion", "nu", "nu_dot") if getattr(sensed, n) is not None]
+        more = self._change("sense", (sensed,), lambda new: [getattr(new, n) for n in names])
+        return replace(sensed, **{n: getattr(sensed, n) + m for n, m in zip(names, more, strict=True)})
 
-        def one(theta: Tensor) -> list[Tensor]:
-            new = functional_call(self.one, {"effect.theta": theta}, ("sense", sensed))
-            return [getattr(new, n) - getattr(sensed, n) for n in names]
 
-        more = vmap(one)(self._shapes())
-        return replace(sensed, **{n: getattr(sensed, n) + m.sum(0) for n, m in zip(names, more, strict=True)})
+def _held(value: Any) -> Any:
+    """Return an argument of a hook through which nothing is differentiated."""
+    if isinstance(value, Tensor):
+        return value.detach()
+    if is_dataclass(value) and not isinstance(value, type):
+        held = {f.name: _held(getattr(value, f.name)) for f in fields(value) if f.init}
+        return replace(value, **held)
+    return value
 
 
 @dataclass(frozen=True)

@@ -150,12 +150,14 @@ class _Sums:
         flat = (series * mask.unsqueeze(-1)).reshape(size, length * 18, -1)
         left = (flat - q @ (q.mT @ flat)).reshape(size, length, 18, -1)
         error = (left * mask.unsqueeze(-1))[:, :, VELOCITY]
-        for k in range(self.own.shape[-1]):
-            self.own[:, :, k] += torch.einsum("blcd,blcd->dc", error[:, k:], error[:, : length - k])
-            if k:
-                self.with_drive[..., k - 1] += torch.einsum(
-                    "blcd,blj->dcj", error[:, k:], tau[:, : length - k]
-                )
+        # Products at all lags at once by the Fourier transform, padded so that no end meets the other.
+        padded, lags = 2 * length, self.own.shape[-1]
+        errors = torch.fft.rfft(error, n=padded, dim=1)
+        drives = torch.fft.rfft(tau, n=padded, dim=1).conj()
+        power = torch.einsum("bfcd,bfcd->fdc", errors, errors.conj()).real
+        self.own += torch.fft.irfft(power, n=padded, dim=0)[:lags].permute(1, 2, 0)
+        both = torch.einsum("bfcd,bfj->fdcj", errors, drives)
+        self.with_drive += torch.fft.irfft(both, n=padded, dim=0)[1:lags].permute(1, 2, 3, 0)
         self.drive += torch.einsum("blc,blj->cj", mask[:, :, VELOCITY], tau**2)
 
     def correlations(self) -> tuple[Array, Array]:

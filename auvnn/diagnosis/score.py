@@ -63,7 +63,7 @@ def project(
     """
     others = [n for n in base if n != effect]
     f, c = layout.of(others), layout.columns[effect]
-    total = statistics.hessian.sum(0)
+    total = statistics.total
     held = priors(layout, others, free)
     theta = parameters_of(layout.model, others)
     # What is at the end of its reach cannot move further to take the candidate's share.
@@ -84,7 +84,7 @@ def _explained(
     """Return what of the scores by window (B, p) a step of the effect's parameters explains, the base following."""
     others = [n for n in base if n != effect]
     f, c = layout.of(others), layout.columns[effect]
-    total = statistics.hessian.sum(0)
+    total = statistics.total
     inner = total[np.ix_(f, f)] + np.diag(priors(layout, others, free).precision)
     carry = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
     both = np.concatenate([c, f])
@@ -182,7 +182,7 @@ def similarity(statistics: Statistics, layout: Layout, base: list[str], names: l
     lies in the span of b's, after what else is uncertain has been taken out of both.
     """
     out = np.eye(len(names))
-    total = statistics.hessian.sum(0)
+    total = statistics.total
     for i, a in enumerate(names):
         for j, b in enumerate(names):
             if i == j:

@@ -9,7 +9,7 @@ import numpy as np
 from auvnn.effects import EFFECTS
 
 if TYPE_CHECKING:
-    from auvnn.diagnosis.diagnose import Diagnosis
+    from auvnn.diagnosis.answer import Diagnosis
 
 
 def number(value: float | None, std: float | None, unit: str) -> str:
@@ -41,11 +41,15 @@ def tell(diagnosis: Diagnosis) -> list[str]:
         ]
     for step in diagnosis.steps:
         if step["verdict"] == "named":
-            for name in step["effects"]:
+            for name in [e for e in step["effects"] if e in diagnosis.missing]:
                 lines.append(f"Missing: {name} ({EFFECTS.get(name).cause}): {parameters(by_name[name])}.")
         elif step["verdict"] == "ambiguous":
             lines.append(
                 "One of these is missing, and this log cannot tell which: " + ", ".join(step["effects"]) + "."
+            )
+        elif step["verdict"] == "withdrawn":
+            lines.append(
+                f"Withdrawn: {', '.join(step['effects'])}, which had stood in for what was found after it."
             )
         elif step["verdict"] == "unknown":
             lines.append(

@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.catalogue import unknown_name
-from auvnn.diagnosis.diagnose import windows_for
+from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.nuisance import lay_out, stated
 from auvnn.diagnosis.probes import extent_of
 from auvnn.effects import Effect, Parameter
@@ -47,7 +47,7 @@ def oracle_information(
     for _ in range(2):
         sums, change, _ = reduce(windows, answers(layout.model, windows, states, [name]), sigma)
         states = moved(states, torch.as_tensor(change))
-    return sums.hessian.sum(0)
+    return sums.total
 
 
 def _shape(

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from auvnn.answers import Answer, plain
 from auvnn.damping.bank import DampingBank
-from auvnn.diagnosis.diagnose import windows_for
+from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.nuisance import Layout, lay_out
 from auvnn.effects import effect_class
 from auvnn.errors import ConfigError

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -21,7 +22,7 @@ from torch import Tensor
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.training.sensitivity import Response, respond
+from auvnn.training.sensitivity import Response, respond, run
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,8 @@ LOOSE = np.array([10.0] * 3 + [1.0] * 3 + [2.0] * 3 + [2.0] * 3)
 TRUST = 1e-4
 # Windows worked out at a time, as long as there are no more parameters than columns: this bounds the memory.
 CHUNK, COLUMNS = 48, 80
+# Windows run free at a time.
+BLOCK = 4 * CHUNK
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,11 @@ class Statistics:
     pairs: Array
     run: NDArray[np.int64]
     first: NDArray[np.int64]
+
+    @cached_property
+    def total(self) -> Array:
+        """J^T J of all windows, (P, P)."""
+        return self.hessian.sum(0)
 
     def columns(self, chosen: Sequence[int]) -> Statistics:
         """Return the same statistics for some of the parameters."""
@@ -123,7 +131,7 @@ class Fitted:
 
     def covariance(self) -> Array:
         """Return the covariance (P, P) of the parameters under white noise of `sigma`."""
-        precision = self.statistics.hessian.sum(0) + np.diag(self.priors.precision)
+        precision = self.statistics.total + np.diag(self.priors.precision)
         # In units of each parameter's own: what is hardly known must not pass for rounding beside what is well known.
         unit = 1.0 / np.sqrt(np.maximum(np.diag(precision), 1e-300))
         return np.linalg.pinv(precision * unit[:, None] * unit, hermitian=True) * unit[:, None] * unit
@@ -200,9 +208,13 @@ def answers(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[s
     model = model.without_absent(names)
     columns = sum(len(model.effect(n).parameters_of) for n in names)
     size = max(CHUNK * COLUMNS // max(columns, COLUMNS), 1)
-    for begin in range(0, len(windows), size):
-        part = slice(begin, begin + size)
-        yield respond(model, windows.pick(part), initial[part], names)
+    for start in range(0, len(windows), BLOCK):
+        block = slice(start, start + BLOCK)
+        some, states = windows.pick(block), initial[block]
+        ran = run(model, some, states, names)
+        for begin in range(0, len(some), size):
+            part = slice(begin, begin + size)
+            yield respond(model, some.pick(part), states[part], names, ran=ran.pick(part))
 
 
 def reduce(windows: Windows, responses: Iterable[Response], sigma: Array) -> tuple[Statistics, Array, Array]:
@@ -218,15 +230,17 @@ def reduce(windows: Windows, responses: Iterable[Response], sigma: Array) -> tup
     """
     weight = _weights(sigma)
     loose = torch.diag(torch.as_tensor(1.0 / LOOSE))
+    # Channels that were not measured would only be multiplied by nought.
+    live = torch.nonzero(weight).flatten().tolist()
     parts: list[list[Array]] = []
     begin = 0
     for answer in responses:
         count, length = answer.error.shape[:2]
         mask = windows.mask[begin : begin + count] * (weight > 0)
         begin += count
-        error = (answer.error * weight).reshape(count, length * 18, 1)
-        slopes = (answer.parameters * weight[:, None]).reshape(count, length * 18, -1)
-        state = (answer.state * weight[:, None]).reshape(count, length * 18, 12)
+        error = (answer.error[..., live] * weight[live]).reshape(count, length * len(live), 1)
+        slopes = answer.parameters[:, :, live].mul_(weight[live, None]).reshape(count, length * len(live), -1)
+        state = answer.state[:, :, live].mul_(weight[live, None]).reshape(count, length * len(live), 12)
         q, r = torch.linalg.qr(torch.cat([state, loose.expand(count, 12, 12)], dim=1))
         q = q[:, :-12]
         both = torch.cat([error, slopes], dim=-1)
@@ -328,7 +342,7 @@ def fit(
 
     for taken in range(1, iterations + 1):
         statistics, a, slopes = reduce(windows, here, sigma)
-        hessian = statistics.hessian.sum(0) + np.diag(priors.precision)
+        hessian = statistics.total + np.diag(priors.precision)
         gradient = statistics.slope.sum(0) - priors.precision * (theta - priors.mean)
         scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
         normal = hessian / scale[:, None] / scale

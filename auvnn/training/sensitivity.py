@@ -156,6 +156,7 @@ def respond(
     chunk: int = 2048,
     *,
     weights: bool = False,
+    ran: Ran | None = None,
 ) -> Response:
     """Return prediction error and sensitivities of windows.
 
@@ -167,72 +168,108 @@ def respond(
         chunk: points differentiated at a time, which bounds the memory.
         weights: let the weights of the damping subnetworks follow as further columns, in the order of
             `model.damping.parameters()`.
+        ran: the same windows as `run` returns them, where that has been done.
     """
-    with torch.no_grad():
-        # What is not there yet is differentiated below; the run itself is the same without it.
-        there = model.without_absent()
-        eta, nu = predict(there, windows, initial)
-        error = window_error(there, windows, eta, nu)
-    count, length = nu.shape[:2]
     order = [model.effect_names.index(name) for name in names]
     thetas = {f"model.effects.{k}.theta": model.members[k].theta.detach() for k in order}
     if weights and model.damping is not None:
         thetas |= {f"model.damping.{n}": p.detach() for n, p in model.damping.named_parameters()}
-    sizes = [theta.numel() for theta in thetas.values()]
-    total = sum(sizes)
+    ran = run(model, windows, initial, names) if ran is None else ran
+    eta, nu = ran.eta, ran.nu
+    count, length = nu.shape[:2]
+    total = sum(theta.numel() for theta in thetas.values())
     times = windows.times[:, windows.warmup :]
     inputs = windows.inputs.rows(windows.warmup)
     steps = times[:, 1:] - times[:, :-1]
 
-    mean, start, mean_slope, start_slope = _thrusts(model, windows, thetas, sizes)
     middle = torch.nn.functional.normalize(eta[:, :-1, 3:] + eta[:, 1:, 3:], dim=-1)
     points = (
         0.5 * (eta[:, :-1, :3] + eta[:, 1:, :3]),
         middle,
         0.5 * (nu[:, :-1] + nu[:, 1:]),
-        mean[:, :-1],
+        ran.mean[:, :-1],
         times[:, :-1] + 0.5 * steps,
         inputs.rows(0, length - 1),
     )
     rate = _differentiate(_Point(model), "rate", points, thetas, chunk)
     jac_state = torch.cat(rate[:3], dim=-1)
     jac_theta = torch.cat(rate[4:], dim=-1) if total else jac_state.new_zeros(*jac_state.shape[:-1], 0)
-    if mean_slope is not None:
-        jac_theta = jac_theta + rate[3] @ mean_slope[:, :-1].flatten(0, 1)
+    if len(ran.columns):
+        jac_theta[..., ran.columns] += rate[3] @ ran.mean_slope[:, :-1].flatten(0, 1)
 
     sensitivity = _propagate(
         jac_state, jac_theta, points[1].flatten(0, 1), points[2].flatten(0, 1), steps.flatten(), count, length
     )
-    state, parameters = _outputs(
-        model, windows, eta, nu, start, start_slope, times, inputs, thetas, sensitivity, chunk
-    )
+    state, parameters = _outputs(model, windows, ran, times, inputs, thetas, sensitivity, chunk)
     seen = windows.mask.unsqueeze(-1)
-    return Response(error, state * seen, parameters * seen)
+    return Response(ran.error, state.mul_(seen), parameters.mul_(seen))
 
 
-def _thrusts(
-    model: GreyBox, windows: Windows, thetas: dict[str, Tensor], sizes: list[int]
-) -> tuple[Tensor, Tensor, Tensor | None, Tensor | None]:
-    """Return mean and starting thrust (B, L, n) and how they change with the parameters, (B, L, n, P)."""
+@dataclass(frozen=True)
+class Ran:
+    """Windows run free once, and what their thrusts depend on: what all chunks of a response share.
+
+    Attributes:
+        eta: (B, L, 7).
+        nu: (B, L, 6).
+        error: measured minus predicted outputs, (B, L, 18).
+        mean: mean thrust of every interval, (B, L, n).
+        start: thrust as it begins, (B, L, n).
+        columns: which of the P parameters the thrusts depend on, (Q,).
+        mean_slope: change of `mean` with those, (B, L, n, Q).
+        start_slope: change of `start` with those, (B, L, n, Q).
+    """
+
+    eta: Tensor
+    nu: Tensor
+    error: Tensor
+    mean: Tensor
+    start: Tensor
+    columns: list[int]
+    mean_slope: Tensor
+    start_slope: Tensor
+
+    def pick(self, part: slice) -> Ran:
+        """Return some of the windows."""
+        return Ran(
+            self.eta[part],
+            self.nu[part],
+            self.error[part],
+            self.mean[part],
+            self.start[part],
+            self.columns,
+            self.mean_slope[part],
+            self.start_slope[part],
+        )
+
+
+def run(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str]) -> Ran:
+    """Run windows free, and differentiate their thrusts by the parameters of the named effects.
+
+    Both go step by step through time, which costs the same for few windows as for many.
+    """
     module, substeps = _Thrust(model), _substeps(windows)
     with torch.no_grad():
+        # What is not there yet is differentiated elsewhere; the run itself is the same without it.
+        there = model.without_absent()
+        eta, nu = predict(there, windows, initial)
+        error = window_error(there, windows, eta, nu)
         mean, start = module(windows, substeps)
     acting = {id(e) for e in model.before_thrust}
-    effects = [k for k in thetas if k.startswith("model.effects.")]
-    keys = [k for k in effects if id(model.members[int(k.split(".")[2])]) in acting]
+    keys, columns, at = {}, [], 0
+    for name in names:
+        k = model.effect_names.index(name)
+        size = model.members[k].theta.numel()
+        if id(model.members[k]) in acting:
+            keys[f"model.effects.{k}.theta"] = model.members[k].theta.detach()
+            columns += range(at, at + size)
+        at += size
     if not keys:
-        return mean, start, None, None
-    slopes = jacfwd(lambda some: functional_call(module, some, (windows, substeps)))(
-        {k: thetas[k] for k in keys}
-    )
-    filled = []
-    for which in slopes:
-        parts = [
-            which[k] if k in which else mean.new_zeros(*mean.shape, size)
-            for k, size in zip(thetas, sizes, strict=True)
-        ]
-        filled.append(torch.cat(parts, dim=-1).detach())
-    return mean, start, filled[0], filled[1]
+        none = mean.new_zeros(*mean.shape, 0)
+        return Ran(eta, nu, error, mean, start, [], none, none)
+    slopes = jacfwd(lambda some: functional_call(module, some, (windows, substeps)))(keys)
+    joined = [torch.cat([which[k] for k in keys], dim=-1).detach() for which in slopes]
+    return Ran(eta, nu, error, mean, start, columns, joined[0], joined[1])
 
 
 def _differentiate(
@@ -316,10 +353,7 @@ def _propagate(
 def _outputs(
     model: GreyBox,
     windows: Windows,
-    eta: Tensor,
-    nu: Tensor,
-    start: Tensor,
-    start_slope: Tensor | None,
+    ran: Ran,
     times: Tensor,
     inputs: Inputs,
     thetas: dict[str, Tensor],
@@ -332,22 +366,25 @@ def _outputs(
         full = torch.nn.functional.pad(sensitivity, (0, 0, 0, 6))
         return full[..., :12], full[..., 12:]
     what = "sense and rate" if measured_rate else "sense"
-    sizes, acting = {k: theta.shape[0] for k, theta in thetas.items()}, thetas
+    acting = thetas
     if not measured_rate:
         # The report itself depends on the sensor effects alone.
         reporting = {id(e) for e in model.using("sense")}
         acting = {k: t for k, t in thetas.items() if id(model.members[int(k.split(".")[2])]) in reporting}
-    points = (eta[..., :3], eta[..., 3:], nu, start, times, inputs)
+    points = (ran.eta[..., :3], ran.eta[..., 3:], ran.nu, ran.start, times, inputs)
     by = _differentiate(_Point(model), what, points, acting, chunk)
     shape = sensitivity.shape[:2]
     by_state = torch.cat(by[:3], dim=-1).reshape(*shape, -1, 12)
-    full = by_state @ sensitivity
-    if thetas:
-        found = dict(zip(acting, by[4:], strict=True))
-        parts = [found[k] if k in found else by[0].new_zeros(*by[0].shape[:-1], n) for k, n in sizes.items()]
-        direct = torch.cat(parts, dim=-1).reshape(*shape, -1, sensitivity.shape[-1] - 12)
-        if start_slope is not None:
-            direct = direct + by[3].reshape(*shape, -1, start.shape[-1]) @ start_slope
-        full = torch.cat([full[..., :12], full[..., 12:] + direct], dim=-1)
-    full = torch.nn.functional.pad(full, (0, 0, 0, 18 - full.shape[-2]))
+    full = sensitivity.new_zeros(*shape, 18, sensitivity.shape[-1])
+    outputs = full[:, :, : by_state.shape[-2]]
+    outputs.copy_(by_state @ sensitivity)
+    at = 12
+    found = dict(zip(acting, by[4:], strict=True))
+    for k, theta in thetas.items():
+        if k in found:
+            outputs[..., at : at + theta.numel()] += found[k].reshape(*shape, -1, theta.numel())
+        at += theta.numel()
+    if len(ran.columns):
+        through = by[3].reshape(*shape, -1, ran.start.shape[-1]) @ ran.start_slope
+        outputs[..., [12 + c for c in ran.columns]] += through
     return full[..., :12], full[..., 12:]

@@ -158,7 +158,11 @@ def train(
 
     trained, fit, nu, held_samples = one_step_fit(how, checkpoint)
     # Whether the damping adds energy is judged below, with what the log leaves open.
-    warnings = [*model.vehicle.warnings, *log.quality().reservations, *(w for w in fit.warnings if w not in fit.energy)]
+    warnings = [
+        *model.vehicle.warnings,
+        *log.quality().reservations,
+        *(w for w in fit.warnings if w not in fit.energy),
+    ]
     start, begun = trained, "the one-step fit"
     if goal.estimated_start and how.method == "measured":
         other = choose_derivative(log, {"method": "local_polynomial"})

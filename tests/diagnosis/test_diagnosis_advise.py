@@ -11,7 +11,7 @@ from strange_effects import HeavePush, listed
 
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.advise import Advice, advise
-from auvnn.diagnosis.diagnose import HORIZON, WARMUP, windows_for
+from auvnn.diagnosis.cut import HORIZON, WARMUP, windows_for
 from auvnn.diagnosis.explain import explain
 from auvnn.diagnosis.nuisance import lay_out, priors
 from auvnn.models import GreyBox
@@ -78,7 +78,7 @@ def test_the_promise_is_what_a_full_refit_leaves(twins):
 
 def test_without_advice_nothing_is_simulated(twins, monkeypatch):
     model, log = twins
-    module = sys.modules["auvnn.diagnosis.diagnose"]
+    module = sys.modules["auvnn.diagnosis.search"]
     monkeypatch.setattr(module, "advise", None)
     assert diagnose(model, log, NAMES, advice=False).next_experiment is None
 

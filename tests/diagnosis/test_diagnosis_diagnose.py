@@ -11,7 +11,7 @@ from small_logs import make_log, sines, small_vehicle
 from strange_effects import BottomPull, ClockForce, HeadingForce, HeavePush, listed
 
 from auvnn.diagnosis import diagnose
-from auvnn.diagnosis.diagnose import windows_for
+from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.unknown import inputs_of
 from auvnn.effects import EFFECTS
 from auvnn.errors import ConfigError, InputError

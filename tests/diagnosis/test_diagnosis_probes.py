@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from auvnn.diagnosis.diagnose import windows_for
+from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.nuisance import lay_out
 from auvnn.diagnosis.probes import extent_of, probed
 from auvnn.diagnosis.score import score

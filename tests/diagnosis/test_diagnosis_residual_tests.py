@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_logs import make_log, small_vehicle
 
-from auvnn.diagnosis.diagnose import windows_for
+from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.explain import explain
 from auvnn.diagnosis.nuisance import lay_out
 from auvnn.diagnosis.residual_tests import residual_tests

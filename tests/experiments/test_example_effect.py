@@ -58,7 +58,7 @@ def test_a_model_takes_it_by_name_and_keeps_it(installed, tmp_path):
 
 
 def test_diagnosis_has_it_among_its_candidates(installed):
-    from auvnn.diagnosis.diagnose import candidates_for
+    from auvnn.diagnosis.cut import candidates_for
     from auvnn.models import load
     from auvnn.simulate import simulate
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from auvnn.diagnosis.diagnose import windows_for
+from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.nuisance import lay_out, stated
 from auvnn.errors import ConfigError
 from auvnn.metrics.free_run import initial_states, moved

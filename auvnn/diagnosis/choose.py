@@ -1,0 +1,192 @@
+"""Which effect to take: the leading ones are refitted, weighed, and must pay on runs left out.
+
+Forward, one effect at a time; and backward: what was taken before must still be needed once another is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from auvnn.diagnosis.explain import Explanation, explain, weigh
+from auvnn.diagnosis.nuisance import Layout
+from auvnn.diagnosis.score import Score, inflation
+from auvnn.metrics.windows import Windows
+from auvnn.training.prediction_error import parameters_of, set_parameters
+
+ALPHA = 0.05
+# Explanations are refitted in full, nonlinearly, as long as their one-step evidence is within reach of the best.
+LEADERS, REACH, REACH_SHARE = 4, 30.0, 0.5
+# Odds of twenty to one: below that two explanations are not told apart.
+ODDS = float(np.log(20.0))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What the leading effects came to.
+
+    Attributes:
+        verdict: named, ambiguous or unknown.
+        best: the explanation that is taken; None where none pays.
+        tried: all that were refitted.
+        rivals: where ambiguous, the explanations between which the log cannot decide.
+    """
+
+    verdict: str
+    best: Explanation | None
+    tried: list[Explanation]
+    rivals: list[Explanation]
+
+
+@dataclass(frozen=True)
+class Chooser:
+    """Weighs explanations of one log.
+
+    Attributes:
+        layout: stated values.
+        windows: of the log.
+        say: told in words what is being done.
+    """
+
+    layout: Layout
+    windows: Windows
+    say: Callable[[str], None]
+
+    def choose(
+        self, scores: dict[str, Score], at: Layout, base: list[str], chosen: list[str], current: Explanation
+    ) -> Choice:
+        """Refit the leading effects beside those chosen before, and take the one that explains best.
+
+        Args:
+            scores: tests of the effects that remain.
+            at: the layout at the current fit.
+            base: effects that are free anyway.
+            chosen: effects found before.
+            current: the fit without any of those that remain.
+        """
+        significant = [s for s in scores.values() if s.degrees and s.p_value < ALPHA]
+        leading = sorted(significant, key=lambda s: -s.evidence)[:LEADERS]
+        top = leading[0].evidence if leading else 0.0
+        leading = [s for s in leading if s.evidence > min(top - REACH, REACH_SHARE * top)]
+        # Evidence counts an effect of many parameters low while it is small; a test that is clear even among
+        # all the others lets it be judged by what it does on runs left out.
+        clear = {s.effect for s in significant if s.p_value < ALPHA / len(scores)}
+        tried = [self._refitted(s, at, base, chosen, current) for s in leading]
+        if not tried:
+            return Choice("unknown", None, [], [])
+        factor = min(self._factor(e) for e in tried)
+        current = weigh(self.layout, current, factor)
+        tried = sorted((weigh(self.layout, e, factor) for e in tried), key=lambda e: -e.evidence)
+        paying = [
+            e
+            for e in tried
+            if (e.evidence > current.evidence or e.effects[-1] in clear)
+            and pays(e, self._without(e, base, current))
+        ]
+        if not paying:
+            return Choice("unknown", None, tried, [])
+        best = paying[0]
+        rivals = [e for e in paying[1:] if best.evidence - e.evidence < ODDS]
+        if rivals:
+            names = tuple(e.effects[-1] for e in [best, *rivals])
+            return Choice("ambiguous", replace(best, effects=(*chosen, *names)), tried, [best, *rivals])
+        # The weights follow the errors that the winner leaves.
+        final = explain(
+            self.layout,
+            self.windows,
+            base,
+            best.effects,
+            start=best.fitted,
+            guess=replace(at, model=best.fitted.model),
+        )
+        return Choice("named", final, [final, *tried[1:]] if tried[0] is best else [final, *tried], [])
+
+    def withdrawn(self, taken: Explanation, base: Sequence[str]) -> tuple[Explanation, list[str]]:
+        """Return the explanation without those effects that it no longer needs, and their names.
+
+        An effect that was taken first may have stood in for the ones that came after it. It goes where the
+        evidence is no lower without it, or where it does not pay on runs left out, everything else refitted.
+
+        Args:
+            taken: the explanation, the newest effect last.
+            base: effects that are free whatever is chosen.
+        """
+        gone: list[str] = []
+        for name in taken.effects[:-1]:
+            left = tuple(e for e in taken.effects if e != name)
+            self.say(f"asking whether {name} is still needed")
+            model = taken.fitted.model.rebuilt(taken.fitted.model.copied_effects())
+            set_parameters(model, [name], self.layout.means[name])
+            without = explain(
+                self.layout,
+                self.windows,
+                base,
+                left,
+                start=taken.fitted,
+                guess=replace(self.layout, model=model),
+                sigma=taken.fitted.sigma,
+                iterations=6,
+            )
+            factor = self._factor(taken)
+            needed = weigh(self.layout, taken, factor).evidence > weigh(self.layout, without, factor).evidence
+            if not needed or not pays(taken, without):
+                gone.append(name)
+                taken = explain(
+                    self.layout,
+                    self.windows,
+                    base,
+                    left,
+                    start=without.fitted,
+                    guess=replace(self.layout, model=without.fitted.model),
+                )
+        return taken, gone
+
+    def _refitted(
+        self, candidate: Score, at: Layout, base: list[str], chosen: list[str], current: Explanation
+    ) -> Explanation:
+        self.say(f"fitting {candidate.effect}")
+        guess = at.model.rebuilt(at.model.copied_effects())
+        known = parameters_of(at.model, [candidate.effect])
+        start = np.where(np.isfinite(candidate.estimate), candidate.estimate, known)
+        set_parameters(guess, [candidate.effect], start)
+        return explain(
+            self.layout,
+            self.windows,
+            base,
+            [*chosen, candidate.effect],
+            start=current.fitted,
+            guess=replace(at, model=guess),
+            sigma=current.fitted.sigma,
+            iterations=6,
+        )
+
+    def _without(self, after: Explanation, base: list[str], current: Explanation) -> Explanation:
+        """Return the same model without the effect, everything else refitted.
+
+        Where the effect is a coefficient group that is uncertain anyway, that group stays as stated.
+        """
+        effect = after.effects[-1]
+        if effect not in base:
+            return current
+        return explain(
+            self.layout,
+            self.windows,
+            [n for n in base if n != effect],
+            after.effects[:-1],
+            start=current.fitted,
+            sigma=current.fitted.sigma,
+            iterations=6,
+        )
+
+    @staticmethod
+    def _factor(explanation: Explanation) -> float:
+        sums = explanation.fitted.statistics
+        return inflation(sums.slope, sums.total, sums.run)
+
+
+def pays(after: Explanation, before: Explanation) -> bool:
+    """Whether the error on what was left out falls by more than its own uncertainty."""
+    gain = before.left_out - after.left_out
+    return float(gain.sum()) > float(np.sqrt(len(gain)) * gain.std(ddof=1))

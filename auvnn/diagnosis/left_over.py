@@ -1,0 +1,41 @@
+"""What an explanation leaves: how much above white noise, and whether it is slower than white noise."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.diagnosis.explain import Explanation
+
+Array = NDArray[np.float64]
+# Slow residuals count as something missing when they are significant and not negligible.
+SLOW_Z, SLOW_SHARE = 4.0, 0.05
+
+
+def slow(explanation: Explanation, floor: Array) -> bool:
+    """Whether the errors left are slower than white noise: something is missing, with a name or without.
+
+    Args:
+        explanation: what was fitted.
+        floor: (18,) no channel is trusted beyond.
+    """
+    sums = explanation.fitted.statistics
+    count, pairs = sums.count.sum(0), sums.pairs.sum(0)
+    spent = 12 * len(sums.cost) * count / max(count.sum(), 1.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        lasting = sums.channel.sum(0) / np.maximum(count - spent, 1.0)
+        fast = np.maximum(sums.rough.sum(0) / (2 * pairs), floor**2)
+        z = (lasting / fast - 1.0) * np.sqrt(count)
+        share = 1.0 - fast / lasting
+    return bool(np.any((count > 0) & (z > SLOW_Z) & (share > SLOW_SHARE)))
+
+
+def excess(explanation: Explanation, weights: Explanation) -> float:
+    """Return the weighted squared error above what white noise alone would leave."""
+    sums, sigma = explanation.fitted.statistics, weights.fitted.sigma
+    noise = np.nan_to_num(weights.fitted.statistics.noise())
+    usable = np.isfinite(sigma)
+    count = sums.count.sum(0)
+    spent = 12 * len(sums.cost) * count / max(count.sum(), 1.0)
+    above = sums.channel.sum(0) - (count - spent) * noise**2
+    return float(np.maximum(above[usable] / sigma[usable] ** 2, 0.0).sum())

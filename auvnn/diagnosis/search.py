@@ -1,0 +1,196 @@
+"""The search: test every effect at the null, take one, look again with it in the model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.diagnosis.advise import advise
+from auvnn.diagnosis.answer import Diagnosis
+from auvnn.diagnosis.choose import ALPHA, Chooser
+from auvnn.diagnosis.cut import HORIZON, WARMUP
+from auvnn.diagnosis.explain import Explanation, explain
+from auvnn.diagnosis.left_over import excess, slow
+from auvnn.diagnosis.nuisance import Layout, stated
+from auvnn.diagnosis.probes import Probed, extent_of, probed
+from auvnn.diagnosis.residual_tests import residual_tests
+from auvnn.diagnosis.score import similarity
+from auvnn.diagnosis.table import fill, tabulate
+from auvnn.diagnosis.unknown import depends_on
+from auvnn.logs import Log
+from auvnn.metrics.windows import Windows
+from auvnn.models import GreyBox
+from auvnn.training.prediction_error import TRUST, Statistics, answers, motion, reduce, set_parameters
+
+Array = NDArray[np.float64]
+# "Something is missing, but nothing that has a name" is a claim of its own: where no effect pays on runs left
+# out, it takes stronger grounds than the test that opened the search.
+ALPHA_UNKNOWN = 0.001
+
+
+class Search:
+    """One diagnosis under way."""
+
+    def __init__(
+        self,
+        layout: Layout,
+        windows: Windows,
+        usable: list[str],
+        say: Callable[[str], None],
+        advice: bool = True,
+    ) -> None:
+        self.layout, self.windows, self.usable, self.say = layout, windows, usable, say
+        self.advice = advice
+        self.chooser = Chooser(layout, windows, say)
+        # The explanations between which the log cannot decide.
+        self.rivals: list[Explanation] = []
+        self.base = [n for n in layout.names if n not in usable or n in layout.nuisance]
+        self.floor = TRUST * motion(windows) + 1e-9
+        self.silent: list[str] = []
+        self.extent = extent_of(windows)
+
+    def statistics(self, found: Explanation, remaining: list[str]) -> tuple[Statistics, Layout, Probed]:
+        """Linearise towards every parameter at a fit, those of the remaining effects at several shapes."""
+        model = self.layout.model.rebuilt(self.layout.model.copied_effects())
+        set_parameters(model, found.names, found.fitted.theta)
+        at = replace(self.layout, model=model)
+        asked = probed(at, remaining, self.extent)
+        sums, _, _ = reduce(
+            self.windows,
+            answers(asked.layout.model, self.windows, found.fitted.initial, asked.layout.model.effect_names),
+            found.fitted.sigma,
+        )
+        return sums, at, asked
+
+    def run(self, model: GreyBox, log: Log, needs: dict[str, list[str]], most: int) -> Diagnosis:
+        """Search for one effect after the other."""
+        self.say("fitting the uncertain coefficients")
+        current = explain(self.layout, self.windows, self.base, ())
+        first, chosen, steps = current, [], []
+        # What turned out to have stood in for something else is not asked for again.
+        withdrawn: list[str] = []
+        table: dict[str, dict[str, Any]] = {}
+        similar: tuple[list[str], Array] = ([], np.eye(0))
+        global_p = 1.0
+        while True:
+            remaining = [n for n in self.usable if n not in chosen and n not in withdrawn]
+            self.say(f"testing {len(remaining)} effects at the null")
+            sums, at, asked = self.statistics(current, remaining)
+            base = [*self.base, *[c for c in chosen if c not in self.base]]
+            asked_at = {n: asked.score(sums, base, n, chosen) for n in remaining}
+            scores = {n: found for n, (found, _) in asked_at.items()}
+            p_value = _together([s.p_value for s in scores.values() if s.degrees])
+            if not table:
+                global_p = p_value
+                similar = (remaining, similarity(sums, asked.layout, base, [k for _, k in asked_at.values()]))
+                table = tabulate(self.layout, scores, current, similar, needs)
+                self.silent = [n for n in remaining if not scores[n].degrees]
+            if p_value >= ALPHA or not remaining or len(chosen) >= most:
+                steps.append({"verdict": self._rest(current), "effects": [], "p_value": p_value})
+                break
+            choice = self.chooser.choose(scores, at, base, chosen, current)
+            for explanation in choice.tried:
+                if not chosen:
+                    fill(self.layout, table, explanation, first)
+            if choice.best is None:
+                verdict = "unknown" if p_value < ALPHA_UNKNOWN else self._rest(current)
+                steps.append({"verdict": verdict, "effects": [], "p_value": p_value})
+                break
+            new = [e for e in choice.best.effects if e not in chosen]
+            steps.append({"verdict": choice.verdict, "effects": new, "p_value": p_value})
+            if choice.verdict == "ambiguous":
+                self.rivals = choice.rivals
+                break
+            current, gone = choice.best, []
+            if chosen:
+                current, gone = self.chooser.withdrawn(choice.best, self.base)
+            if gone:
+                withdrawn += gone
+                steps.append({"verdict": "withdrawn", "effects": gone, "p_value": p_value})
+            chosen = list(current.effects)
+        return self._answer(model, log, first, current, steps, table, similar, global_p)
+
+    def _rest(self, current: Explanation) -> str:
+        """Return the verdict where no effect is asked for any more."""
+        return "unknown" if slow(current, self.floor) else "adequate"
+
+    def _answer(
+        self,
+        model: GreyBox,
+        log: Log,
+        first: Explanation,
+        last: Explanation,
+        steps: list[dict[str, Any]],
+        table: dict[str, dict[str, Any]],
+        similar: tuple[list[str], Array],
+        global_p: float,
+    ) -> Diagnosis:
+        gone = {e for s in steps if s["verdict"] == "withdrawn" for e in s["effects"]}
+        missing = [e for s in steps for e in s["effects"] if e not in gone]
+        order = sorted(
+            table.values(),
+            key=lambda c: (missing.index(c["effect"]) if c["effect"] in missing else 99, -c.pop("_order")),
+        )
+        verdict = steps[0]["verdict"]
+        before, after = excess(first, last), excess(last, last)
+        unexplained = float(np.clip(after / before, 0.0, 1.0)) if before > 0 else 0.0
+        depends = {}
+        if verdict == "unknown" or steps[-1]["verdict"] == "unknown":
+            depends = depends_on(last.fitted.model, log, self.windows)
+        return Diagnosis(
+            model.vehicle.name,
+            log.name,
+            verdict,
+            missing,
+            steps,
+            order,
+            0.0 if verdict == "adequate" else unexplained,
+            depends,
+            self._next(model),
+            self._warnings(model, log),
+            {
+                "method": f"none: free-running windows of {self._length():g} s with estimated initial states",
+                "bandwidth_hz": None,
+            },
+            global_p,
+            similar,
+            last,
+            self._tests(first, last),
+        )
+
+    def _tests(self, first: Explanation, last: Explanation) -> dict[str, Any]:
+        """Return the residual tests without what was found and with it."""
+        self.say("testing what is left for whiteness")
+        before = residual_tests(first, self.windows).to_dict()
+        after = before if last is first else residual_tests(last, self.windows).to_dict()
+        return {"before": before, "after": after}
+
+    def _next(self, model: GreyBox) -> dict[str, Any] | None:
+        if not (self.advice and len(self.rivals) > 1):
+            return None
+        return advise(model, self.layout, self.rivals, (HORIZON, WARMUP), self.say).to_dict()
+
+    def _length(self) -> float:
+        times = self.windows.times[:, self.windows.warmup :]
+        return round(float((times[:, -1] - times[:, 0]).max()), 3)
+
+    def _warnings(self, model: GreyBox, log: Log) -> list[str]:
+        found = [*model.vehicle.warnings, *log.quality().reservations]
+        if len(log.runs) < 2:
+            found.append("the log holds one run: what is left out in turn are stretches of it")
+        if self.silent:
+            found.append(
+                f"{log.name} says nothing about {', '.join(self.silent)}: nothing in it depends on them"
+            )
+        if not stated(model):
+            found.append("no coefficient of the model is uncertain: any error of theirs will be given a name")
+        return found
+
+
+def _together(p_values: list[float]) -> float:
+    """Return one p-value for many dependent tests: Bonferroni's, which holds whatever the dependence."""
+    return float(min(1.0, len(p_values) * min(p_values))) if p_values else 1.0

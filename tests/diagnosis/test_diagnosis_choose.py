@@ -1,0 +1,65 @@
+"""What was taken first must still be needed once more is there: stand-ins go, causes stay."""
+
+from __future__ import annotations
+
+import pytest
+from small_logs import make_log, small_vehicle
+
+from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.choose import Chooser
+from auvnn.diagnosis.cut import windows_for
+from auvnn.diagnosis.explain import explain
+from auvnn.diagnosis.nuisance import lay_out
+from auvnn.models import GreyBox
+
+LIGHT, PUSH = {"net_buoyancy": {"force": 6.0}}, {"constant_force": {"Y": 5.0}}
+NAMES = ["constant_force", "net_buoyancy"]
+
+
+@pytest.fixture(scope="module")
+def model():
+    return GreyBox(small_vehicle())
+
+
+def logged(model, hidden):
+    return make_log(model.with_effects(hidden), runs=3, duration=8.0, noise=1.0)
+
+
+@pytest.fixture(scope="module")
+def two(model):
+    return logged(model, {**LIGHT, **PUSH})
+
+
+def asked(model, log):
+    """Return who asks, and the explanation with both effects in it, the stand-in first."""
+    layout, windows = lay_out(model, NAMES), windows_for(model, log)
+    base = [n for n in layout.names if n not in NAMES]
+    return Chooser(layout, windows, lambda words: None), base, explain(layout, windows, base, NAMES)
+
+
+def test_an_effect_that_is_not_there_is_withdrawn_once_the_cause_is_in_the_model(model):
+    chooser, base, both = asked(model, logged(model, LIGHT))
+    left, gone = chooser.withdrawn(both, base)
+    assert gone == ["constant_force"] and left.effects == ("net_buoyancy",)
+    assert left.fitted.model.effect("net_buoyancy").theta.item() == pytest.approx(6.0, abs=0.2)
+
+
+def test_two_effects_that_are_there_both_stay(model, two):
+    chooser, base, both = asked(model, two)
+    left, gone = chooser.withdrawn(both, base)
+    assert gone == [] and left is both
+
+
+def test_a_withdrawn_effect_is_told_and_not_counted_as_missing(model, two, monkeypatch):
+    plain = diagnose(model, two, NAMES)
+    assert set(plain.missing) == set(NAMES)
+
+    def all_gone(self, taken, base):
+        return explain(self.layout, self.windows, base, taken.effects[1:]), [taken.effects[0]]
+
+    monkeypatch.setattr(Chooser, "withdrawn", all_gone)
+    found = diagnose(model, two, NAMES)
+    assert found.missing == [plain.missing[1]]
+    assert [s["verdict"] for s in found.steps][:3] == ["named", "named", "withdrawn"]
+    assert any(line.startswith(f"Withdrawn: {plain.missing[0]}") for line in found.story)
+    assert not any(line.startswith(f"Missing: {plain.missing[0]}") for line in found.story)
