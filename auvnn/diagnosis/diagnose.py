@@ -6,12 +6,18 @@ from collections.abc import Callable, Sequence
 
 from auvnn.diagnosis.answer import Diagnosis
 from auvnn.diagnosis.cut import candidates_for, windows_for
+from auvnn.diagnosis.learned_drag import reduced
 from auvnn.diagnosis.nuisance import lay_out
 from auvnn.diagnosis.search import Search
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log
 from auvnn.models import GreyBox
 from auvnn.training.absorbed import absorption
+
+LEARNED = (
+    "of the learned damping only what drag can be was kept for the tests, and that was left uncertain; "
+    "after adding what is named, train the subnetworks again with it in the model"
+)
 
 
 def diagnose(
@@ -54,10 +60,13 @@ def diagnose(
     if len(windows) < 4:
         cure = "record a longer log" if window is None else "choose a shorter window, or record a longer log"
         raise InputError(f"{log.name} gives only {len(windows)} windows of free running: {cure}")
-    layout = lay_out(model, usable)
+    # What subnetworks have swallowed leaves no residual: only what drag can be is kept of them.
+    known, spread = reduced(model, log)
+    layout = lay_out(known, usable, spread)
     search = Search(layout, windows, usable, say, advice)
     found = search.run(model, log, needs, max_effects)
-    # A subnetwork that has swallowed an effect leaves nothing of it for the tests above to see.
+    if spread is not None:
+        found.warnings.append(LEARNED)
     found.absorbed = absorption(model, log)
     if found.absorbed is not None:
         found.warnings += found.absorbed.words()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.nuisance import DETERMINED, Layout, priors, scales, shapes, stated
+from auvnn.diagnosis.nuisance import DETERMINED, Layout, priors, scales, shapes
 from auvnn.diagnosis.score import inflation
 from auvnn.metrics.windows import Windows
 from auvnn.training.prediction_error import Fitted, Priors, Statistics, fit
@@ -128,14 +128,13 @@ def weigh(layout: Layout, explanation: Explanation, factor: float) -> Explanatio
     Reference: MacKay (1992), Neural Computation 4(3).
     """
     fitted, prior = explanation.fitted, []
-    uncertain = stated(layout.model)
     means = []
     for name in explanation.names:
         mean = layout.means[name]
         means.append(mean)
         size = scales(layout, name)
-        if name in uncertain and name not in explanation.effects:
-            size = uncertain[name] * np.maximum(np.abs(mean), 1e-3)
+        if name in layout.spreads and name not in explanation.effects:
+            size = layout.spreads[name]
         prior.append(np.broadcast_to(size, mean.shape))
     # With nothing uncertain and nothing asked for, there is nothing to weigh but the data.
     size = np.concatenate([np.zeros(0), *prior])

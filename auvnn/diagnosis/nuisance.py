@@ -37,6 +37,7 @@ class Layout:
         columns: effect to columns.
         nuisance: effects that stand for stated uncertainty.
         means: what was stated of each effect's parameters before anything was fitted.
+        spreads: nuisance effect to the standard deviations of its parameters.
     """
 
     model: GreyBox
@@ -44,6 +45,7 @@ class Layout:
     columns: dict[str, NDArray[np.int64]]
     nuisance: tuple[str, ...]
     means: dict[str, Array]
+    spreads: dict[str, Array]
 
     def described(self, name: str) -> tuple[Parameter, ...]:
         """Return the parameters of an effect, or of one of its stand-ins, `name@number`."""
@@ -70,9 +72,16 @@ def stated(model: GreyBox) -> dict[str, float]:
     }
 
 
-def lay_out(model: GreyBox, candidates: Sequence[str]) -> Layout:
-    """Return the model with nuisance terms and candidates in it, those not there yet at their nulls."""
-    groups = list(stated(model))
+def lay_out(model: GreyBox, candidates: Sequence[str], learned: Array | None = None) -> Layout:
+    """Return the model with nuisance terms and candidates in it, those not there yet at their nulls.
+
+    Args:
+        model: as known.
+        candidates: effects that can be asked for.
+        learned: standard deviations (72,) of `learned_drag`, where damping was learned.
+    """
+    uncertain = stated(model)
+    groups = [*uncertain, *([] if learned is None else ["learned_drag"])]
     effects = model.copied_effects()
     present = [str(e.name) for e in effects]
     for name in dict.fromkeys([*groups, *candidates]):
@@ -86,7 +95,10 @@ def lay_out(model: GreyBox, candidates: Sequence[str]) -> Layout:
         columns[str(effect.name)] = np.arange(at, at + size)
         means[str(effect.name)] = effect.theta.detach().numpy().copy()
         at += size
-    return Layout(full, tuple(columns), columns, tuple(groups), means)
+    spreads = {g: s * np.maximum(np.abs(means[g]), 1e-3) for g, s in uncertain.items()}
+    if learned is not None:
+        spreads["learned_drag"] = learned
+    return Layout(full, tuple(columns), columns, tuple(groups), means, spreads)
 
 
 def priors(layout: Layout, names: Sequence[str], free: Sequence[str] = ()) -> Priors:
@@ -97,13 +109,12 @@ def priors(layout: Layout, names: Sequence[str], free: Sequence[str] = ()) -> Pr
         names: effects.
         free: those of them that are asked for: their stated uncertainty is left out.
     """
-    uncertain = stated(layout.model)
     mean, precision, reach = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
     for name in names:
         stated_values = layout.means[name]
         mean.append(stated_values)
-        if name in uncertain and name not in free:
-            spread = uncertain[name] * np.maximum(np.abs(stated_values), 1e-3)
+        spread = None if name in free else layout.spreads.get(name)
+        if spread is not None:
             precision.append(spread**-2)
             reach.append(REACH * spread)
         else:

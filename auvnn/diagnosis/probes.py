@@ -232,4 +232,4 @@ def probed(layout: Layout, names: Sequence[str], extent: Extent) -> Probed:
     if not starts:
         return Probed(layout, {})
     whole = GreyBox(model.vehicle, effects, model.damping, model.actuation)
-    return Probed(Layout(whole, tuple(columns), columns, layout.nuisance, means), starts)
+    return Probed(Layout(whole, tuple(columns), columns, layout.nuisance, means, layout.spreads), starts)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from auvnn.diagnosis.nuisance import DETERMINED, FREE, Layout, priors, scales, stated
+from auvnn.diagnosis.nuisance import DETERMINED, FREE, Layout, priors, scales
 from auvnn.training.prediction_error import Priors, Statistics, parameters_of
 
 Array = NDArray[np.float64]
@@ -171,7 +171,7 @@ def score(
 def _prior_variance(layout: Layout, effect: str, vectors: Array) -> Array | None:
     if effect not in layout.nuisance:
         return None
-    variance = (stated(layout.model)[effect] * layout.means[effect] / scales(layout, effect)) ** 2
+    variance = (layout.spreads[effect] / scales(layout, effect)) ** 2
     return vectors.T @ (variance[:, None] * vectors)
 
 

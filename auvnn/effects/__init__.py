@@ -56,6 +56,7 @@ EFFECTS = Catalogue(
 
 # Known, so that a model that holds one can be saved and loaded, but not offered as a name for what is missing.
 _UNOFFERED = {
+    "learned_drag": "auvnn.effects.learned_drag:LearnedDrag",
     "inertia": "auvnn.effects.inertia_factors:InertiaFactors",
     "residual_force": "auvnn.effects.residual_force:ResidualForce",
 }

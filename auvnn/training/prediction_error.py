@@ -239,7 +239,8 @@ def reduce(windows: Windows, responses: Iterable[Response], sigma: Array) -> tup
         mask = windows.mask[begin : begin + count] * (weight > 0)
         begin += count
         error = (answer.error[..., live] * weight[live]).reshape(count, length * len(live), 1)
-        slopes = answer.parameters[:, :, live].mul_(weight[live, None]).reshape(count, length * len(live), -1)
+        slopes = answer.parameters[:, :, live].mul_(weight[live, None])
+        slopes = slopes.reshape(count, length * len(live), slopes.shape[-1])
         state = answer.state[:, :, live].mul_(weight[live, None]).reshape(count, length * len(live), 12)
         q, r = torch.linalg.qr(torch.cat([state, loose.expand(count, 12, 12)], dim=1))
         q = q[:, :-12]
