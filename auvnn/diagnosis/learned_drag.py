@@ -4,7 +4,7 @@ Subnetworks of the velocity absorb nearly any missing effect on the manoeuvre th
 they have absorbed leaves no residual to be tested. A diagnosis therefore puts in their place the drag law that
 comes nearest to them along the log,
 
-    d_i(nu) = sum_j a_ij nu_j + b_ij |nu_j| nu_j,
+    d_i(nu) = sum_j a_ij nu_j + sum_jk b_ikj |nu_k| nu_j,
 
 and lets each coefficient move by a stated share of what was learned (`effects.learned_drag`). The law is no richer
 than its uncertainty, so that whatever of an effect has got into it can be taken back. A force at rest, a drift of
@@ -21,12 +21,15 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from auvnn.damping.bank import DampingBank
+from auvnn.effects.learned_drag import products
 from auvnn.logs import Log
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
-# Standard deviation of each correction, as a share of the learned force at the usual speed. Ours.
-SHARE = 0.3
+# Standard deviation of each correction, as a share of the learned force at usual speeds: of nu_j and |nu_j| nu_j,
+# and of the products of two velocities, of which there are many. Ours.
+SHARE, COUPLED = 0.3, 0.1
+OWN = np.concatenate([np.ones(6, dtype=bool), np.eye(6, dtype=bool).ravel()])
 # A speed that is hardly there tells nothing of its coefficients.
 RIDGE = 1e-6
 
@@ -35,7 +38,7 @@ class DragLaw(nn.Module):
     """A drag law of fixed coefficients, in the place of subnetworks.
 
     Args:
-        coefficients: (6, 12): of nu_j, and of |nu_j| nu_j.
+        coefficients: (6, 42), as `effects.learned_drag` orders them.
     """
 
     def __init__(self, coefficients: Array) -> None:
@@ -45,11 +48,7 @@ class DragLaw(nn.Module):
 
     def forward(self, nu: Tensor) -> Tensor:
         """Return d(nu), (..., 6)."""
-        return _products(nu) @ self.get_buffer("coefficients").to(nu).mT
-
-
-def _products(nu: Tensor) -> Tensor:
-    return torch.cat([nu, nu.abs() * nu], dim=-1)
+        return products(nu) @ self.get_buffer("coefficients").to(nu).mT
 
 
 def has_learned(model: GreyBox) -> bool:
@@ -65,7 +64,7 @@ def reduced(model: GreyBox, log: Log) -> tuple[GreyBox, Array | None]:
         log: along its velocities the law is laid out.
 
     Returns:
-        the model; standard deviations (72,) of `learned_drag`'s parameters, or None.
+        the model; standard deviations (252,) of `learned_drag`'s parameters, or None.
     """
     bank = model.damping
     if bank is None or not has_learned(model):
@@ -74,11 +73,11 @@ def reduced(model: GreyBox, log: Log) -> tuple[GreyBox, Array | None]:
     with torch.no_grad():
         wrench = bank(torch.as_tensor(nu).to(bank.input_scale)).double().numpy()
     usual = np.maximum(np.sqrt(np.mean(nu**2, axis=0)), 1e-6)
-    unit = np.concatenate([usual, usual**2])
-    products = _products(torch.as_tensor(nu)).numpy() / unit
-    gram = products.T @ products + RIDGE * len(nu) * np.eye(12)
-    coefficients = np.linalg.solve(gram, products.T @ wrench).T / unit
+    unit = products(torch.as_tensor(usual)).numpy()
+    columns = products(torch.as_tensor(nu)).numpy() / unit
+    gram = columns.T @ columns + RIDGE * len(nu) * np.eye(len(unit))
+    coefficients = np.linalg.solve(gram, columns.T @ wrench).T / unit
     law = cast(DampingBank, DragLaw(coefficients))
-    size = np.sqrt(np.mean(wrench**2, axis=0))[:, None]
-    spread = SHARE * np.concatenate([(size / usual).ravel(), (size / usual**2).ravel()])
+    size = np.sqrt(np.mean(wrench**2, axis=0))
+    spread = np.outer(size, np.where(OWN, SHARE, COUPLED) / unit).ravel()
     return GreyBox(model.vehicle, model.copied_effects(), law, model.actuation), np.maximum(spread, 1e-9)

@@ -78,7 +78,7 @@ def lay_out(model: GreyBox, candidates: Sequence[str], learned: Array | None = N
     Args:
         model: as known.
         candidates: effects that can be asked for.
-        learned: standard deviations (72,) of `learned_drag`, where damping was learned.
+        learned: standard deviations (252,) of `learned_drag`, where damping was learned.
     """
     uncertain = stated(model)
     groups = [*uncertain, *([] if learned is None else ["learned_drag"])]
