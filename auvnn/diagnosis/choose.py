@@ -13,14 +13,16 @@ import numpy as np
 from auvnn.diagnosis.explain import Explanation, explain, weigh
 from auvnn.diagnosis.nuisance import Layout
 from auvnn.diagnosis.score import Score, inflation
+from auvnn.effects import effect_class
 from auvnn.metrics.windows import Windows
 from auvnn.training.prediction_error import parameters_of, set_parameters
 
 ALPHA = 0.05
 # Explanations are refitted in full, nonlinearly, as long as their one-step evidence is within reach of the best.
-LEADERS, REACH, REACH_SHARE = 4, 30.0, 0.5
-# Odds of twenty to one: below that two explanations are not told apart.
-ODDS = float(np.log(20.0))
+LEADERS, REACH, REACH_SHARE = 5, 30.0, 0.5
+# Odds of a hundred to one: below that two explanations are not told apart. Several of them compete in every log, and
+# at twenty to one a wrong one wins now and then by chance.
+ODDS = float(np.log(100.0))
 
 
 @dataclass(frozen=True)
@@ -88,10 +90,12 @@ class Chooser:
         if not paying:
             return Choice("unknown", None, tried, [])
         best = paying[0]
-        rivals = [e for e in paying[1:] if best.evidence - e.evidence < ODDS]
+        rivals = [e for e in paying[1:] if not self._told_apart(best, e)]
         if rivals:
-            names = tuple(e.effects[-1] for e in [best, *rivals])
-            return Choice("ambiguous", replace(best, effects=(*chosen, *names)), tried, [best, *rivals])
+            plainer = effect_class(best.effects[-1]).plainer
+            group = sorted([best, *rivals], key=lambda e: e.effects[-1] not in plainer)
+            names = tuple(e.effects[-1] for e in group)
+            return Choice("ambiguous", replace(best, effects=(*chosen, *names)), tried, group)
         # The weights follow the errors that the winner leaves.
         final = explain(
             self.layout,
@@ -142,6 +146,20 @@ class Chooser:
                     guess=replace(self.layout, model=without.fitted.model),
                 )
         return taken, gone
+
+    def _told_apart(self, best: Explanation, other: Explanation) -> bool:
+        """Whether the log decides between two explanations.
+
+        The evidence also counts how many parameters there are and how large they might have been. Where the fit
+        is the same, that settles it only against the one with more parameters, and not where it is the plainer.
+        """
+        if best.evidence - other.evidence < ODDS:
+            return False
+        if 0.5 * (other.misfit - best.misfit) >= ODDS:
+            return True
+        mine, theirs = best.effects[-1], other.effects[-1]
+        size = {n: len(self.layout.columns[n]) for n in (mine, theirs)}
+        return size[theirs] > size[mine] and theirs not in effect_class(mine).plainer
 
     def _refitted(
         self, candidate: Score, at: Layout, base: list[str], chosen: list[str], current: Explanation

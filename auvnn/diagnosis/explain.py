@@ -29,6 +29,7 @@ class Explanation:
         evidence: logarithm of the marginal likelihood, up to a constant that all explanations share.
         left_out: (B,) weighted squared error of each window, fitted without its fold.
         left_out_count: (B,) samples of each window.
+        misfit: the part of minus twice the evidence that is fit: squared error and departure from what was stated.
     """
 
     effects: tuple[str, ...]
@@ -37,6 +38,7 @@ class Explanation:
     evidence: float
     left_out: Array
     left_out_count: Array
+    misfit: float = 0.0
 
     @property
     def cv(self) -> float:
@@ -144,7 +146,8 @@ def weigh(layout: Layout, explanation: Explanation, factor: float) -> Explanatio
     data = float(fitted.statistics.cost.sum()) / factor
     information = fitted.statistics.total * size[:, None] * size / factor
     volume = np.linalg.slogdet(information + np.eye(len(size)))[1]
-    return replace(explanation, evidence=-0.5 * (data + float(away @ away) + volume))
+    misfit = data + float(away @ away)
+    return replace(explanation, evidence=-0.5 * (misfit + volume), misfit=misfit)
 
 
 def determined(explanation: Explanation, columns: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -21,6 +21,7 @@ class ActuationDelay(Effect):
     cause = "the thrust comes a fixed time after its command"
     symbol = "T_d"
     reference = "Ljung (1999), System Identification, section 4.2"
+    plainer = ("thruster_lag",)
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -172,6 +172,10 @@ class Effect(nn.Module):
         `body`: mass, centres, inertia, added mass, buoyancy, damping coefficients.
         `wrench`: any further force and moment on the body.
         `sense`: what the sensors make of the state.
+
+    `plainer` names effects that explain the same trace more plainly wherever a log does not reach far enough to
+    tell them apart: a current that is the same at all depths, where the depth hardly changes. The effect is then
+    given as one of a group, never alone.
     """
 
     name: ClassVar[str]
@@ -180,6 +184,7 @@ class Effect(nn.Module):
     reference: ClassVar[str]
     channels: ClassVar[tuple[str, ...]] = ()
     excludes: ClassVar[tuple[str, ...]] = ()
+    plainer: ClassVar[tuple[str, ...]] = ()
     time_varying: ClassVar[bool] = False
 
     theta: nn.Parameter

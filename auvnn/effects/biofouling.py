@@ -21,6 +21,7 @@ class Biofouling(Effect):
     cause = "drag grows with time"
     symbol = "k_f"
     reference = "Schultz et al. (2015), Biofouling 31; Anderlini et al. (2021), IEEE JOE"
+    plainer = ("quadratic_damping",)
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

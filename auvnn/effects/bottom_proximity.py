@@ -19,6 +19,7 @@ class BottomProximity(Proximity):
     cause = "added mass and drag grow near the bottom"
     symbol = "f(h)"
     reference = "Lamb (1932), section 137; Korotkin (2009), Added Masses of Ship Structures"
+    plainer = ("added_mass",)
     channels = ("altitude",)
 
     def distance(self, moment: Moment) -> tuple[Tensor, float] | None:

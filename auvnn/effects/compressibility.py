@@ -23,6 +23,7 @@ class Compressibility(Effect):
     cause = "buoyancy changes with depth"
     symbol = "dB/dz"
     reference = "Fossen (2011), section 4.1"
+    plainer = ("net_buoyancy",)
     channels = ("z",)
 
     @classmethod

@@ -28,6 +28,7 @@ class CrossFlowDrag(Effect):
     cause = "sideways drag is spread along the hull"
     symbol = "C_d2D"
     reference = "Faltinsen (1990), chapter 6; Fossen (2011), section 6.4"
+    plainer = ("quadratic_damping",)
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

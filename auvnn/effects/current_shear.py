@@ -21,6 +21,7 @@ class CurrentShear(Effect):
     cause = "the current changes with depth"
     symbol = "dv_c/dz"
     reference = "DNV-RP-C205 (2010), section 4"
+    plainer = ("ocean_current",)
     channels = ("z",)
 
     @classmethod

@@ -22,6 +22,7 @@ class Flooding(Effect):
     cause = "water leaks into the hull"
     symbol = "m_dot"
     reference = "Fossen (2011), sections 3.3 and 4.1"
+    plainer = ("net_buoyancy",)
     time_varying = True
 
     @classmethod

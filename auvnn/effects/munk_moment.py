@@ -22,6 +22,7 @@ class MunkMoment(Effect):
     cause = "the Munk moment is not the ideal one"
     symbol = "k_M"
     reference = "Munk (1924), NACA 184; Newman (1977), section 4.13"
+    plainer = ("added_mass",)
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

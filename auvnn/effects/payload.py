@@ -29,6 +29,7 @@ class Payload(Effect):
     cause = "a load is picked up at some time"
     symbol = "m_p"
     reference = "Van de Ven et al. (2004), section 5; Fossen (2011), section 3.3"
+    plainer = ("net_buoyancy",)
     time_varying = True
 
     @classmethod

@@ -19,6 +19,7 @@ class SurfaceProximity(Proximity):
     cause = "added mass and drag fall near the surface"
     symbol = "f(z)"
     reference = "Faltinsen (1990), Sea Loads on Ships and Offshore Structures, chapter 3"
+    plainer = ("added_mass",)
     channels = ("z",)
     sign = -1.0
 

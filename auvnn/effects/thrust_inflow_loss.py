@@ -24,6 +24,7 @@ class ThrustInflowLoss(Effect):
     cause = "thrust falls with the speed of the inflow"
     symbol = "k_V"
     reference = "Fossen (2011), section 9.1"
+    plainer = ("thruster_gain",)
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

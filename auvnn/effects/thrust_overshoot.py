@@ -28,6 +28,7 @@ class ThrustOvershoot(Effect):
     cause = "thrust is larger at first and falls back as the flow develops"
     symbol = "kappa_T"
     reference = "Healey, Rock, Cody, Miles and Brown (1995), IEEE JOE 20(4)"
+    plainer = ("thruster_lag",)
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -23,6 +23,7 @@ class TiltedVertical(Effect):
     cause = "the attitude's vertical is tilted"
     symbol = "delta_v"
     reference = "Fossen (2011), section 2.2"
+    plainer = ("cg_offset",)
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -18,6 +18,7 @@ class TrappedWater(Effect):
     cause = "water inside the hull moves along"
     symbol = "m_w"
     reference = "Fossen (2011), sections 3.3 and 6.3"
+    plainer = ("added_mass",)
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -39,6 +39,7 @@ class TurningForces(Effect):
     cause = "forces in a turn are not those of the added mass"
     symbol = "Y_ur"
     reference = "Gertler and Hagen (1967), DTMB report 2510"
+    plainer = ("coupled_damping",)
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -21,6 +21,7 @@ class VoltageDroop(Effect):
     cause = "thrust follows the battery's voltage"
     symbol = "gamma_V"
     reference = "Blue Robotics (2019), T200 performance data"
+    plainer = ("thruster_gain",)
     channels = ("voltage",)
 
     @classmethod
