@@ -60,10 +60,11 @@ def _ranks(ax: Axes, found: Mapping[str, np.ndarray]) -> None:
     for k, values in enumerate(found.values()):
         at = np.arange(1, values.size + 1) / (values.size + 1)
         more: dict[str, Any] = {"label": "one test each"} if k == 0 else {}
-        ax.plot(at, values, color=style.AFTER.color, lw=0.7, alpha=0.75, zorder=3, **more)
+        ax.plot(at, values, color=style.AFTER.color, lw=0.45, alpha=0.6, zorder=3, **more)
     ax.set_xlim(0, 1)
     ax.set_ylim(0, 1)
     ax.set_box_aspect(1)
+    ax.set_anchor("N")
     style.show_grid(ax, "both")
     ax.legend(loc="lower right", fontsize=7.5, frameon=True, facecolor="white", edgecolor="none", framealpha=1.0)
     ax.set_xlabel("expected at its rank, uniform $p$")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
@@ -191,7 +193,7 @@ def _combined(options: Mapping[str, Any], part: str) -> list[Case]:
             rate=float(options["rate"]), held_out=_count(options, "held_out"), ties=bool(options.get("ties")),
             candidates=tuple(candidates) or None, part=part,
         )  # fmt: skip
-        names = _names(asked, load_vehicle(vehicle), noise, accelerations)
+        names = _names(asked, load_vehicle(vehicle), noise, accelerations, str(plant))
         for hidden in names:
             nothing = hidden == NOTHING
             for size, k in itertools.product(["none"] if nothing else sizes, range(repeats)):
@@ -220,23 +222,47 @@ def _manoeuvres(options: Mapping[str, Any]) -> list[Any]:
     return list(dict.fromkeys(out))
 
 
-def _names(asked: Sequence[str], vehicle: Vehicle, noise: Any, accelerations: bool | None) -> list[str]:
+def _names(
+    asked: Sequence[str], vehicle: Vehicle, noise: Any, accelerations: bool | None, plant: str
+) -> list[str]:
     """Return the names asked for; "all" are those of which a log of this kind can hold anything."""
     out: list[str] = []
     for name in asked:
-        out += can_be_hidden(vehicle, noise, accelerations) if name == "all" else [name]
+        out += can_be_hidden(vehicle, noise, accelerations, plant) if name == "all" else [name]
+    # Asked of every plant, so that one that is not there is refused before anything is run.
+    refusing(plant)
     return list(dict.fromkeys(out))
 
 
-def can_be_hidden(vehicle: Vehicle, noise: Any, accelerations: bool | None) -> list[str]:
-    """Return the effects of the catalogue for which vehicle and log have what they need."""
+def can_be_hidden(vehicle: Vehicle, noise: Any, accelerations: bool | None, plant: str = "own") -> list[str]:
+    """Return the effects of the catalogue for which vehicle, plant and log have what they need."""
     actuation = "thrusters" if vehicle.thrusters else "wrench"
     measured = make_noise(noise).accelerations if accelerations is None else accelerations
     absent = set() if measured else {"du", "dv", "dw", "dp", "dq", "dr"}
     absent |= set() if vehicle.fins else {"fin_1"}
     absent |= {"voltage"} if vehicle.reference_voltage is None else set()
     kinds = {name: EFFECTS.get(name) for name in EFFECTS.names()}
-    return [n for n, k in kinds.items() if not absent & set(k.channels) and not k.lacks(vehicle, actuation)]
+    refused = refusing(plant)
+    return [
+        n
+        for n, kind in kinds.items()
+        if not absent & set(kind.channels) and not kind.lacks(vehicle, actuation) and not refused(n)
+    ]
+
+
+def refusing(plant: str) -> Callable[[str], str]:
+    """Return what says why a plant cannot hold an effect, or nothing.
+
+    Raises:
+        ConfigError: there is no such plant.
+    """
+    if plant == "own":
+        return lambda effect: ""
+    if importlib.util.find_spec("auvnn.plants") is None:
+        raise ConfigError(
+            f"plants={plant}: this installation has the package's own equations only; say plants=own"
+        )
+    return importlib.import_module("auvnn.plants").PLANTS.get(plant)().refuses
 
 
 def together(names: Sequence[str], sizes: Sequence[str], count: int, seed: int) -> tuple[str, str]:
@@ -252,11 +278,3 @@ def together(names: Sequence[str], sizes: Sequence[str], count: int, seed: int) 
             chosen = [str(s) for s in generator.choice(list(sizes), count)]
             return JOIN.join(drawn), JOIN.join(chosen)
     raise ConfigError(f"effects={list(names)}: there are no {count} among them that can be hidden together")
-
-
-def kinds_of(todo: Sequence[Case]) -> Iterator[tuple[str, int]]:
-    """Yield how many logs there are of each kind, in words for a dry run."""
-    for kind in KINDS:
-        found = sum(case.kind == kind for case in todo)
-        if found:
-            yield kind, found
