@@ -88,7 +88,7 @@ def test_an_interrupted_benchmark_goes_on_where_it_was(tmp_path, todo, monkeypat
     # As if it had never been interrupted.
     monkeypatch.setattr(study, "run_case", answered)
     assert answer.to_dict() == benchmark(OPTIONS, journal=tmp_path / "other.jsonl").to_dict()
-    assert benchmark(OPTIONS).metrics == answer.metrics, "and without a journal"
+    assert benchmark(OPTIONS).table == answer.table, "and without a journal"
 
 
 class Pool:
