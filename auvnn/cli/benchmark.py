@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
+from typing import Any
+
+from auvnn.cli.folder import WORK
 from auvnn.cli.job import Answering, Job, Verb
 
 TAKEN = (
@@ -17,29 +21,55 @@ TAKEN = (
     "duration",
     "rate",
     "workers",
+    "plants",
+    "accelerations",
+    "loops",
+    "pairs",
+    "triples",
+    "strangers",
+    "held_out",
+    "ties",
+    "candidates",
+    "only",
 )
+JOURNAL = "rows.jsonl"
 
 
 def _run(job: Job) -> Answering:
     from auvnn.studies.benchmark import benchmark
 
-    answer = benchmark({key: job[key] for key in TAKEN}, progress=job.say.progress)
+    options = {key: job[key] for key in TAKEN} | {"plan": job.options.get("plan")}
+    # Not among the answer's files yet: those of a run that is interrupted are taken away.
+    journal = job.out / WORK / JOURNAL
+    answer = benchmark(options, progress=job.say.progress, journal=journal, any_code=job["any_code"])
     answer.write(job.folder)
+    if journal.exists():
+        shutil.copyfile(journal, job.folder / JOURNAL)
     for row in answer.table:
         verdicts = ", ".join(f"{k} {v}" for k, v in row["answers"].items())
         job.say(
             f"{row['hidden']:<19} {row['size']:<7} {row['noise']:<10} {row['excitation']:<10} "
             f"{row['named_first']} of {row['logs']} named first; {verdicts}"
         )
-    for name, value in answer.to_dict()["metrics"].items():
-        shown = "unknown" if value is None else f"{value:.4g}" if isinstance(value, float) else value
-        job.say(f"result    {name} {shown}")
+    data = answer.to_dict()
+    job.warn(data["warnings"])
+    for name, value in data["metrics"].items():
+        job.say(f"result    {name} {_shown(value)}")
+    for aim in data["targets"]:
+        met = {None: "not measured", True: "met", False: "missed"}[aim["met"]]
+        bounds = " ".join(f"{word} {aim[word]:g}" for word in ("least", "most") if aim[word] is not None)
+        of = f" of {aim['count']}" if aim["count"] else ""
+        job.say(f"target    {aim['part']}: {aim['rate']} {_shown(aim['share'])}{of}, wanted {bounds}: {met}")
     return answer
+
+
+def _shown(value: Any) -> Any:
+    return "unknown" if value is None else f"{value:.4g}" if isinstance(value, float) else value
 
 
 VERB = Verb(
     summary="the hidden-effect benchmark: how often the right name is found, how often a wrong one",
     reads=(),
-    writes=("benchmark.json", "report.html", "figures/"),
+    writes=("benchmark.json", "rows.jsonl", "report.html", "figures/"),
     run=_run,
 )

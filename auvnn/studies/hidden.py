@@ -28,6 +28,9 @@ SIZES = {"small": 5.0, "medium": 10.0, "large": 30.0}
 # A coefficient is missing only where it is off by more than was stated of it, so its size counts those amounts
 # too: the factor's logarithm is so many times the stated relative uncertainty. Ours, not the literature's.
 BEYOND = {"small": 2.5, "medium": 4.0, "large": 6.0}
+# White noise of measured accelerations, m/s2 and rad/s2, of which the realistic condition says nothing: a good
+# accelerometer, and the differences of a gyroscope's rates.
+ACCELERATION_NOISE = {**dict.fromkeys(("du", "dv", "dw"), 0.02), **dict.fromkeys(("dp", "dq", "dr"), 0.05)}
 
 
 def oracle_information(
@@ -81,6 +84,7 @@ def sized(
     runs: int = 4,
     duration: float = 60.0,
     rate: float = 20.0,
+    accelerations: bool | None = None,
 ) -> dict[str, float]:
     """Return parameters of an effect in a random direction and of a stated size.
 
@@ -98,6 +102,8 @@ def sized(
         runs: of the log.
         duration: of each run, s.
         rate: samples per second.
+        accelerations: whether the log will have them. They count only for an effect that needs them, so that all
+            others have the same size with and without.
 
     Raises:
         ConfigError: an unknown size or effect, or one that the manoeuvre says nothing about.
@@ -120,11 +126,13 @@ def sized(
     bottom = None
     if "altitude" in type(layout.model.effect(effect)).channels:
         bottom = bottom_below(model, excitation, seed, runs=runs, duration=duration, rate=rate)
+    felt = accelerations is True and bool(ACCELERATION_NOISE.keys() & set(type(layout.model.effect(effect)).channels))
     made = simulate(
         model, excitation, "realistic", None, seed,
-        runs=runs, duration=duration, rate=rate, max_step=0.025, bottom=bottom,
+        runs=runs, duration=duration, rate=rate, max_step=0.025, bottom=bottom, accelerations=felt,
     )  # fmt: skip
-    sigma = np.array([0.05, 0.05, 0.01, 0.003, 0.003, 0.008] + [0.006] * 3 + [0.003] * 3 + [np.inf] * 6)
+    further = list(ACCELERATION_NOISE.values()) if felt else [np.inf] * 6
+    sigma = np.array([0.05, 0.05, 0.01, 0.003, 0.003, 0.008] + [0.006] * 3 + [0.003] * 3 + further)
     shape = _shape(type(layout.model.effect(effect)), described, made.log, generator)
     information = oracle_information(model, made.log, effect, sigma, shape)
     step = np.where(fixed, 0.0, direction * scale)

@@ -45,7 +45,7 @@ def test_lists_and_single_names_are_taken(auvnn):
 def test_a_dry_run_says_what_it_would_write(auvnn):
     status, out, err = auvnn("benchmark", *TINY, "out=out", "dry_run=true")
     assert (status, err) == (0, "")
-    assert "would write  benchmark.json, report.html, figures/ in out" in out and not Path("out").exists()
+    assert "would write  benchmark.json, rows.jsonl, report.html, figures/ in out" in out and not Path("out").exists()
 
 
 def test_misspelt_words_are_refused(refused):

@@ -84,8 +84,15 @@ def test_each_repeat_has_a_seed_of_its_own():
     assert seeds == [1000, 1001, 1002]
 
 
-def test_all_is_the_whole_catalogue_and_no_more():
-    assert {c.hidden for c in cases(OPTIONS)} == set(EFFECTS.names())
+def test_all_is_the_catalogue_without_what_such_a_log_says_nothing_of():
+    # No fins, no stated battery, and accelerations only where they are measured.
+    absent = {"fin_stall", "voltage_droop"}
+    assert {c.hidden for c in cases({**OPTIONS, "noises": "none"})} == set(EFFECTS.names()) - absent
+    for more in ({}, {"noises": "none", "accelerations": False}):
+        found = {c.hidden for c in cases({**OPTIONS, **more})}
+        assert found == set(EFFECTS.names()) - {*absent, "accelerometer_tilt"}
+    assert "fin_stall" in {c.hidden for c in cases({**OPTIONS, "vehicles": "remus100"})}
+    assert [c.hidden for c in cases({**OPTIONS, "effects": "fin_stall", "repeats": 1})] == ["fin_stall"] * 2
 
 
 def test_nothing_has_no_size_and_so_occurs_once():
@@ -181,12 +188,12 @@ def test_a_fault_is_an_outcome_and_not_the_end(monkeypatch):
 def test_rows_keep_the_order_of_the_cases_whichever_ends_first(monkeypatch):
     todo = cases({**OPTIONS, "effects": ["cg_offset", "ocean_current"]})
 
-    def backwards(some: list[Case], workers: int):
-        assert workers == 2
+    def backwards(some: list[Case], workers: int, run: Any):
+        assert workers == 2 and run is run_case
         for case in reversed(some):
             yield row(case.hidden, "adequate", size=case.size, seed=case.seed)
 
-    monkeypatch.setattr(study, "_all", backwards)
+    monkeypatch.setattr(study, "run_all", backwards)
     told: list[str] = []
     answer = benchmark({**OPTIONS, "effects": ["cg_offset", "ocean_current"], "workers": 2}, told.append)
     found = [(r["hidden"], r["size"], r["seed"]) for r in answer.rows]

@@ -13,10 +13,13 @@ from matplotlib.figure import Figure
 from auvnn.report.html import Table
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import outcomes
+from auvnn.report.pages.benchmark_rates import other_words, p_values_of, rate_tables, target_words
 from auvnn.report.pages.outcomes import NOTHING, Row, in_group, names, right, rows_of, text, values
-from auvnn.report.plots.confusion import confusion
+from auvnn.report.plots.confusion import RIGHT, confusion
 from auvnn.report.plots.coverage import Z95, coverage
+from auvnn.report.plots.falls import falls
 from auvnn.report.plots.recovery import recovery, wilson
+from auvnn.report.plots.uniformity import uniformity
 from auvnn.report.view import View
 from auvnn.report.words import count, finite, listing, number, p_value, percent, plural
 
@@ -45,8 +48,9 @@ class BenchmarkPage(Page):
         if not rows:
             return []
         hidden = outcomes.with_effect(rows)
-        out = [*_naming_words(hidden), _null_words(outcomes.with_nothing(rows))]
-        out += [_wrong_words(rows, view.mapping("metrics")), *_interval_words(hidden)]
+        out = [*target_words(view), *_naming_words(hidden)[:1], *other_words(rows), *_naming_words(hidden)[1:]]
+        out += [_null_words(outcomes.with_nothing(rows)), _wrong_words(rows, view.mapping("metrics"))]
+        out += _interval_words(hidden)
         faults = sum(text(r, "verdict") == "fault" for r in rows)
         if faults:
             out.append(f"{plural(faults, 'log')} ended in a fault instead of an answer.")
@@ -69,7 +73,7 @@ class BenchmarkPage(Page):
             Plot(
                 "confusion",
                 "What was hidden, and what was answered",
-                lambda: confusion(*outcomes.confusion_counts(rows)),
+                lambda: _confusion(rows),
                 "Each row holds the logs that hide the same. The number says how many of them got this "
                 "answer in the first step, the shade their share of the row. Framed: the right answer; bold: "
                 "another. Ambiguous: a group was declared that the log cannot tell apart.",
@@ -92,6 +96,31 @@ class BenchmarkPage(Page):
                 "so the points may leave the band more often than one in twenty.",
             ),
         ]
+        shares = outcomes.shares_of_fall(rows)
+        if shares:
+            found.append(
+                Plot(
+                    "falls",
+                    "How much better the model gets with what was found",
+                    lambda: falls(shares, target=TARGET),
+                    "On further runs of the same plant: the fall of the error of 5 s of free running from the nominal "
+                    "model, its coefficients refitted, to the model with what was found, as a share of the fall to "
+                    "the truth. Only of logs in which the truth's own fall is clear.",
+                )
+            )
+        nulls = p_values_of(view)
+        if nulls:
+            found.append(
+                Plot(
+                    "uniformity",
+                    "Whether the tests hold what they promise where nothing is hidden",
+                    lambda: uniformity(nulls),
+                    "Tests of all effects on the logs that hide nothing. Left: uniform p-values give lines within "
+                    "the band; below it they are too small, above too large, which is safe. Right: how often each "
+                    "is below 0.05. Effects with a time or a frequency to be found are corrected for having taken "
+                    "the best of several, so theirs may only be too large.",
+                )
+            )
         parts = outcomes.by_condition(rows)
         if 1 < len(parts) <= MOST_CONDITIONS:
             found += [_one_condition(i, *part) for i, part in enumerate(parts.items(), 1)]
@@ -106,6 +135,7 @@ class BenchmarkPage(Page):
             "options make the same log again."
         )
         return [
+            *rate_tables(view),
             Table(
                 "By condition",
                 *_condition_table(rows),
@@ -138,6 +168,11 @@ class BenchmarkPage(Page):
             ("Of each kind", "" if repeats is None else plural(repeats, "log")),
             ("Seeds", " to ".join(dict.fromkeys([seeds[0], seeds[-1]])) if seeds else ""),
         ]
+
+
+def _confusion(rows: Sequence[Row]) -> Figure:
+    right = {**RIGHT, **dict.fromkeys(outcomes.strangers(rows), "unknown")}
+    return confusion(*outcomes.confusion_counts(rows), right=right)
 
 
 def _recovery(rows: Sequence[Row]) -> Figure:

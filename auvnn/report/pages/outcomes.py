@@ -15,6 +15,8 @@ from auvnn.report.words import finite
 
 Row = Mapping[str, Any]
 NOTHING = "nothing"
+JOIN = "+"
+KINDS = ("effect", "several", "stranger", "nothing")
 CONDITION = ("vehicle", "noise", "excitation")
 
 
@@ -41,10 +43,22 @@ def answer(row: Row) -> str:
     return given[0] if given else text(row, "verdict")
 
 
+def kind(row: Row) -> str:
+    """Return what kind of thing is hidden: one effect, several, a stranger to the catalogue, or nothing."""
+    if text(row, "kind") in KINDS:
+        return text(row, "kind")
+    return "nothing" if text(row, "hidden") == NOTHING else "effect"
+
+
 def right(row: Row) -> bool:
-    """Whether the hidden effect, and it alone, was named first; with nothing, whether none was."""
-    if text(row, "hidden") == NOTHING:
-        return answer(row) == "adequate"
+    """Whether the hidden effect, and it alone, was named first; with nothing, and a stranger, whether none was.
+
+    Of several, whether all were named and nothing else.
+    """
+    if kind(row) in ("nothing", "stranger"):
+        return text(row, "verdict") == {"nothing": "adequate", "stranger": "unknown"}[kind(row)]
+    if kind(row) == "several":
+        return text(row, "verdict") == "named" and {*names(row)} == {*text(row, "hidden").split(JOIN)}
     return text(row, "verdict") == "named" and answer(row) == text(row, "hidden")
 
 
@@ -55,17 +69,23 @@ def in_group(row: Row) -> bool:
 
 def flawless(row: Row) -> bool:
     """Whether the answer is right and no further name was given."""
-    return right(row) and len(names(row)) <= (text(row, "hidden") != NOTHING)
+    hidden = {"nothing": 0, "stranger": 0, "effect": 1}
+    return right(row) and (kind(row) == "several" or len(names(row)) <= hidden[kind(row)])
+
+
+def of_kind(rows: Sequence[Row], wanted: str) -> list[Row]:
+    """Return the logs that hide one effect, several, a stranger or nothing."""
+    return [r for r in rows if kind(r) == wanted]
 
 
 def with_effect(rows: Sequence[Row]) -> list[Row]:
-    """Return the logs that hide an effect."""
-    return [r for r in rows if text(r, "hidden") != NOTHING]
+    """Return the logs that hide one effect."""
+    return of_kind(rows, "effect")
 
 
 def with_nothing(rows: Sequence[Row]) -> list[Row]:
     """Return the logs that hide nothing."""
-    return [r for r in rows if text(r, "hidden") == NOTHING]
+    return of_kind(rows, "nothing")
 
 
 def values(rows: Sequence[Row], key: str) -> list[str]:
@@ -94,14 +114,36 @@ def errors(rows: Sequence[Row], key: str) -> NDArray[np.float64]:
 
 
 def confusion_counts(rows: Sequence[Row]) -> tuple[list[str], list[str], NDArray[np.float64]]:
-    """Return what was hidden (n), what was answered (m), and how many logs (n, m)."""
+    """Return what was hidden (n), what was answered (m), and how many logs (n, m).
+
+    Logs that hide several effects are not in it: their first answer is only a part of theirs.
+    """
+    rows = [r for r in rows if kind(r) != "several"]
     hidden = list(dict.fromkeys(text(r, "hidden") for r in with_effect(rows)))
     given = [a for a in dict.fromkeys(map(answer, rows)) if a not in hidden and a not in OUTCOMES]
     columns = [*hidden, *given, *OUTCOMES]
-    lines = [*hidden, *([NOTHING] if with_nothing(rows) else [])]
+    lines = [*hidden, *strangers(rows), *([NOTHING] if with_nothing(rows) else [])]
     counts = Counter((text(r, "hidden"), answer(r)) for r in rows)
     table = np.array([[counts[h, c] for c in columns] for h in lines], dtype=float)
     return lines, columns, table.reshape(len(lines), len(columns))
+
+
+def strangers(rows: Sequence[Row]) -> list[str]:
+    """Return the names of what is hidden that the catalogue has no name for."""
+    return values(of_kind(rows, "stranger"), "hidden")
+
+
+def shares_of_fall(rows: Sequence[Row]) -> dict[str, dict[str, list[float]]]:
+    """Return {effect: {size: shares of the true fall of the held-out error}}; several effects are "several"."""
+    out: dict[str, dict[str, list[float]]] = {}
+    for r in rows:
+        found = r.get("fall")
+        share = finite(found.get("share")) if isinstance(found, Mapping) else None
+        if share is not None and kind(r) in ("effect", "several"):
+            name = text(r, "hidden") if kind(r) == "effect" else "several"
+            size = text(r, "size") if kind(r) == "effect" else "mixed"
+            out.setdefault(name, {}).setdefault(size, []).append(share)
+    return out
 
 
 def found_by_size(rows: Sequence[Row]) -> dict[str, dict[str, tuple[int, int]]]:

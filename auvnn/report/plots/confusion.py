@@ -21,7 +21,9 @@ GAP = 0.35  # cells, between names and outcomes
 # Ever darker, so that a grey print keeps the order, yet not so dark that the frame is lost.
 SHADES = ["#ffffff", "#c9dcec", style.BAR, style.AFTER.color]
 # As many rows or columns as the numbers in the cells stay legible for.
-MOST = 40
+MOST = 56
+# Below this step of the cells, in inches, names stand upright and smaller.
+NARROW = 0.17
 
 
 @style.styled
@@ -71,7 +73,8 @@ def confusion(
         ax.text(edge + 0.3, lines[i] + 0.5, f"{totals[i]:.0f}", ha="left", va="center", fontsize=8)
     ax.text(edge + 0.3, -0.1, "logs", ha="left", va="bottom", fontsize=8, style="italic")
     ax.set_xticks([place[j] + 0.5 for j in order], [label(answered[j], 26) for j in order],
-                  rotation=55, ha="right", rotation_mode="anchor")  # fmt: skip
+                  rotation=55 if step > NARROW else 90, ha="right", rotation_mode="anchor",
+                  va="center_baseline" if step <= NARROW else "baseline")  # fmt: skip
     ax.set_yticks([y + 0.5 for y in lines], [label(name, 26) for name in hidden])
     for tick, j in zip(ax.get_xticklabels(), order, strict=True):
         tick.set_fontstyle("italic" if answered[j] in outcomes else "normal")
@@ -79,7 +82,7 @@ def confusion(
         tick.set_fontstyle("italic" if name in right else "normal")
     ax.set_xlim(-0.05, edge + 0.05)
     ax.set_ylim(max(lines) + 1.05, -0.05)
-    ax.tick_params(length=0, labelsize=8)
+    ax.tick_params(length=0, labelsize=8 if step > NARROW else 6)
     for spine in ax.spines.values():
         spine.set_visible(False)
     ax.set_xlabel("answered first (number of logs)")
@@ -101,4 +104,4 @@ def _cell(
         text = f"{value:.0f}" if np.isfinite(value) else "–"
         weight = "normal" if is_right else "bold"
         ax.text(x + 0.5, y + 0.5, text, ha="center", va="center_baseline", color=ink, weight=weight,
-                fontsize=8 if step > 0.22 else 6, zorder=4)  # fmt: skip
+                fontsize=8 if step > 0.22 else 6 if step > 0.13 else 5, zorder=4)  # fmt: skip

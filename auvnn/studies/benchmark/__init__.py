@@ -1,0 +1,66 @@
+"""The hidden-effect benchmark: hide, diagnose, count what was named, by effect, size, noise and manoeuvre."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from auvnn.answers import plain
+from auvnn.studies.benchmark.cases import NOTHING, Case, cases
+from auvnn.studies.benchmark.counting import false_names, in_group, named_first
+from auvnn.studies.benchmark.journal import Journal
+from auvnn.studies.benchmark.one_log import run_case
+from auvnn.studies.benchmark.running import run_all
+from auvnn.studies.benchmark.summary import Benchmark, summarise
+
+__all__ = [
+    "NOTHING",
+    "Benchmark",
+    "Case",
+    "benchmark",
+    "cases",
+    "false_names",
+    "in_group",
+    "named_first",
+    "run_case",
+    "summarise",
+]
+
+
+def benchmark(
+    options: Mapping[str, Any],
+    progress: Callable[[str], None] | None = None,
+    *,
+    journal: str | Path | None = None,
+    any_code: bool = False,
+) -> Benchmark:
+    """Run all cases on several processes and count.
+
+    Args:
+        options: see `cases`; `workers` is how many processes, by default one for each core.
+        progress: told after each log.
+        journal: a file to which each row is added as it is done, and from which an interrupted run goes on.
+        any_code: also go on from rows that another version of the code made.
+
+    Raises:
+        ConfigError: something in the options is unknown or out of range.
+        InputError: the journal is none.
+    """
+    say = progress or (lambda words: None)
+    todo = cases(options)
+    kept = None if journal is None else Journal(journal)
+    rows = {} if kept is None else kept.rows(todo, any_code=any_code)
+    if rows:
+        say(f"going on: {len(rows)} of {len(todo)} logs are done")
+    left = [case for case in todo if case not in rows]
+    workers = int(options.get("workers") or os.cpu_count() or 1)
+    for row in run_all(left, workers, run_case):
+        case = Case.of_row(row)
+        rows[case] = plain(row) if kept is None else kept.append(row)
+        say(
+            f"{len(rows)} of {len(todo)}: {row['hidden']} {row['size']} seed {row['seed']}: {row['verdict']} "
+            f"{'+'.join(row['missing'])}"
+        )
+    return summarise([rows[case] for case in todo], options)

@@ -1,0 +1,113 @@
+"""What one row counts as: right, in a group, tied, a false name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from auvnn.studies.benchmark.cases import JOIN, NOTHING
+
+Row = Mapping[str, Any]
+# Below this many standard errors the log cannot tell two effects apart; see `information`.
+TIED = 2.0
+
+
+def kind_of(row: Row) -> str:
+    """Return "effect", "several", "stranger" or "nothing"."""
+    if row.get("kind"):
+        return str(row["kind"])
+    return "nothing" if row["hidden"] == NOTHING else "several" if JOIN in row["hidden"] else "effect"
+
+
+def effects_of(row: Row) -> list[str]:
+    """Return the effects of the catalogue that are hidden."""
+    return str(row["hidden"]).split(JOIN) if kind_of(row) in ("effect", "several") else []
+
+
+def steps_of(row: Row) -> list[dict[str, Any]]:
+    """Return the answer step by step: verdict and effects."""
+    if row.get("found") is not None:
+        return list(row["found"])
+    return [{"verdict": row["verdict"], "effects": list(row["missing"])}]
+
+
+def named_first(row: Row) -> bool:
+    """Whether a hidden effect, and it alone, was named in the first step."""
+    return row["verdict"] == "named" and bool(row["missing"]) and row["missing"][0] in effects_of(row)
+
+
+def named_alone(row: Row) -> bool:
+    """Whether what is hidden was named, and nothing besides."""
+    return row["verdict"] == "named" and sorted(row["missing"]) == sorted(effects_of(row))
+
+
+def in_group(row: Row) -> bool:
+    """Whether a hidden effect was named, or is a member of a group declared ambiguous, in the first step."""
+    return named_first(row) or (
+        row["verdict"] == "ambiguous" and bool({*effects_of(row)} & {*row["missing"]})
+    )
+
+
+def tied(row: Row, effect: str, others: list[str]) -> bool:
+    """Whether the log cannot tell a hidden effect from any of the others: see `information`."""
+    distance = (row.get("plant_imitation") or row.get("imitation") or {}).get(effect) or {}
+    return all(distance.get(name) is not None and distance[name] <= TIED for name in others)
+
+
+def effect_named(row: Row, effect: str) -> bool:
+    """Whether a hidden effect was named in some step, or declared in a group that the log cannot tell apart."""
+    for step in steps_of(row):
+        if effect in step["effects"]:
+            others = [n for n in step["effects"] if n != effect]
+            return step["verdict"] == "named" or tied(row, effect, others)
+    return False
+
+
+def named_or_tied(row: Row) -> bool:
+    """Whether the hidden effect was named first, or is in a first group that the log cannot tell apart."""
+    if named_first(row):
+        return True
+    mine = [n for n in effects_of(row) if n in row["missing"]]
+    return (
+        row["verdict"] == "ambiguous"
+        and bool(mine)
+        and all(tied(row, mine[0], [n]) for n in steps_of(row)[0]["effects"] if n != mine[0])
+    )
+
+
+def all_named(row: Row) -> bool:
+    """Whether every hidden effect was named, or declared in a group that the log cannot tell apart."""
+    return bool(effects_of(row)) and all(effect_named(row, effect) for effect in effects_of(row))
+
+
+def given_names(row: Row) -> list[str]:
+    """Return the names that were given; members of a declared group are not given as names."""
+    if row.get("found") is not None:
+        return [n for step in row["found"] if step["verdict"] == "named" for n in step["effects"]]
+    return list(row["missing"]) if row["verdict"] == "named" else []
+
+
+def false_names(row: Row) -> list[str]:
+    """Return the names that were given and are not hidden."""
+    return [n for n in given_names(row) if n not in effects_of(row)]
+
+
+def false_share(row: Row) -> float:
+    """Return the share of the given names that are false, none given counting as none false."""
+    given = given_names(row)
+    return len(false_names(row)) / len(given) if given else 0.0
+
+
+def right_verdict(row: Row) -> bool:
+    """Whether the verdict is the one that is right where nothing can be named: adequate, or unknown."""
+    return row["verdict"] == {"nothing": "adequate", "stranger": "unknown"}.get(kind_of(row))
+
+
+def right_axis(row: Row) -> bool:
+    """Whether the degree of freedom that was said to hold the unknown is the one in which it mostly acts."""
+    return row.get("axis") is not None and row.get("axis") in (row.get("axes_true") or [])
+
+
+def answer_of(row: Row) -> str:
+    """Return what was answered in the first step: the first name, or the verdict where none was given."""
+    return row["missing"][0] if row["verdict"] == "named" and row["missing"] else row["verdict"]

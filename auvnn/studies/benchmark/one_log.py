@@ -1,0 +1,191 @@
+"""One log of the benchmark: hide, drive, diagnose, and say what came out as plain data."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from auvnn.answers import plain
+from auvnn.effects import EFFECTS
+from auvnn.errors import AuvnnError, one_line
+from auvnn.studies.benchmark.cases import Case
+from auvnn.studies.benchmark.strangers import axis_of, said_axis, sized_stranger
+
+# The plant's step, s: the error of 2e-5 m/s that the longer one leaves is far below any noise, but not below none.
+STEP_WITHOUT_NOISE, STEP_WITH_NOISE = 0.01, 0.025
+
+
+def run_case(case: Case) -> dict[str, Any]:
+    """Hide, diagnose, and return what came out, as plain data; a fault is an outcome, not an end."""
+    import torch
+
+    torch.set_num_threads(1)
+    row, began = case.to_row(), time.monotonic()
+    try:
+        row.update(_answered(case))
+        fault = None
+    except AuvnnError as problem:
+        fault = str(problem)
+    except Exception as problem:
+        # A fault of the program in one log of five hundred must not cost the others.
+        fault = f"a fault of the program: {type(problem).__name__}: {one_line(problem, 300)}"
+    if fault is not None:
+        row.update(verdict="fault", missing=[])
+    row.update(fault=fault, seconds=time.monotonic() - began)
+    return plain(row)
+
+
+def conditions(case: Case) -> dict[str, Any]:
+    """Return what `simulate` is asked for, the hidden effects and the plant's step aside."""
+    return {
+        "excitation": case.excitation,
+        "noise": noise_of(case),
+        "seed": case.seed,
+        "runs": case.runs,
+        "duration": case.duration,
+        "rate": case.rate,
+    }
+
+
+def noise_of(case: Case) -> str | dict[str, Any]:
+    """Return the noise condition, with noise for accelerations that it says nothing of but that are logged."""
+    from auvnn.studies.hidden import ACCELERATION_NOISE
+
+    if case.accelerations and case.noise == "realistic":
+        return {"name": case.noise, "standard_deviation": ACCELERATION_NOISE}
+    return case.noise
+
+
+def _answered(case: Case) -> dict[str, Any]:
+    from auvnn.diagnosis import diagnose
+    from auvnn.models import load
+    from auvnn.simulate import simulate
+    from auvnn.studies.benchmark.falls import fall, names_to_add
+
+    model, began = load(case.vehicle), time.monotonic()
+    hidden = _hidden(case, model)
+    step = STEP_WITHOUT_NOISE if case.noise == "none" else STEP_WITH_NOISE
+    # Only an independent plant is named: a package without any has its own equations alone.
+    more: dict[str, Any] = {} if case.plant == "own" else {"plant": case.plant}
+    if case.accelerations is not None:
+        more["accelerations"] = case.accelerations
+    # Further runs of the same plant follow those that are diagnosed; they do not change them.
+    whole = {**conditions(case), **more, "runs": case.runs + case.held_out}
+    made = simulate(model, hidden=hidden, coefficients=case.coefficients, max_step=step, **whole)
+    numbers = [run.number for run in made.log.runs]
+    log = made.log.select(numbers[: case.runs]) if case.held_out else made.log
+    simulated = time.monotonic()
+    found = diagnose(model, log, None if case.candidates is None else list(case.candidates), advice=False)
+    diagnosed = time.monotonic()
+    row: dict[str, Any] = {
+        "verdict": found.verdict,
+        "missing": found.missing,
+        "p_value": found.global_p_value,
+        "steps": [s["verdict"] for s in found.steps],
+        "found": [{"verdict": s["verdict"], "effects": list(s["effects"])} for s in found.steps],
+        "truth": hidden,
+        "ranking": [c["effect"] for c in found.candidates[:3]],
+        "parameters": {},
+    }
+    of = {c["effect"]: c["parameters"] for c in found.candidates}
+    if case.kind == "effect":
+        row["parameters"] = of.get(case.hidden, {})
+    elif case.kind == "several":
+        row["parameters"] = {name: of.get(name, {}) for name in case.effects}
+    elif case.kind == "nothing":
+        row["p_values"] = {c["effect"]: c["p_value"] for c in found.candidates if c["p_value"] is not None}
+    else:
+        row.update(
+            axis=said_axis(found.depends_on), axes_true=axis_of(case.hidden), depends_on=found.depends_on
+        )
+    of_the_catalogue = case.kind in ("effect", "several")
+    if of_the_catalogue:
+        row["errors"] = errors_of(case, hidden, row["parameters"])
+        if case.held_out:
+            held = made.log.select(numbers[case.runs :])
+            row["fall"] = fall(model, made.plant, log, held, names_to_add(found.steps))
+        if case.ties:
+            row.update(_ties(case, model, log, made.truth, found))
+    else:
+        row["errors"] = {}
+    return {
+        **row,
+        "seconds_simulate": simulated - began,
+        "seconds_diagnose": diagnosed - simulated,
+        "seconds_judge": time.monotonic() - diagnosed,
+    }
+
+
+def _hidden(case: Case, model: Any) -> dict[str, dict[str, float]]:
+    """Return what is hidden, each of its size."""
+    from auvnn.simulate import make_noise
+    from auvnn.studies.hidden import sized
+
+    if case.kind == "stranger":
+        how = {k: v for k, v in conditions(case).items() if k != "noise"}
+        return {case.hidden: sized_stranger(model, case.hidden, case.size, **how)}
+    logged = make_noise(case.noise).accelerations if case.accelerations is None else case.accelerations
+    return {
+        name: sized(model, name, size, **conditions(case), accelerations=logged)
+        for name, size in zip(case.effects, case.sizes, strict=True)
+    }
+
+
+def _ties(case: Case, model: Any, log: Any, truth: Mapping[str, Any], found: Any) -> dict[str, Any]:
+    """Return which effects can pass for the hidden ones on this log, by distance in standard errors.
+
+    Of every candidate by the package's own equations; of a group that was declared and holds a hidden effect also
+    by differences of the plant, where another plant made the log and windows can say it.
+    """
+    from auvnn.studies.benchmark.information import Truth, imitation, information, point_of
+    from auvnn.studies.benchmark.plant_information import covers, plant_information
+
+    hidden = {name: truth["hidden"][name] for name in case.effects}
+    rivals = [c["effect"] for c in found.candidates if c["p_value"] is not None]
+    rivals = [n for n in rivals if n not in hidden]
+    point = point_of(model, log, Truth(hidden, truth["coefficients"]), rivals, noise_of(case))
+    out: dict[str, Any] = {"imitation": imitation(information(point), rivals)}
+    group = [s["effects"] for s in found.steps if s["verdict"] == "ambiguous" and {*s["effects"]} & {*hidden}]
+    if case.plant != "own" and group:
+        names = list(dict.fromkeys([*hidden, *group[0]]))
+        if covers(point, names):
+            bottom = truth["conditions"]["bottom"]
+            by_plant = plant_information(case.plant, model, point, names, bottom)
+            out["plant_imitation"] = imitation(by_plant, [n for n in group[0] if n not in hidden])
+    return out
+
+
+def errors_of(
+    case: Case, truth: Mapping[str, Mapping[str, float]], parameters: Mapping[str, Any]
+) -> dict[str, dict[str, float | None]]:
+    """Return each parameter's error, relative to its effect's size, and in standard errors.
+
+    Of several effects, a parameter is called by its effect and its own name. A shape, an onset or a frequency, has
+    no distance from its null and so no relative error.
+    """
+    out: dict[str, dict[str, float | None]] = {}
+    for effect, values in truth.items():
+        described = EFFECTS.get(effect).describe(*_described(case.vehicle))
+        null = {p.name: p.null for p in described if not p.shape}
+        size = max(np.sqrt(sum((values[n] - v) ** 2 for n, v in null.items())), 1e-300)
+        answered = parameters if case.kind == "effect" else parameters.get(effect, {})
+        for name, value in values.items():
+            found = answered.get(name)
+            if found is None or found["value"] is None:
+                continue
+            gap, std = found["value"] - value, found["std"]
+            out[name if case.kind == "effect" else f"{effect}.{name}"] = {
+                "relative": abs(gap) / size if name in null else None,
+                "z": gap / std if std and np.isfinite(std) else None,
+            }
+    return out
+
+
+def _described(vehicle: str) -> tuple[Any, str]:
+    from auvnn.vehicle import load_vehicle
+
+    known = load_vehicle(vehicle)
+    return known, "thrusters" if known.thrusters else "wrench"

@@ -1,0 +1,64 @@
+"""The script of the hidden-effect experiment: its tables say what the answer says, its README can be filled."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from auvnn.studies.benchmark import summarise
+
+HERE = Path(__file__).resolve().parents[2] / "experiments" / "hidden_effects"
+
+
+@pytest.fixture(scope="module")
+def script() -> Any:
+    spec = importlib.util.spec_from_file_location("hidden_effects_run", HERE / "run.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def answer() -> dict[str, Any]:
+    def row(size: str, verdict: str, missing: list[str]) -> dict[str, Any]:
+        return {
+            "vehicle": "rov95", "hidden": "cg_offset", "size": size, "noise": "realistic", "excitation": "multisine",
+            "kind": "effect", "part": "one", "verdict": verdict, "missing": missing, "errors": {}, "seconds": 1.0,
+            "fault": None, "fall": {"share": 0.93 if missing else 0.0},
+        }  # fmt: skip
+
+    rows = [row(s, "named", ["cg_offset"]) for s in ("medium", "large", "large")] + [row("small", "adequate", [])]
+    part = {"targets": [{"rate": "named_first", "least": 0.9, "sizes": ["medium", "large"]}]}
+    plan = {"parts": {"one": part}, "targets": [{"rate": "median_fall", "least": 0.95}]}
+    return json.loads(json.dumps(summarise(rows, {"plan": plan}).to_dict()))
+
+
+def test_the_tables_say_what_the_answer_says(script, answer):
+    text = script.tables(answer)
+    assert "4 logs, 0 faults." in text
+    assert "| one | named_first | at least 90 % | 100.0 % (43.9 to 100.0) | 3 | met |" in text
+    assert "| all | median_fall | at least 95 % | 93.0 % | 4 | **missed** |" in text
+    (line,) = [words for words in text.splitlines() if words.startswith("| `cg_offset`")]
+    assert line.startswith("| `cg_offset` | 4 | 75.0 % (30.1 to 95.4) | 75.0 %") and line.endswith("| 93 % |")
+    assert "too few logs or sizes" in line
+
+
+def test_the_readme_is_filled_between_its_marks_and_can_be_filled_again(script, answer, tmp_path):
+    readme = tmp_path / "README.md"
+    text = (HERE / "README.md").read_text(encoding="utf-8")
+    assert text.count(script.BEGIN) == text.count(script.END) == 1 and text.index(script.BEGIN) < text.index(script.END)
+    readme.write_text(text, encoding="utf-8")
+    (tmp_path / "out" / "figures").mkdir(parents=True)
+    (tmp_path / "out" / "figures" / "confusion.png").write_bytes(b"png")
+    script.into_readme(script.tables(answer), tmp_path / "out", readme)
+    once = readme.read_text(encoding="utf-8")
+    script.into_readme(script.tables(answer), tmp_path / "out", readme)
+    assert readme.read_text(encoding="utf-8") == once
+    assert once.startswith(text[: text.index(script.BEGIN)]) and once.endswith(text[text.index(script.END) :])
+    assert "| `cg_offset` | 4 |" in once and "(figures/confusion.png)" in once
+    assert (tmp_path / "figures" / "confusion.png").read_bytes() == b"png"
