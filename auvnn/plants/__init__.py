@@ -8,6 +8,7 @@ PLANTS = Catalogue(
     {
         "own": "auvnn.plants.own:OwnPlant",
         "numpy": "auvnn.plants.independent:NumpyPlant",
+        "mujoco": "auvnn.plants.mujoco_engine:MujocoPlant",
     },
     "auvnn.plants",
 )

@@ -77,10 +77,10 @@ class OwnPlant(Plant):
             rate = model.nu_dot(position, quat_to_matrix(quaternion), run.nu, run.thrust, inputs, times)
             sensed = model.sense(Sensed(position, quaternion, run.nu, rate))
         assert sensed.nu_dot is not None
+        fins = None if inputs.fins is None else inputs.fins.numpy()
         return Motion(
-            *(x.numpy() for x in (run.eta, run.nu, rate)),
-            *(x.numpy() for x in (sensed.position, sensed.quaternion, sensed.nu, sensed.nu_dot)),
-            inputs.command.numpy(), None if inputs.fins is None else inputs.fins.numpy(),
+            run.eta.numpy(), run.nu.numpy(), rate.numpy(), sensed.position.numpy(), sensed.quaternion.numpy(),
+            sensed.nu.numpy(), sensed.nu_dot.numpy(), inputs.command.numpy(), fins,
         )  # fmt: skip
 
 

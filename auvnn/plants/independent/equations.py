@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +22,25 @@ from auvnn.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
+# Command (R, n), fin angles (R, m) or None, voltage (R,) or None.
+Held = tuple[Array, Array | None, Array | None]
+
+
+@dataclass(frozen=True)
+class Around:
+    """The water where the vehicles are.
+
+    Attributes:
+        flow: velocity through it, body axes, (R, 3).
+        gain: rate of its own velocity as the turning body sees it, (R, 3), or None where it is still.
+        walls: of each boundary, share of the added mass and its slope with depth, (R, 1) each.
+        grown: factor on the added mass, (R, 1).
+    """
+
+    flow: Array
+    gain: Array | None
+    walls: list[tuple[Array, Array]]
+    grown: Array
 
 
 class Equations:
@@ -69,8 +90,8 @@ class Equations:
         self.walls = [n for n in ("bottom_proximity", "surface_proximity") if n in effects]
         fixed = [lump for lump in self.hull.lumps if lump.share is None]
         self.growing = [lump for lump in self.hull.lumps if lump.share is not None]
-        self.fixed = [sum(part) for part in zip(*(lump.moments() for lump in fixed), strict=True)]
-        self.constant = None if self.growing or self.walls else np.linalg.inv(self._matrix(*self.fixed, 1.0))
+        self.fixed: list[Any] = [sum(part) for part in zip(*(lump.moments() for lump in fixed), strict=True)]
+        self.inverse = None if self.growing or self.walls else np.linalg.inv(self._matrix(*self.fixed, 1.0))
         self.drags = [bool(np.any(self.hull.linear)), bool(np.any(self.hull.quadratic))]
 
     def _matrix(self, mass: float, first: Array, inertia: Array, grown: float | Array) -> Array:
@@ -79,7 +100,7 @@ class Equations:
         rigid = np.block([[mass * np.eye(3), -x], [x, inertia]])
         return rigid + np.asarray(grown)[..., None, None] * self.hull.added
 
-    def _rigid(self, t: float) -> list:
+    def _rigid(self, t: float) -> list[Any]:
         """Return mass, first moment and inertia of all that is there at a time."""
         total = list(self.fixed)
         for lump in self.growing:
@@ -111,16 +132,93 @@ class Equations:
         above = name == "surface_proximity"
         if not above and self.bottom is None:
             return 0.0 * depth, 0.0 * depth
-        away = depth if above else self.bottom - depth
+        away = depth if above else (self.bottom or 0.0) - depth
         h = np.maximum(away, self.radius)
         f = (-1.0 if above else 1.0) * values["strength"] * (self.radius / h) ** values["exponent"]
         slope = np.where(away > self.radius, -values["exponent"] * f / h, 0.0)
         return f, slope if above else -slope
 
+    def around(self, t: float, place: Array, rotation: Array, v: Array, turn: Array) -> Around:
+        """Return what the water does where the vehicles are."""
+        depth = place[:, 2:]
+        flow, gain = v, None
+        if self.moves:
+            stream, change = water(self.effects, self.vehicle, t, place, times(rotation, v))
+            to_body = rotation.transpose(0, 2, 1)
+            along = times(to_body, stream)
+            flow, gain = v - along, times(to_body, change) - cross(turn, along)
+        walls = [self._wall(n, depth) for n in self.walls]
+        grown = np.ones_like(depth)
+        for f, _ in walls:
+            grown = grown * (1.0 + f)
+        return Around(flow, gain, walls, grown)
+
+    def inertial(self, t: float, v: Array, turn: Array, near: Around) -> dict[str, Array]:
+        """Return what motion itself asks for, of the body and of the water, (R, 6) each."""
+        mass, first, inertia = self._rigid(t)
+        s = np.broadcast_to(first, v.shape)
+        swing = cross(turn, v)
+        force = -(mass * swing + cross(turn, cross(turn, s)))
+        moment = -(cross(turn, turn @ inertia.T) + cross(s, swing))
+        impulse = near.grown * (np.concatenate([near.flow, turn], axis=-1) @ self.hull.added.T)
+        p, m = impulse[:, :3], impulse[:, 3:]
+        out = {
+            "inertia of the body": np.concatenate([force, moment], axis=-1),
+            "inertia of the water": -np.concatenate(
+                [cross(turn, p), cross(turn, m) + cross(near.flow, p)], axis=-1
+            ),
+        }
+        if near.gain is not None:
+            out["water acceleration"] = near.grown * (near.gain @ self.hull.added[:, :3].T)
+        return out
+
+    def forces(
+        self,
+        t: float,
+        place: Array,
+        rotation: Array,
+        v: Array,
+        turn: Array,
+        thrust: Array,
+        held: Held,
+        near: Around,
+    ) -> dict[str, Array]:
+        """Return every other force and moment by name, (R, 6) each; shapes as in `terms`."""
+        command, angles, voltage = held
+        down, flow = rotation[:, 2, :], near.flow
+        drag = self.drag(flow, turn)
+        out = {"drag": drag}
+        share = self._more_drag(t, near)
+        if share is not None:
+            out["added drag"] = share * drag
+        if near.walls:
+            out["walls"] = self._walls(v, turn, down, near)
+        left = self.actuators.given(thrust, command, voltage, flow, turn)
+        moment = left @ self.actuators.turns.T
+        if "propeller_torque" in self.effects:
+            moment = moment + self.actuators.torque(left)
+        out["thrust"] = np.concatenate([left @ self.actuators.forces.T, moment], axis=-1)
+        if self.fins is not None:
+            out["fins"] = np.concatenate(self.fins.wrench(flow, turn, angles), axis=-1)
+        out["weight"] = self._weight(t, down, flow, turn)
+        if self.loads:
+            a = (near.grown * np.diagonal(self.hull.added)[:3]).T
+            instant = Instant(
+                self.vehicle, t, place, rotation, down, v, turn, flow, command,
+                self.hull.buoyancy, self.hull.cb, (a[2] - a[0], a[1] - a[0]),
+            )  # fmt: skip
+            for name, load, values in self.loads:
+                out[f"force of {name}"] = np.concatenate(load(values, instant), axis=-1)
+        if self.strangers:
+            seen = Seen(self.vehicle, t, place, rotation, flow, turn, out["thrust"])
+            for name, member, values in self.strangers:
+                out[name] = member.wrench(values, seen)
+        return out
+
     def terms(
-        self, t: float, place: Array, rotation: Array, v: Array, turn: Array, thrust: Array, held: tuple
-    ) -> tuple[dict[str, Array], Array]:
-        """Return every force and moment (R, 6) by name, and the matrix's inverse (6, 6) or (R, 6, 6).
+        self, t: float, place: Array, rotation: Array, v: Array, turn: Array, thrust: Array, held: Held
+    ) -> dict[str, Array]:
+        """Return every force and moment (R, 6) by name.
 
         Args:
             t: s.
@@ -129,91 +227,50 @@ class Equations:
             v: over ground, (R, 3).
             turn: angular rate, (R, 3).
             thrust: of the actuators, before what flow and battery take, N, (R, n).
-            held: command (R, n), fin angles (R, m) or None, voltage (R,) or None.
+            held: command, fin angles and voltage.
         """
-        hull, out = self.hull, {}
-        command, angles, voltage = held
-        down = rotation[:, 2, :]
-        flow, gain = v, np.zeros_like(v)
-        if self.moves:
-            over = times(rotation, v)
-            stream, change = water(self.effects, self.vehicle, t, place, over)
-            to_body = rotation.transpose(0, 2, 1)
-            along = times(to_body, stream)
-            flow = v - along
-            gain = times(to_body, change) - cross(turn, along)
+        near = self.around(t, place, rotation, v, turn)
+        return self.inertial(t, v, turn, near) | self.forces(t, place, rotation, v, turn, thrust, held, near)
 
-        depth = place[:, 2:]
-        walls = [self._wall(n, depth) for n in self.walls]
-        grown = np.ones_like(depth)
-        for f, _ in walls:
-            grown = grown * (1.0 + f)
+    def rate(
+        self, t: float, place: Array, rotation: Array, v: Array, turn: Array, thrust: Array, held: Held
+    ) -> Array:
+        """Return (v_dot, w_dot), (R, 6); arguments as in `terms`."""
+        near = self.around(t, place, rotation, v, turn)
+        first, *others = self.inertial(t, v, turn, near).values()
+        total = first.copy()
+        for part in (*others, *self.forces(t, place, rotation, v, turn, thrust, held, near).values()):
+            total += part
+        if self.inverse is not None:
+            return total @ self.inverse.T
+        matrix = self._matrix(*self._rigid(t), near.grown[:, 0] if near.walls else 1.0)
+        return times(np.linalg.inv(matrix), total)
 
-        mass, first, inertia = self._rigid(t) if self.growing else self.fixed
-        spin = cross(turn, np.broadcast_to(first, v.shape))
-        swing = cross(turn, v)
-        force = -(mass * swing + cross(turn, spin))
-        moment = -(cross(turn, turn @ inertia.T) + cross(np.broadcast_to(first, v.shape), swing))
-        out["inertia of the body"] = np.concatenate([force, moment], axis=-1)
-
-        still = np.concatenate([flow, turn], axis=-1) @ hull.added.T
-        impulse = grown * still
-        p, m = impulse[:, :3], impulse[:, 3:]
-        out["inertia of the water"] = -np.concatenate(
-            [cross(turn, p), cross(turn, m) + cross(flow, p)], axis=-1
-        )
-        if self.moves:
-            out["water acceleration"] = grown * (gain @ hull.added[:, :3].T)
-
-        drag = self.drag(flow, turn)
-        out["drag"] = drag
-        more = np.zeros_like(depth)
+    def _more_drag(self, t: float, near: Around) -> Array | None:
+        """Return by what share the drag has grown, (R, 1) or (6,)."""
+        more = None
         if "biofouling" in self.effects:
-            more = more + self.effects["biofouling"]["rate"] * t
-        for f, _ in walls:
-            more = more + f
+            more = np.full(6, self.effects["biofouling"]["rate"] * t)
         if self.held is not None:
             load = self.effects["payload"]
-            more = more + self.held(t)[0] * (np.array([load[a] for a in "XYZKMN"]) - 1.0)
-        out["added drag"] = more * drag
+            part = self.held(t)[0] * (np.array([load[a] for a in "XYZKMN"]) - 1.0)
+            more = part if more is None else more + part
+        for f, _ in near.walls:
+            more = f if more is None else more + f
+        return more
 
-        if walls:
-            sinking = dot(down, v)
-            energy = 0.5 * dot(np.concatenate([flow, turn], axis=-1), still)
-            rest = np.zeros_like(out["drag"])
-            for i, (_, slope) in enumerate(walls):
-                others = np.ones_like(depth)
-                for j, (f, _) in enumerate(walls):
-                    others = others * (1.0 if i == j else 1.0 + f)
-                rest -= others * slope * sinking * still
-                rest[:, :3] += others * slope * energy * down
-            out["walls"] = rest
-
-        left = self.actuators.given(thrust, command, voltage, flow, turn)
-        forces, turns = self.actuators.forces, self.actuators.turns
-        moment = left @ turns.T
-        if "propeller_torque" in self.effects:
-            moment = moment + self.actuators.torque(left)
-        out["thrust"] = np.concatenate([left @ forces.T, moment], axis=-1)
-        if self.fins is not None:
-            out["fins"] = np.concatenate(self.fins.wrench(flow, turn, angles), axis=-1)
-        out["weight"] = self._weight(t, down, flow, turn)
-
-        if self.loads:
-            a = (grown * np.diagonal(hull.added)[:3]).T
-            instant = Instant(
-                self.vehicle, t, place, rotation, down, v, turn, flow, command,
-                hull.buoyancy, hull.cb, (a[2] - a[0], a[1] - a[0]),
-            )  # fmt: skip
-            for name, load, values in self.loads:
-                out[name] = np.concatenate(load(values, instant), axis=-1)
-        if self.strangers:
-            seen = Seen(self.vehicle, t, place, rotation, flow, turn, out["thrust"])
-            for name, member, values in self.strangers:
-                out[name] = member.wrench(values, seen)
-        if self.constant is not None:
-            return out, self.constant
-        return out, np.linalg.inv(self._matrix(mass, first, inertia, grown[:, 0] if walls else 1.0))
+    def _walls(self, v: Array, turn: Array, down: Array, near: Around) -> Array:
+        """Return -(dM_A/dz) nu_r z_dot and the pull of the energy's gradient, (R, 6)."""
+        still = np.concatenate([near.flow, turn], axis=-1) @ self.hull.added.T
+        energy = 0.5 * (dot(near.flow, still[:, :3]) + dot(turn, still[:, 3:]))
+        slope = np.zeros_like(energy)
+        for i, (_, own) in enumerate(near.walls):
+            for j, (f, _) in enumerate(near.walls):
+                own = own if i == j else own * (1.0 + f)
+            slope = slope + own
+        out = -slope * dot(down, v) * still
+        out[:, :3] += slope * energy * down
+        return out
 
     def _weight(self, t: float, down: Array, flow: Array, turn: Array) -> Array:
         """Return weight and buoyancy, of hull and load, and what it takes to carry new mass along, (R, 6)."""
@@ -232,10 +289,3 @@ class Equations:
             turning = turning + cross(arm, jerk)
         turning = turning + cross(np.broadcast_to(hanging, down.shape), down)
         return np.concatenate([force, turning], axis=-1)
-
-    def rate(
-        self, t: float, place: Array, rotation: Array, v: Array, turn: Array, thrust: Array, held: tuple
-    ) -> Array:
-        """Return (v_dot, w_dot), (R, 6)."""
-        out, inverse = self.terms(t, place, rotation, v, turn, thrust, held)
-        return times(inverse, sum(out.values()))

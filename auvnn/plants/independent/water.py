@@ -37,7 +37,7 @@ def waves(values: Values, vehicle: Vehicle, t: float, place: Array, moving: Arra
     phase = k * (place[:, :2] @ ahead) - omega * t + values["phase"]
     w = values["amplitude"] * omega * np.exp(-k * np.maximum(place[:, 2], 0.0) + 1j * phase)
 
-    def vector(z: Array) -> Array:
+    def vector(z: NDArray[np.complexfloating]) -> Array:
         return np.stack([z.real * ahead[0], z.real * ahead[1], -z.imag], axis=-1)
 
     return vector(w), vector(-1j * omega * w)
