@@ -91,7 +91,9 @@ class Equations:
         fixed = [lump for lump in self.hull.lumps if lump.share is None]
         self.growing = [lump for lump in self.hull.lumps if lump.share is not None]
         self.fixed: list[Any] = [sum(part) for part in zip(*(lump.moments() for lump in fixed), strict=True)]
-        self.inverse = None if self.growing or self.walls else np.linalg.inv(self._matrix(*self.fixed, 1.0))
+        mass, moment, inertia = self.fixed
+        changing = self.growing or self.walls
+        self.inverse = None if changing else np.linalg.inv(self._matrix(mass, moment, inertia, 1.0))
         self.drags = [bool(np.any(self.hull.linear)), bool(np.any(self.hull.quadratic))]
 
     def _matrix(self, mass: float, first: Array, inertia: Array, grown: float | Array) -> Array:
@@ -243,7 +245,8 @@ class Equations:
             total += part
         if self.inverse is not None:
             return total @ self.inverse.T
-        matrix = self._matrix(*self._rigid(t), near.grown[:, 0] if near.walls else 1.0)
+        mass, moment, inertia = self._rigid(t)
+        matrix = self._matrix(mass, moment, inertia, near.grown[:, 0] if near.walls else 1.0)
         return times(np.linalg.inv(matrix), total)
 
     def _more_drag(self, t: float, near: Around) -> Array | None:

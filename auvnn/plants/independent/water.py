@@ -35,12 +35,15 @@ def waves(values: Values, vehicle: Vehicle, t: float, place: Array, moving: Arra
     k = omega**2 / vehicle.gravity
     ahead = np.array([np.cos(values["direction"]), np.sin(values["direction"])])
     phase = k * (place[:, :2] @ ahead) - omega * t + values["phase"]
-    w = values["amplitude"] * omega * np.exp(-k * np.maximum(place[:, 2], 0.0) + 1j * phase)
+    size = values["amplitude"] * omega * np.exp(-k * np.maximum(place[:, 2], 0.0))
+    w = size * np.cos(phase), size * np.sin(phase)
+    # -i omega W
+    w_dot = omega * w[1], -omega * w[0]
 
-    def vector(z: NDArray[np.complexfloating]) -> Array:
-        return np.stack([z.real * ahead[0], z.real * ahead[1], -z.imag], axis=-1)
+    def vector(real: Array, imaginary: Array) -> Array:
+        return np.stack([real * ahead[0], real * ahead[1], -imaginary], axis=-1)
 
-    return vector(w), vector(-1j * omega * w)
+    return vector(*w), vector(*w_dot)
 
 
 Field = Callable[[Values, Vehicle, float, Array, Array], tuple[Array, Array]]
