@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
@@ -145,13 +145,13 @@ def drive(stretch: Stretch, task: Task, look: Look) -> Motion:
     return stretch.motion()
 
 
-def refuse(plant: Plant, task: Task) -> None:
+def refuse(plant: Plant, effects: Iterable[str]) -> None:
     """Refuse what a plant does not know.
 
     Raises:
         ConfigError: one of the effects, that it has not.
     """
-    for effect in (*task.effects, *task.strangers):
+    for effect in effects:
         why = plant.refuses(effect)
         if why:
             raise ConfigError(f"plant {plant.name} cannot hold the effect {effect}: {why}")

@@ -68,7 +68,7 @@ class MujocoPlant(Plant):
 
     def move(self, task: Task, look: Look) -> Motion:
         """Run the engine."""
-        refuse(self, task)
+        refuse(self, (*task.effects, *task.strangers))
         refuse_learned(self, task)
         return drive(_Scene(task, engine()), task, look)
 

@@ -59,7 +59,7 @@ class OwnPlant(Plant):
 
     def move(self, task: Task, look: Look) -> Motion:
         """Run the model."""
-        refuse(self, task)
+        refuse(self, task.strangers)
         model: GreyBox = task.model
         with torch.inference_mode():
             t = torch.tensor(task.t)

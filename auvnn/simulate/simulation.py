@@ -17,6 +17,7 @@ from auvnn.errors import ConfigError
 from auvnn.logs import Log, Run
 from auvnn.models import GreyBox
 from auvnn.plants import PLANTS, Motion, Task
+from auvnn.plants.base import refuse
 from auvnn.plants.strangers import STRANGERS
 from auvnn.simulate.excitations import EXCITATIONS, make_excitation
 from auvnn.simulate.noise import Draws, make_noise
@@ -75,7 +76,7 @@ def simulate(
         excitation: `paper`, `multisine` or `survey`, or a mapping of its options with `name`.
         noise: `none`, `paper` or `realistic`, or a mapping of its options.
         hidden: effects that the log has and the model has not: parameters by name, or None for typical ones.
-            With `plant="numpy"` also strangers, effects that are not in the catalogue.
+            With `plant="numpy"` or `"mujoco"` also strangers, effects that are not in the catalogue.
         seed: of all random numbers; the same seed gives the same log.
         runs: how many, numbered from 0; run i does not change when more are asked for.
         duration: of each run, s.
@@ -108,7 +109,10 @@ def simulate(
     truth_hidden: dict[str, dict[str, float]] = {}
     strangers: dict[str, dict[str, float]] = {}
     near = False
-    for name, values in as_hidden(hidden).items():
+    wanted = as_hidden(hidden)
+    # Before anything is planned: that takes seconds.
+    refuse(maker, wanted)
+    for name, values in wanted.items():
         if name in STRANGERS:
             generator = _generator(seed, "hidden", zlib.crc32(name.encode()))
             strangers[name] = STRANGERS.get(name).checked(values, generator)

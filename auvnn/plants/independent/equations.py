@@ -247,7 +247,8 @@ class Equations:
             return total @ self.inverse.T
         mass, moment, inertia = self._rigid(t)
         matrix = self._matrix(mass, moment, inertia, near.grown[:, 0] if near.walls else 1.0)
-        return times(np.linalg.inv(matrix), total)
+        inverse: Array = np.linalg.inv(matrix).astype(np.float64)
+        return times(inverse, total)
 
     def _more_drag(self, t: float, near: Around) -> Array | None:
         """Return by what share the drag has grown, (R, 1) or (6,)."""

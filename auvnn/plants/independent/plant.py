@@ -36,6 +36,6 @@ class NumpyPlant(Plant):
 
     def move(self, task: Task, look: Look) -> Motion:
         """Run the equations."""
-        refuse(self, task)
+        refuse(self, (*task.effects, *task.strangers))
         refuse_learned(self, task)
         return drive(Stretch(task), task, look)

@@ -1,7 +1,7 @@
 """Effects that the catalogue does not have, for asking whether a diagnosis knows what it does not know.
 
-They act in the plant `numpy` only. No name of the catalogue is right for any of them; what can be right is the degree
-of freedom that they push most (`axis`).
+They act in the plants `numpy` and `mujoco`. No name of the catalogue is right for any of them; what can be right is
+the degree of freedom that they push most (`axis`).
 """
 
 from auvnn.catalogue import Catalogue
