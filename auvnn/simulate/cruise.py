@@ -8,7 +8,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from auvnn.effects import Moment
 from auvnn.models import GreyBox, Inputs
 from auvnn.physics.attitude import euler_to_quat, quat_to_matrix
 from auvnn.vehicle import Vehicle
@@ -80,20 +79,3 @@ def cruise(model: GreyBox, command: Array) -> Cruise:
     found = least_squares(residual, [1.0, 0.0, 0.0, 0.0], bounds=(low, bound))
     speed, heave, pitch, angle = found.x
     return Cruise(np.array([speed, 0.0, heave, 0.0, 0.0, 0.0]), float(pitch), angle * up)
-
-
-def over_ground(model: GreyBox, eta: torch.Tensor, nu: torch.Tensor) -> torch.Tensor:
-    """Return the velocity over ground at the start of runs, from that through the water, (..., 6).
-
-    Args:
-        model: whose water moves.
-        eta: (..., 7).
-        nu: (..., 6).
-    """
-    rotation, zero = quat_to_matrix(eta[..., 3:]), torch.zeros_like(nu)
-    command = zero[..., :1].expand(*nu.shape[:-1], model.actuators.size)
-    moment = Moment(zero[..., 0], eta[..., :3], rotation, zero, zero, zero, command)
-    for effect in model.using("water"):
-        drift = (rotation.mT @ effect.water(moment)[0].unsqueeze(-1)).squeeze(-1)
-        nu = torch.cat([nu[..., :3] + drift, nu[..., 3:]], dim=-1)
-    return nu

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from auvnn.effects import Sensed
 from auvnn.errors import AuvnnError
 from auvnn.models import GreyBox
-from auvnn.simulate.cruise import over_ground
+from auvnn.plants.own import closed_loop, over_ground
 from auvnn.simulate.excitations import EXCITATIONS, make_excitation
-from auvnn.simulate.motion import closed_loop
 
 Array = NDArray[np.float64]
 

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
-from auvnn.effects import EFFECTS, Sensed
+from auvnn.effects import EFFECTS
 from auvnn.effects.sizes import radius
 from auvnn.errors import ConfigError
 from auvnn.logs import Log, Run
-from auvnn.models import GreyBox, Inputs, Trajectory
-from auvnn.physics.attitude import quat_to_matrix
-from auvnn.simulate.excitations import EXCITATIONS, Plan, make_excitation
-from auvnn.simulate.motion import closed_loop, open_loop
+from auvnn.models import GreyBox
+from auvnn.plants import PLANTS, Motion, Task
+from auvnn.plants.base import refuse
+from auvnn.plants.strangers import STRANGERS
+from auvnn.simulate.excitations import EXCITATIONS, make_excitation
 from auvnn.simulate.noise import Draws, make_noise
 from auvnn.simulate.plant import as_hidden, drawn_factors, make_plant, typical_values
 
@@ -38,7 +38,8 @@ class Simulation:
     Attributes:
         log: what the sensors recorded.
         truth: the content of `truth.json`.
-        plant: the model with everything hidden in it.
+        plant: the model with everything hidden in it that the catalogue of effects knows, as a torch model,
+            whichever plant made the motion.
         set_points: what a controller was told to follow, by name, (runs, samples) each; empty in open loop.
     """
 
@@ -63,6 +64,7 @@ def simulate(
     actuation: str | None = None,
     max_step: float = 0.01,
     bottom: float | None = None,
+    plant: str = "own",
 ) -> Simulation:
     """Make a log: the model with effects hidden in it, driven and measured.
 
@@ -74,6 +76,7 @@ def simulate(
         excitation: `paper`, `multisine` or `survey`, or a mapping of its options with `name`.
         noise: `none`, `paper` or `realistic`, or a mapping of its options.
         hidden: effects that the log has and the model has not: parameters by name, or None for typical ones.
+            With `plant="numpy"` or `"mujoco"` also strangers, effects that are not in the catalogue.
         seed: of all random numbers; the same seed gives the same log.
         runs: how many, numbered from 0; run i does not change when more are asked for.
         duration: of each run, s.
@@ -85,12 +88,15 @@ def simulate(
         max_step: longest step of the integrator (RK4), s.
         bottom: depth of a flat bottom, m: the log gets an `altitude`. By default there is one, close below the
             nominal model's deepest point, only where a hidden effect needs it.
+        plant: what makes the motion: `own`, the model's own equations; `numpy`, independent ones with an adaptive
+            solver; `mujoco`, a physics engine. Excitation, sampling and sensors' noise are the same for all.
 
     Returns:
         Log, truth and plant.
 
     Raises:
-        ConfigError: an option is unknown or out of range.
+        ConfigError: an option is unknown or out of range, or the plant does not know a hidden effect.
+        MissingExtra: the plant's package is not installed.
         AuvnnError: the plant diverges; the message says when and by which term.
     """
     _check(seed, runs, duration, rate, coefficients, max_step)
@@ -98,10 +104,19 @@ def simulate(
         raise ConfigError(f"accelerations = {accelerations!r}: true or false is needed, or null")
     manner = make_excitation(excitation, EXCITATIONS)
     condition = make_noise(noise)
+    maker = PLANTS.get(plant)()
     model = _actuated(model, actuation)
     truth_hidden: dict[str, dict[str, float]] = {}
+    strangers: dict[str, dict[str, float]] = {}
     near = False
-    for name, values in as_hidden(hidden).items():
+    wanted = as_hidden(hidden)
+    # Before anything is planned: that takes seconds.
+    refuse(maker, wanted)
+    for name, values in wanted.items():
+        if name in STRANGERS:
+            generator = _generator(seed, "hidden", zlib.crc32(name.encode()))
+            strangers[name] = STRANGERS.get(name).checked(values, generator)
+            continue
         if values is None:
             # Its own stream by its name: the order of the effects must not matter.
             generator = _generator(seed, "hidden", zlib.crc32(name.encode()))
@@ -115,28 +130,35 @@ def simulate(
     if coefficients == "drawn":
         streams = {s: _generator(seed, s, 0) for s in STREAMS[4:8]}
         factors = drawn_factors(model.vehicle, list(truth_hidden), streams)
-    plant = make_plant(model, truth_hidden, factors)
-    plant.bottom = bottom
+    hiding = make_plant(model, truth_hidden, factors)
+    hiding.bottom = bottom
 
     t = np.arange(round(duration * rate) + 1) / rate
     with torch.inference_mode():
         plan = manner.plan(model, t, [_generator(seed, "excitation", i) for i in range(runs)])
         draws = Draws(condition, len(t), [_generator(seed, "noise", i) for i in range(runs)])
         voltage = _battery(model, t, [_generator(seed, "voltage", i) for i in range(runs)])
-        trajectory, inputs = _moved(plant, plan, draws, voltage, torch.tensor(t), max_step)
-        logged = condition.accelerations if accelerations is None else accelerations
-        sensed = _sensed(plant, trajectory, inputs, logged)
-        altitude = None
-        if bottom is not None:
-            size = condition.standard_deviation.get("altitude", 0.0)
-            streams = [_generator(seed, "altitude", i) for i in range(runs)]
-            noisy = np.stack([size * g.standard_normal(len(t)) for g in streams])
-            altitude = bottom - trajectory.eta[..., 2].numpy() + noisy
-        made = _runs(t, sensed, inputs, draws, model.actuation, altitude)
+    task = Task(
+        model.vehicle, model.actuation, {str(e.name): e.values() for e in hiding.members}, strangers, hiding,
+        plan.eta0, plan.nu0, t, plan.command, plan.fins, plan.controller, plan.under_way, voltage, bottom, max_step,
+    )  # fmt: skip
+
+    def look(k: int, position: Array, quaternion: Array, nu: Array) -> tuple[Array, Array, Array]:
+        return draws.added("x", position, k), draws.turned(quaternion, k), draws.added("u", nu, k)
+
+    motion = maker.move(task, look)
+    logged = condition.accelerations if accelerations is None else accelerations
+    altitude = None
+    if bottom is not None:
+        size = condition.standard_deviation.get("altitude", 0.0)
+        streams = [_generator(seed, "altitude", i) for i in range(runs)]
+        noisy = np.stack([size * g.standard_normal(len(t)) for g in streams])
+        altitude = bottom - motion.eta[..., 2] + noisy
+    made = _runs(t, motion, voltage, draws, model.actuation, altitude, logged)
     log = Log.from_runs(made, name=f"{model.vehicle.name}-{manner.name}-{seed}")
     truth = {
         "schema": "auvnn/truth/1",
-        "hidden": {e.name: e.values() for e in plant.copied_effects() if e.name in truth_hidden},
+        "hidden": {e.name: e.values() for e in hiding.members if e.name in truth_hidden} | strangers,
         "noise": condition.name,
         "seed": int(seed),
         "model": model.vehicle.name,
@@ -151,10 +173,11 @@ def simulate(
             "rate": float(rate),
             "max_step": float(max_step),
             "bottom": bottom,
+            "plant": maker.name,
         },
         "notes": list(plan.notes),
     }
-    return Simulation(log, truth, plant, plan.set_points)
+    return Simulation(log, truth, hiding, plan.set_points)
 
 
 def bottom_below(
@@ -207,54 +230,35 @@ def _actuated(model: GreyBox, actuation: str | None) -> GreyBox:
     return GreyBox(model.vehicle, effects, model.damping, actuation)
 
 
-def _battery(model: GreyBox, t: Array, generators: Sequence[np.random.Generator]) -> Tensor | None:
+def _battery(model: GreyBox, t: Array, generators: Sequence[np.random.Generator]) -> Array | None:
     """Return the voltage of a battery that falls by a tenth in ten minutes, (R, T), or None."""
     reference = model.vehicle.reference_voltage
     if reference is None:
         return None
     first = np.array([g.uniform(0.94, 1.04) for g in generators])
-    return torch.tensor(reference * (first[:, None] - 0.1 * t / 600.0))
-
-
-def _moved(
-    plant: GreyBox, plan: Plan, draws: Draws, voltage: Tensor | None, t: Tensor, max_step: float
-) -> tuple[Trajectory, Inputs]:
-    if plan.controller is None:
-        return open_loop(plant, plan, voltage, t, max_step)
-
-    def look(k: int, sensed: Sensed) -> tuple[Array, Array, Array]:
-        return (
-            draws.added("x", sensed.position.numpy(), k),
-            draws.turned(sensed.quaternion.numpy(), k),
-            draws.added("u", sensed.nu.numpy(), k),
-        )
-
-    return closed_loop(plant, plan, plan.controller, look, voltage, t, max_step)
-
-
-def _sensed(plant: GreyBox, run: Trajectory, inputs: Inputs, accelerations: bool) -> Sensed:
-    position, quaternion = run.eta[..., :3], run.eta[..., 3:]
-    rate = None
-    if accelerations:
-        times = run.times.expand(run.nu.shape[:-1])
-        rate = plant.nu_dot(position, quat_to_matrix(quaternion), run.nu, run.thrust, inputs, times)
-    return plant.sense(Sensed(position, quaternion, run.nu, rate))
+    return reference * (first[:, None] - 0.1 * t / 600.0)
 
 
 def _runs(
-    t: Array, sensed: Sensed, inputs: Inputs, draws: Draws, actuation: str, altitude: Array | None
+    t: Array,
+    motion: Motion,
+    battery: Array | None,
+    draws: Draws,
+    actuation: str,
+    altitude: Array | None,
+    rates: bool,
 ) -> list[Run]:
-    position, nu = draws.added("x", sensed.position.numpy()), draws.added("u", sensed.nu.numpy())
-    quaternion = draws.turned(sensed.quaternion.numpy())
-    rate = None if sensed.nu_dot is None else draws.added("du", sensed.nu_dot.numpy())
+    position, nu = draws.added("x", motion.position), draws.added("u", motion.velocity)
+    quaternion = draws.turned(motion.quaternion)
+    rate = draws.added("du", motion.rate) if rates else None
     voltage = None
-    if inputs.voltage is not None:
-        voltage = draws.added("voltage", inputs.voltage.numpy()[..., None])[..., 0]
-    command = inputs.command.numpy()
+    if battery is not None:
+        voltage = draws.added("voltage", battery[..., None])[..., 0]
+    command = motion.command
     return [
         Run(
             number=i, t=t, quaternion=quaternion[i], nu=nu[i], nu_dot=None if rate is None else rate[i],
-            position=position[i], fins=None if inputs.fins is None else inputs.fins[i].numpy(),
+            position=position[i], fins=None if motion.fins is None else motion.fins[i],
             wrench=command[i] if actuation == "wrench" else None,
             thrusters=command[i] if actuation == "thrusters" else None,
             voltage=None if voltage is None else voltage[i],

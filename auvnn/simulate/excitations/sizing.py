@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from auvnn.models import GreyBox, Inputs
-from auvnn.simulate.cruise import over_ground
+from auvnn.plants.own import over_ground
 from auvnn.simulate.excitations.base import Array, Plan
 from auvnn.simulate.limits import Limits
 

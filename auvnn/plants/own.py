@@ -1,30 +1,90 @@
-"""The plant in motion: free-running under given commands, or step by step under a controller."""
+"""The package's own model as the plant: free-running under commands, or step by step under a controller."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from auvnn.effects import Sensed
-from auvnn.errors import AuvnnError
+from auvnn.effects import Moment, Sensed
 from auvnn.models import GreyBox, Inputs, Trajectory
 from auvnn.models.rollout import LIMIT, steps_per_interval
 from auvnn.models.thrust_signal import ThrustSignal
 from auvnn.physics.attitude import quat_derivative, quat_to_matrix
-from auvnn.simulate.cruise import over_ground
-from auvnn.simulate.excitations import Controller, Plan
+from auvnn.plants.base import Controller, Look, Motion, Plant, Task, diverged, refuse
 
 Array = NDArray[np.float64]
 
 # What the sensors make of row k: position, quaternion and nu, reported and noisy.
-Look = Callable[[int, Sensed], tuple[Array, Array, Array]]
+Seen = Callable[[int, Sensed], tuple[Array, Array, Array]]
 
 
-def open_loop(plant: GreyBox, plan: Plan, voltage: Tensor | None, t: Tensor, max_step: float
+class Start(Protocol):
+    """What runs begin with and are told to do; a `Task` and an excitation's `Plan` both are such."""
+
+    @property
+    def eta0(self) -> Array: ...  # noqa: D102
+
+    @property
+    def nu0(self) -> Array: ...  # noqa: D102
+
+    @property
+    def command(self) -> Array | None: ...  # noqa: D102
+
+    @property
+    def fins(self) -> Array | None: ...  # noqa: D102
+
+    @property
+    def under_way(self) -> bool: ...  # noqa: D102
+
+
+class OwnPlant(Plant):
+    """The model itself, integrated by RK4 with a fixed step, actuators in closed form.
+
+    What it hides is computed by the code that is to explain it: right for teaching and for checking the
+    estimation, no proof of the physics.
+    """
+
+    name = "own"
+
+    def refuses(self, effect: str) -> str:
+        """Return why it cannot hold a stranger; it knows every effect of the catalogue."""
+        return (
+            "it holds the catalogue's effects only; use plant=numpy" if effect.startswith("stranger_") else ""
+        )
+
+    def move(self, task: Task, look: Look) -> Motion:
+        """Run the model."""
+        refuse(self, task.strangers)
+        model: GreyBox = task.model
+        with torch.inference_mode():
+            t = torch.tensor(task.t)
+            voltage = None if task.voltage is None else torch.tensor(task.voltage)
+            if task.controller is None:
+                run, inputs = open_loop(model, task, voltage, t, task.max_step)
+            else:
+
+                def seen(k: int, sensed: Sensed) -> tuple[Array, Array, Array]:
+                    return look(k, sensed.position.numpy(), sensed.quaternion.numpy(), sensed.nu.numpy())
+
+                run, inputs = closed_loop(model, task, task.controller, seen, voltage, t, task.max_step)
+            position, quaternion = run.eta[..., :3], run.eta[..., 3:]
+            times = run.times.expand(run.nu.shape[:-1])
+            rate = model.nu_dot(position, quat_to_matrix(quaternion), run.nu, run.thrust, inputs, times)
+            sensed = model.sense(Sensed(position, quaternion, run.nu, rate))
+        assert sensed.nu_dot is not None
+        fins = None if inputs.fins is None else inputs.fins.numpy()
+        return Motion(
+            run.eta.numpy(), run.nu.numpy(), rate.numpy(), sensed.position.numpy(), sensed.quaternion.numpy(),
+            sensed.nu.numpy(), sensed.nu_dot.numpy(), inputs.command.numpy(), fins,
+        )  # fmt: skip
+
+
+def open_loop(plant: GreyBox, plan: Start, voltage: Tensor | None, t: Tensor, max_step: float
               ) -> tuple[Trajectory, Inputs]:  # fmt: skip
     """Run the plant under the plan's commands.
 
@@ -37,12 +97,12 @@ def open_loop(plant: GreyBox, plan: Plan, voltage: Tensor | None, t: Tensor, max
     run = plant.rollout(torch.tensor(plan.eta0), _first_velocity(plant, plan), inputs, t, max_step=max_step)
     if run.divergences:
         first = run.divergences[0]
-        raise diverged(plant, first.index, first.time, first.term)
+        raise diverged(plant.vehicle.name, first.index, first.time, first.term)
     return run, inputs
 
 
 def closed_loop(
-    plant: GreyBox, plan: Plan, controller: Controller, look: Look, voltage: Tensor | None, t: Tensor,
+    plant: GreyBox, plan: Start, controller: Controller, look: Seen, voltage: Tensor | None, t: Tensor,
     max_step: float,
 ) -> tuple[Trajectory, Inputs]:  # fmt: skip
     """Run the plant under a controller that sees only what the sensors report, all runs at once.
@@ -179,7 +239,7 @@ class Stepper:
             eta[:, :3], quat_to_matrix(eta[:, 3:]), self.nus[k][one], self.thrusts[k][one], row, time
         )
         worst = max(terms, key=lambda n: float(terms[n].abs().max()))
-        raise diverged(self.model, run, float(self.t[k]), worst)
+        raise diverged(self.model.vehicle.name, run, float(self.t[k]), worst)
 
     def inputs(self) -> Inputs:
         """Return what was held, (R, T, ...)."""
@@ -192,14 +252,23 @@ class Stepper:
         return Trajectory(self.t, eta, nu, thrust)
 
 
-def _first_velocity(plant: GreyBox, plan: Plan) -> Tensor:
+def _first_velocity(plant: GreyBox, plan: Start) -> Tensor:
     nu = torch.tensor(plan.nu0)
     return over_ground(plant, torch.tensor(plan.eta0), nu) if plan.under_way else nu
 
 
-def diverged(plant: GreyBox, run: int, time: float, term: str) -> AuvnnError:
-    """Return the error that says where a run left what is physical."""
-    return AuvnnError(
-        f"simulating {plant.vehicle.name}: run {run} diverged after {time:g} s; the largest term was {term}. "
-        "Check its numbers"
-    )
+def over_ground(model: GreyBox, eta: Tensor, nu: Tensor) -> Tensor:
+    """Return the velocity over ground at the start of runs, from that through the water, (..., 6).
+
+    Args:
+        model: whose water moves.
+        eta: (..., 7).
+        nu: (..., 6).
+    """
+    rotation, zero = quat_to_matrix(eta[..., 3:]), torch.zeros_like(nu)
+    command = zero[..., :1].expand(*nu.shape[:-1], model.actuators.size)
+    moment = Moment(zero[..., 0], eta[..., :3], rotation, zero, zero, zero, command)
+    for effect in model.using("water"):
+        drift = (rotation.mT @ effect.water(moment)[0].unsqueeze(-1)).squeeze(-1)
+        nu = torch.cat([nu[..., :3] + drift, nu[..., 3:]], dim=-1)
+    return nu

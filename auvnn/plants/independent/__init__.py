@@ -1,0 +1,5 @@
+"""A plant with equations of its own: vectors instead of matrices, scipy's integrator, nothing of the model's code."""
+
+from auvnn.plants.independent.plant import NumpyPlant
+
+__all__ = ["NumpyPlant"]

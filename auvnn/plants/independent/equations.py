@@ -1,0 +1,295 @@
+"""The equations of motion in vectors: a rigid body by Newton and Euler, the fluid by its impulse (Kirchhoff)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.plants.independent.fins import Fins
+from auvnn.plants.independent.hull import build, grasp
+from auvnn.plants.independent.loads import LOADS, Instant
+from auvnn.plants.independent.sizes import sphere_radius
+from auvnn.plants.independent.thrust import Actuators
+from auvnn.plants.independent.vectors import cross, cross_matrix, dot, times
+from auvnn.plants.independent.water import water
+from auvnn.plants.strangers import STRANGERS
+from auvnn.plants.strangers.base import Seen
+from auvnn.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+# Command (R, n), fin angles (R, m) or None, voltage (R,) or None.
+Held = tuple[Array, Array | None, Array | None]
+
+
+@dataclass(frozen=True)
+class Around:
+    """The water where the vehicles are.
+
+    Attributes:
+        flow: velocity through it, body axes, (R, 3).
+        gain: rate of its own velocity as the turning body sees it, (R, 3), or None where it is still.
+        walls: of each boundary, share of the added mass and its slope with depth, (R, 1) each.
+        grown: factor on the added mass, (R, 1).
+    """
+
+    flow: Array
+    gain: Array | None
+    walls: list[tuple[Array, Array]]
+    grown: Array
+
+
+class Equations:
+    """Accelerations of R vehicles.
+
+    With total mass m, first moment s = sum m_i r_i and inertia J about the origin of all rigid parts:
+
+        F = m (v_dot + w x v) + w_dot x s + w x (w x s)
+        N = J w_dot + w x (J w) + s x (v_dot + w x v)
+
+    The water around has the impulse (P, L) = M_A (v_r, w); what it does to the body is
+
+        F = -(P_dot + w x P),    N = -(L_dot + w x L + v_r x P)
+
+    with P_dot taken in the body: v_r changes by v_dot - R'a + w x R'v_c. Parts whose mass grows take up water
+    at rest: -m_dot (v_r + w x r). Near bottom or surface M_A is (1 + f) times itself, so that the impulse changes
+    with the distance too, and the gradient of the fluid's energy pulls.
+    Reference: Goldstein (1980), chapter 5; Lamb (1932), sections 119 to 124.
+
+    Args:
+        vehicle: plain numbers.
+        effects: all that act, name to parameters, in order.
+        strangers: effects outside the catalogue.
+        actuators: of the vehicle.
+        bottom: depth, m, or None.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        effects: Mapping[str, Values],
+        strangers: Mapping[str, Values],
+        actuators: Actuators,
+        bottom: float | None,
+    ) -> None:
+        """Work out what does not change."""
+        self.vehicle, self.effects, self.actuators, self.bottom = vehicle, effects, actuators, bottom
+        self.hull = build(vehicle, effects)
+        self.loads = [(name, LOADS[name], values) for name, values in effects.items() if name in LOADS]
+        self.strangers = [(n, STRANGERS.get(n), values) for n, values in strangers.items()]
+        self.fins = None
+        if vehicle.fins:
+            self.fins = Fins(vehicle, effects.get("fin_stall", {}).get("factor", 1.0))
+        self.moves = any(n in effects for n in ("ocean_current", "current_shear", "waves"))
+        self.held = grasp(effects["payload"]["time"], vehicle) if "payload" in effects else None
+        self.radius = sphere_radius(vehicle)
+        self.walls = [n for n in ("bottom_proximity", "surface_proximity") if n in effects]
+        fixed = [lump for lump in self.hull.lumps if lump.share is None]
+        self.growing = [lump for lump in self.hull.lumps if lump.share is not None]
+        self.fixed: list[Any] = [sum(part) for part in zip(*(lump.moments() for lump in fixed), strict=True)]
+        mass, moment, inertia = self.fixed
+        changing = self.growing or self.walls
+        self.inverse = None if changing else np.linalg.inv(self._matrix(mass, moment, inertia, 1.0))
+        self.drags = [bool(np.any(self.hull.linear)), bool(np.any(self.hull.quadratic))]
+
+    def _matrix(self, mass: float, first: Array, inertia: Array, grown: float | Array) -> Array:
+        """Return the matrix in front of (v_dot, w_dot), (6, 6) or (R, 6, 6)."""
+        x = cross_matrix(first)
+        rigid = np.block([[mass * np.eye(3), -x], [x, inertia]])
+        return rigid + np.asarray(grown)[..., None, None] * self.hull.added
+
+    def _rigid(self, t: float) -> list[Any]:
+        """Return mass, first moment and inertia of all that is there at a time."""
+        total = list(self.fixed)
+        for lump in self.growing:
+            assert lump.share is not None
+            share = lump.share(t)[0]
+            total = [a + share * b for a, b in zip(total, lump.moments(), strict=True)]
+        return total
+
+    def drag(self, flow: Array, turn: Array) -> Array:
+        """Return the stated drag with what effects made of it, (R, 6)."""
+        hull = self.hull
+        nu = np.concatenate([flow, turn], axis=-1)
+        out = np.zeros_like(nu)
+        if self.drags[0]:
+            out -= nu @ hull.linear.T
+        if self.drags[1]:
+            out -= (np.abs(nu) * nu) @ hull.quadratic.T
+        for place, axes, linear, quadratic in hull.parts:
+            arm = np.broadcast_to(place, flow.shape)
+            own = np.concatenate([(flow + cross(turn, arm)) @ axes, turn @ axes], axis=-1)
+            law = -(linear + quadratic * np.abs(own)) * own
+            force, moment = law[:, :3] @ axes.T, law[:, 3:] @ axes.T
+            out += np.concatenate([force, moment + cross(arm, force)], axis=-1)
+        return out
+
+    def _wall(self, name: str, depth: Array) -> tuple[Array, Array]:
+        """Return f and its slope with depth, (R, 1), of a boundary's share in the added mass."""
+        values = self.effects[name]
+        above = name == "surface_proximity"
+        if not above and self.bottom is None:
+            return 0.0 * depth, 0.0 * depth
+        away = depth if above else (self.bottom or 0.0) - depth
+        h = np.maximum(away, self.radius)
+        f = (-1.0 if above else 1.0) * values["strength"] * (self.radius / h) ** values["exponent"]
+        slope = np.where(away > self.radius, -values["exponent"] * f / h, 0.0)
+        return f, slope if above else -slope
+
+    def around(self, t: float, place: Array, rotation: Array, v: Array, turn: Array) -> Around:
+        """Return what the water does where the vehicles are."""
+        depth = place[:, 2:]
+        flow, gain = v, None
+        if self.moves:
+            stream, change = water(self.effects, self.vehicle, t, place, times(rotation, v))
+            to_body = rotation.transpose(0, 2, 1)
+            along = times(to_body, stream)
+            flow, gain = v - along, times(to_body, change) - cross(turn, along)
+        walls = [self._wall(n, depth) for n in self.walls]
+        grown = np.ones_like(depth)
+        for f, _ in walls:
+            grown = grown * (1.0 + f)
+        return Around(flow, gain, walls, grown)
+
+    def inertial(self, t: float, v: Array, turn: Array, near: Around) -> dict[str, Array]:
+        """Return what motion itself asks for, of the body and of the water, (R, 6) each."""
+        mass, first, inertia = self._rigid(t)
+        s = np.broadcast_to(first, v.shape)
+        swing = cross(turn, v)
+        force = -(mass * swing + cross(turn, cross(turn, s)))
+        moment = -(cross(turn, turn @ inertia.T) + cross(s, swing))
+        impulse = near.grown * (np.concatenate([near.flow, turn], axis=-1) @ self.hull.added.T)
+        p, m = impulse[:, :3], impulse[:, 3:]
+        out = {
+            "inertia of the body": np.concatenate([force, moment], axis=-1),
+            "inertia of the water": -np.concatenate(
+                [cross(turn, p), cross(turn, m) + cross(near.flow, p)], axis=-1
+            ),
+        }
+        if near.gain is not None:
+            out["water acceleration"] = near.grown * (near.gain @ self.hull.added[:, :3].T)
+        return out
+
+    def forces(
+        self,
+        t: float,
+        place: Array,
+        rotation: Array,
+        v: Array,
+        turn: Array,
+        thrust: Array,
+        held: Held,
+        near: Around,
+    ) -> dict[str, Array]:
+        """Return every other force and moment by name, (R, 6) each; shapes as in `terms`."""
+        command, angles, voltage = held
+        down, flow = rotation[:, 2, :], near.flow
+        drag = self.drag(flow, turn)
+        out = {"drag": drag}
+        share = self._more_drag(t, near)
+        if share is not None:
+            out["added drag"] = share * drag
+        if near.walls:
+            out["walls"] = self._walls(v, turn, down, near)
+        left = self.actuators.given(thrust, command, voltage, flow, turn)
+        moment = left @ self.actuators.turns.T
+        if "propeller_torque" in self.effects:
+            moment = moment + self.actuators.torque(left)
+        out["thrust"] = np.concatenate([left @ self.actuators.forces.T, moment], axis=-1)
+        if self.fins is not None:
+            out["fins"] = np.concatenate(self.fins.wrench(flow, turn, angles), axis=-1)
+        out["weight"] = self._weight(t, down, flow, turn)
+        if self.loads:
+            a = (near.grown * np.diagonal(self.hull.added)[:3]).T
+            instant = Instant(
+                self.vehicle, t, place, rotation, down, v, turn, flow, command,
+                self.hull.buoyancy, self.hull.cb, (a[2] - a[0], a[1] - a[0]),
+            )  # fmt: skip
+            for name, load, values in self.loads:
+                out[f"force of {name}"] = np.concatenate(load(values, instant), axis=-1)
+        if self.strangers:
+            seen = Seen(self.vehicle, t, place, rotation, flow, turn, out["thrust"])
+            for name, member, values in self.strangers:
+                out[name] = member.wrench(values, seen)
+        return out
+
+    def terms(
+        self, t: float, place: Array, rotation: Array, v: Array, turn: Array, thrust: Array, held: Held
+    ) -> dict[str, Array]:
+        """Return every force and moment (R, 6) by name.
+
+        Args:
+            t: s.
+            place: NED, m, (R, 3).
+            rotation: body to NED, (R, 3, 3).
+            v: over ground, (R, 3).
+            turn: angular rate, (R, 3).
+            thrust: of the actuators, before what flow and battery take, N, (R, n).
+            held: command, fin angles and voltage.
+        """
+        near = self.around(t, place, rotation, v, turn)
+        return self.inertial(t, v, turn, near) | self.forces(t, place, rotation, v, turn, thrust, held, near)
+
+    def rate(
+        self, t: float, place: Array, rotation: Array, v: Array, turn: Array, thrust: Array, held: Held
+    ) -> Array:
+        """Return (v_dot, w_dot), (R, 6); arguments as in `terms`."""
+        near = self.around(t, place, rotation, v, turn)
+        first, *others = self.inertial(t, v, turn, near).values()
+        total = first.copy()
+        for part in (*others, *self.forces(t, place, rotation, v, turn, thrust, held, near).values()):
+            total += part
+        if self.inverse is not None:
+            return total @ self.inverse.T
+        mass, moment, inertia = self._rigid(t)
+        matrix = self._matrix(mass, moment, inertia, near.grown[:, 0] if near.walls else 1.0)
+        inverse: Array = np.linalg.inv(matrix).astype(np.float64)
+        return times(inverse, total)
+
+    def _more_drag(self, t: float, near: Around) -> Array | None:
+        """Return by what share the drag has grown, (R, 1) or (6,)."""
+        more = None
+        if "biofouling" in self.effects:
+            more = np.full(6, self.effects["biofouling"]["rate"] * t)
+        if self.held is not None:
+            load = self.effects["payload"]
+            part = self.held(t)[0] * (np.array([load[a] for a in "XYZKMN"]) - 1.0)
+            more = part if more is None else more + part
+        for f, _ in near.walls:
+            more = f if more is None else more + f
+        return more
+
+    def _walls(self, v: Array, turn: Array, down: Array, near: Around) -> Array:
+        """Return -(dM_A/dz) nu_r z_dot and the pull of the energy's gradient, (R, 6)."""
+        still = np.concatenate([near.flow, turn], axis=-1) @ self.hull.added.T
+        energy = 0.5 * (dot(near.flow, still[:, :3]) + dot(turn, still[:, 3:]))
+        slope = np.zeros_like(energy)
+        for i, (_, own) in enumerate(near.walls):
+            for j, (f, _) in enumerate(near.walls):
+                own = own if i == j else own * (1.0 + f)
+            slope = slope + own
+        out = -slope * dot(down, v) * still
+        out[:, :3] += slope * energy * down
+        return out
+
+    def _weight(self, t: float, down: Array, flow: Array, turn: Array) -> Array:
+        """Return weight and buoyancy, of hull and load, and what it takes to carry new mass along, (R, 6)."""
+        hull = self.hull
+        force = (hull.weight - hull.buoyancy) * down
+        hanging = hull.weight * hull.cg - hull.buoyancy * hull.cb
+        turning = np.zeros_like(down)
+        for lump in self.growing:
+            assert lump.share is not None
+            share, rate = lump.share(t)
+            pull = share * (lump.mass * self.vehicle.gravity - lump.lift)
+            hanging = hanging + pull * lump.place
+            arm = np.broadcast_to(lump.place, flow.shape)
+            jerk = -rate * lump.mass * (flow + cross(turn, arm))
+            force = force + pull * down + jerk
+            turning = turning + cross(arm, jerk)
+        turning = turning + cross(np.broadcast_to(hanging, down.shape), down)
+        return np.concatenate([force, turning], axis=-1)

@@ -1,0 +1,63 @@
+"""Control fins: lift across the local flow, from the angle between chord and flow."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.plants.independent.vectors import cross
+from auvnn.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+
+class Fins:
+    """All fins of a vehicle.
+
+    The chord turns with the fin's angle; the angle of attack is that from the flow in the fin's plane to the
+    chord, taken within a right angle because the profile is the same fore and aft. The lift coefficient blends
+    from c_La alpha into a flat plate's 2 sin|sin| cos about the stall angle, over a twelfth of it.
+
+    Args:
+        vehicle: whose fins.
+        factor: on all stall angles.
+    """
+
+    def __init__(self, vehicle: Vehicle, factor: float = 1.0) -> None:
+        """Collect geometry."""
+        fins = vehicle.fins
+        self.place, self.axis = np.array([f.position for f in fins]), np.array([f.axis for f in fins])
+        self.size = 0.5 * vehicle.water_density * np.array([f.area for f in fins])
+        self.slope, self.stall = (
+            np.array([f.lift_slope for f in fins]),
+            factor * np.array([f.stall for f in fins]),
+        )
+        ahead = np.array([1.0, 0.0, 0.0]) - self.axis[:, :1] * self.axis
+        self.ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
+        self.across = np.cross(self.axis, self.ahead)
+
+    def wrench(self, flow: Array, turn: Array, angles: Array | None) -> tuple[Array, Array]:
+        """Return force and moment (R, 3) each.
+
+        Args:
+            flow: velocity through the water, (R, 3).
+            turn: angular rate, (R, 3).
+            angles: rad, (R, m), or None for zero.
+        """
+        angle = np.zeros((len(flow), len(self.size))) if angles is None else angles
+        chord = np.cos(angle)[..., None] * self.ahead + np.sin(angle)[..., None] * self.across
+        local = flow[:, None] + cross(
+            np.broadcast_to(turn[:, None], chord.shape), self.place[None] + 0 * chord
+        )
+        local = local - (local * self.axis).sum(-1, keepdims=True) * self.axis
+        axis = np.broadcast_to(self.axis, chord.shape)
+        side, along = (axis * cross(local, chord)).sum(-1), (local * chord).sum(-1)
+        # A chord that points backwards is the same profile the other way round.
+        attack = np.arctan2(np.where(along < 0, -side, side), np.abs(along))
+        blend = 1.0 / (1.0 + np.exp(np.minimum(12.0 * (np.abs(attack) / self.stall - 1.0), 700.0)))
+        sine = np.sin(attack)
+        plate = 2.0 * np.sign(sine) * sine**2 * np.cos(attack)
+        lift = blend * self.slope * attack + (1.0 - blend) * plate
+        speed = np.sqrt((local * local).sum(-1))
+        force = (self.size * lift * speed)[..., None] * cross(axis, local)
+        return force.sum(1), cross(self.place[None] + 0 * force, force).sum(1)

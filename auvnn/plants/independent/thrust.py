@@ -1,0 +1,178 @@
+"""The actuators: thrust as a function of time, solved exactly between commands, and what flow and battery take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from auvnn.plants.independent.sizes import full_effort
+from auvnn.vehicle import Table, Vehicle
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+Signal = Callable[[float], Array]
+
+
+class Actuators:
+    """Thrusters, or the axes of a commanded wrench, with their history.
+
+    The thrust is a function of continuous time: the overshoot's flow and the lag's gap fade by exponentials
+    between commands, and a delay looks back into the pieces before. Nothing is averaged over a row.
+
+    Args:
+        vehicle: whose thrusters.
+        actuation: "thrusters" or "wrench".
+        effects: all of them, in order.
+    """
+
+    def __init__(self, vehicle: Vehicle, actuation: str, effects: Mapping[str, Values]) -> None:
+        """Collect geometry and curves."""
+        self.vehicle, self.wrench = vehicle, actuation == "wrench"
+        if self.wrench:
+            self.forces, self.turns = np.eye(6)[:3], np.eye(6)[3:]
+            self.full: Array = full_effort(vehicle)
+        else:
+            self.forces = np.array([u.direction for u in vehicle.thrusters]).T
+            self.turns = np.array([np.cross(u.position, u.direction) for u in vehicle.thrusters]).T
+            self.full = np.ones(len(vehicle.thrusters))
+        self.effects = effects
+        self.lag = effects.get("thruster_lag", {}).get("time_constant", 0.0)
+        self.late = effects.get("actuation_delay", {}).get("delay", 0.0)
+        self.begins: list[float] = []
+        self.pieces: list[Signal] = []
+        self.flow: Array | None = None
+        self.last: Array | None = None
+
+    def names(self) -> list[str]:
+        """Return what the actuators are called in parameters."""
+        if self.wrench:
+            return list("XYZKMN")
+        return [f"thruster_{i + 1}" for i in range(len(self.full))]
+
+    def settled(self, command: Array) -> Array:
+        """Return the thrust that commands (R, n) give in the end, N."""
+        if self.wrench:
+            return command
+        out = np.empty_like(command)
+        for i, unit in enumerate(self.vehicle.thrusters):
+            c = command[:, i]
+            if isinstance(unit.curve, Table):
+                out[:, i] = np.interp(c, unit.curve.command, unit.curve.thrust)
+            else:
+                out[:, i] = np.where(c > 0, unit.max_forward * c**2, -unit.max_reverse * c**2)
+        return out
+
+    def hold(self, command: Array, begin: float, end: float) -> None:
+        """Take new commands (R, n) at time `begin`, s, held up to `end`."""
+        wanted: Signal = lambda t: command  # noqa: E731
+        constant = True
+        for name, values in self.effects.items():
+            if name == "thruster_deadband":
+                wanted = self._deadband(wanted, values["width"])
+            elif name == "thrust_overshoot":
+                wanted, constant = self._overshoot(wanted, values, begin, end), False
+
+        def demand(t: float) -> Array:
+            return self.settled(wanted(t))
+
+        piece = demand if not constant else _always(demand(begin))
+        if self.lag > 0.0:
+            first = piece(begin) if self.last is None else self.last
+            if constant:
+                piece = _fading(piece(begin), first, begin, self.lag)
+            else:
+                piece = self._chasing(demand, first, begin, end)
+        self.begins.append(begin)
+        self.pieces.append(piece)
+        self.last = piece(end)
+
+    def _deadband(self, wanted: Signal, width: float) -> Signal:
+        def out(t: float) -> Array:
+            share = wanted(t) / self.full
+            size = np.abs(share)
+            beyond = np.maximum(size - width, 0.0) / (1.0 - width)
+            return np.where(size < 1.0, np.copysign(beyond, share), share) * self.full
+
+        return out
+
+    def _overshoot(self, wanted: Signal, values: Values, begin: float, end: float) -> Signal:
+        # A dead band before it only maps held commands to held ones, so that the flow's equation is linear here.
+        command, tau = wanted(begin), values["time_constant"]
+        excess = np.array([values[n] for n in self.names()])
+        flow = command if self.flow is None else self.flow
+        self.flow = command + (flow - command) * np.exp(-(end - begin) / tau)
+        gap = excess * (command - flow)
+        return lambda t: command + gap * np.exp(-(t - begin) / tau)
+
+    def _chasing(self, demand: Signal, first: Array, begin: float, end: float) -> Signal:
+        """Solve the lag behind a demand that changes between commands."""
+        shape = first.shape
+
+        def rate(t: float, y: Array) -> Array:
+            return ((demand(t) - y.reshape(shape)) / self.lag).ravel()
+
+        if end <= begin:
+            return _always(first)
+        found = solve_ivp(
+            rate, (begin, end), first.ravel(), "LSODA", rtol=1e-10, atol=1e-10, dense_output=True
+        )
+        return lambda t: found.sol(min(t, end)).reshape(shape)
+
+    def breaks(self, begin: float, end: float) -> list[float]:
+        """Return the moments between `begin` and `end` at which the thrust may jump."""
+        if self.late == 0.0:
+            return []
+        jumps = np.array(self.begins[1:]) + self.late
+        return [float(x) for x in jumps if begin + 1e-12 < x < end - 1e-12]
+
+    def between(self, begin: float, end: float) -> Signal:
+        """Return the thrust (R, n), N, as a function of time over a stretch without jumps."""
+        middle = 0.5 * (begin + end) - self.late
+        index = max(int(np.searchsorted(self.begins, middle, side="right")) - 1, 0)
+        piece = self.pieces[index]
+        start = self.begins[index]
+        return lambda t: piece(max(t - self.late, start))
+
+    def given(self, thrust: Array, command: Array, voltage: Array | None, flow: Array, turn: Array) -> Array:
+        """Return what is left of the thrust (R, n) in a flow (R, 3) with the battery as it is, in order of effects.
+
+        Args:
+            thrust: N.
+            command: as given by the log, (R, n).
+            voltage: V, (R,), or None.
+            flow: velocity through the water, (R, 3).
+            turn: angular rate, (R, 3).
+        """
+        for name, values in self.effects.items():
+            if name == "thruster_gain":
+                thrust = thrust * np.array([values[n] for n in self.names()])
+            elif name == "thrust_inflow_loss":
+                along = flow @ self.forces
+                if not self.wrench:
+                    along = along + turn @ self.turns
+                thrust = thrust - values["coefficient"] * np.abs(command / self.full) * along
+            elif name == "voltage_droop" and voltage is not None and self.vehicle.reference_voltage:
+                share = np.maximum(voltage / self.vehicle.reference_voltage, 1e-3)
+                thrust = thrust * np.power(share, values["exponent"])[:, None]
+        return thrust
+
+    def torque(self, thrust: Array) -> Array:
+        """Return the propellers' reaction (R, 3), N m, if there is any."""
+        coefficient = self.effects.get("propeller_torque", {}).get("coefficient", 0.0)
+        sense = np.array([u.handedness for u in self.vehicle.thrusters], dtype=float)
+        if self.wrench:
+            along = thrust[:, :1] * (-1.0 if sense.sum() < 0 else 1.0)
+            return coefficient * along * np.array([1.0, 0.0, 0.0])
+        return coefficient * (thrust * sense) @ self.forces.T
+
+
+def _always(value: Array) -> Signal:
+    return lambda t: value
+
+
+def _fading(goal: Array, first: Array, begin: float, tau: float) -> Signal:
+    gap = first - goal
+    return lambda t: goal + gap * np.exp(-(t - begin) / tau)
