@@ -18,7 +18,7 @@ from auvnn.plants.independent.water import water
 
 Array = NDArray[np.float64]
 
-# Of the solver, per interval between commands; what is left over a minute is far below a millimetre.
+# Of the solver, per interval between commands.
 RELATIVE, ABSOLUTE = 1e-9, 1e-10
 # State of one vehicle: position, rotation by rows, velocity, angular rate.
 SIZE = 18
