@@ -182,7 +182,27 @@ def test_a_fault_is_an_outcome_and_not_the_end(monkeypatch):
     (case,) = cases({**TINY, "effects": "nothing", "duration": 5})
     found = run_case(case)
     assert (found["verdict"], found["fault"], found["missing"]) == ("fault", "the model diverges", [])
+    assert found["made"] is True, "the log was there"
     assert summarise([found], OPTIONS).metrics["faults"] == 1
+
+
+def test_a_log_that_cannot_be_made_is_no_fault_of_the_diagnosis():
+    (case,) = cases({**TINY, "effects": "fin_stall", "duration": 5})
+    found = run_case(case)
+    assert (found["verdict"], found["made"]) == ("fault", False) and found["fault"]
+    metrics = summarise([found], OPTIONS).metrics
+    assert (metrics["faults"], metrics["not_made"], metrics["logs_with_effect"]) == (1, 1, 0)
+
+
+def test_an_error_of_the_program_in_one_log_does_not_end_the_others(monkeypatch):
+    import auvnn.diagnosis
+
+    def breaks(*_: Any, **__: Any) -> None:
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr(auvnn.diagnosis, "diagnose", breaks)
+    (case,) = cases({**TINY, "effects": "nothing", "duration": 5})
+    assert run_case(case)["fault"] == "a fault of the program: ZeroDivisionError: division by zero"
 
 
 def test_rows_keep_the_order_of_the_cases_whichever_ends_first(monkeypatch):

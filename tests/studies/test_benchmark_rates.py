@@ -101,7 +101,8 @@ def test_each_rate_counts_its_own_kind():
         row("s", ("unknown", []), kind="stranger", axis="X", axes_true=["X"]),
         row("s", *named("c"), kind="stranger", axis=None, axes_true=["X"]),
         row("nothing", ("adequate", []), kind="nothing"),
-        row("nothing", ("fault", []), kind="nothing", fault="it broke"),
+        row("nothing", ("fault", []), kind="nothing", fault="it broke", made=True),
+        row("a", ("fault", []), fault="a leaves no trace", made=False),
     ]  # fmt: skip
     found = {e["rate"]: (e["hits"], e["count"]) for e in by_part(rows) if e["part"] == "all"}
     assert found == {
@@ -109,7 +110,7 @@ def test_each_rate_counts_its_own_kind():
         "all_named": (1, 1), "several_named_alone": (1, 1), "adequate_with_nothing": (1, 2),
         "unknown_with_stranger": (1, 2), "axis_of_stranger": (1, 2),
         # Given: a; b; a and b; c. Wrong: b and c.
-        "false_names": (2, 5), "exact_ties": (1, 2), "faults": (1, 8),
+        "false_names": (2, 5), "exact_ties": (1, 2), "faults": (2, 9), "not_made": (1, 9),
         # The share of each log that is no fault: 0, 0, 1, 0, 0, 1, 0.
         "false_discovery_rate": (None, 7),
     }  # fmt: skip

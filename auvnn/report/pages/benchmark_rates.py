@@ -27,7 +27,8 @@ WORDS = {
     "coverage_95": "95 % intervals that hold the true value",
     "exact_ties": "logs with an effect that no one can tell from the hidden one",
     "median_fall": "fall of the held-out error, of the true one, median",
-    "faults": "faults",
+    "not_made": "logs that could not be made",
+    "faults": "faults, those included",
 }
 
 

@@ -74,8 +74,8 @@ def flawless(row: Row) -> bool:
 
 
 def of_kind(rows: Sequence[Row], wanted: str) -> list[Row]:
-    """Return the logs that hide one effect, several, a stranger or nothing."""
-    return [r for r in rows if kind(r) == wanted]
+    """Return the logs that hide one effect, several, a stranger or nothing; one that was not made is none."""
+    return [r for r in rows if kind(r) == wanted and r.get("made") is not False]
 
 
 def with_effect(rows: Sequence[Row]) -> list[Row]:
@@ -118,7 +118,7 @@ def confusion_counts(rows: Sequence[Row]) -> tuple[list[str], list[str], NDArray
 
     Logs that hide several effects are not in it: their first answer is only a part of theirs.
     """
-    rows = [r for r in rows if kind(r) != "several"]
+    rows = [r for r in rows if kind(r) != "several" and r.get("made") is not False]
     hidden = list(dict.fromkeys(text(r, "hidden") for r in with_effect(rows)))
     given = [a for a in dict.fromkeys(map(answer, rows)) if a not in hidden and a not in OUTCOMES]
     columns = [*hidden, *given, *OUTCOMES]

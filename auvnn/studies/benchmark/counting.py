@@ -19,6 +19,11 @@ def kind_of(row: Row) -> str:
     return "nothing" if row["hidden"] == NOTHING else "several" if JOIN in row["hidden"] else "effect"
 
 
+def was_made(row: Row) -> bool:
+    """Whether there was a log to diagnose: an effect may leave no trace on a manoeuvre, or a plant diverge."""
+    return row.get("made") is not False
+
+
 def effects_of(row: Row) -> list[str]:
     """Return the effects of the catalogue that are hidden."""
     return str(row["hidden"]).split(JOIN) if kind_of(row) in ("effect", "several") else []

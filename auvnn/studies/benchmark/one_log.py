@@ -23,9 +23,10 @@ def run_case(case: Case) -> dict[str, Any]:
     import torch
 
     torch.set_num_threads(1)
-    row, began = case.to_row(), time.monotonic()
+    # Until there is a log, nothing that goes wrong is the diagnosis' doing.
+    row, began = {**case.to_row(), "made": False}, time.monotonic()
     try:
-        row.update(_answered(case))
+        row.update(_answered(case, row))
         fault = None
     except AuvnnError as problem:
         fault = str(problem)
@@ -59,7 +60,8 @@ def noise_of(case: Case) -> str | dict[str, Any]:
     return case.noise
 
 
-def _answered(case: Case) -> dict[str, Any]:
+def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
+    """Return what is answered; note in `begun` once there is a log to answer for."""
     from auvnn.diagnosis import diagnose
     from auvnn.models import load
     from auvnn.simulate import simulate
@@ -78,6 +80,7 @@ def _answered(case: Case) -> dict[str, Any]:
     numbers = [run.number for run in made.log.runs]
     log = made.log.select(numbers[: case.runs]) if case.held_out else made.log
     simulated = time.monotonic()
+    begun["made"] = True
     found = diagnose(model, log, None if case.candidates is None else list(case.candidates), advice=False)
     diagnosed = time.monotonic()
     row: dict[str, Any] = {

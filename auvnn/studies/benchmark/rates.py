@@ -33,7 +33,7 @@ def z_of(row: Row) -> list[float]:
 
 
 def _of(kinds: str | tuple[str, ...], hit: Callable[[Row], bool]) -> Callable[[Sequence[Row]], list[bool]]:
-    return lambda rows: [bool(hit(r)) for r in rows if kind_of(r) in kinds]
+    return lambda rows: [bool(hit(r)) for r in rows if kind_of(r) in kinds and counting.was_made(r)]
 
 
 def _within(rows: Sequence[Row]) -> list[bool]:
@@ -62,6 +62,7 @@ RATES: dict[str, Callable[[Sequence[Row]], list[bool]]] = {
     ],
     "coverage_95": _within,
     "exact_ties": lambda rows: [_tie(r) for r in rows if kind_of(r) == "effect" and r.get("imitation")],
+    "not_made": lambda rows: [not counting.was_made(r) for r in rows],
     "faults": lambda rows: [r["verdict"] == "fault" for r in rows],
 }
 

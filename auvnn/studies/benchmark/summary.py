@@ -95,8 +95,9 @@ def summarise(rows: Sequence[Row], options: Mapping[str, Any]) -> Benchmark:
 
 
 def _metrics(rows: Sequence[Row]) -> dict[str, float]:
-    hidden = [r for r in rows if kind_of(r) == "effect"]
-    null = [r for r in rows if kind_of(r) == "nothing"]
+    made = [r for r in rows if counting.was_made(r)]
+    hidden = [r for r in made if kind_of(r) == "effect"]
+    null = [r for r in made if kind_of(r) == "nothing"]
     given = [n for r in rows for n in given_names(r)]
     false = [n for r in rows for n in false_names(r)]
     zs = [z for r in rows for z in z_of(r)]
@@ -105,8 +106,8 @@ def _metrics(rows: Sequence[Row]) -> dict[str, float]:
     metrics = {
         "logs": len(rows),
         "logs_with_effect": len(hidden),
-        "logs_with_several": sum(kind_of(r) == "several" for r in rows),
-        "logs_with_stranger": sum(kind_of(r) == "stranger" for r in rows),
+        "logs_with_several": sum(kind_of(r) == "several" for r in made),
+        "logs_with_stranger": sum(kind_of(r) == "stranger" for r in made),
         "logs_with_nothing": len(null),
         "named_first_share": _share(map(named_first, hidden)),
         "named_alone_share": _share(map(counting.named_alone, hidden)),
@@ -116,6 +117,7 @@ def _metrics(rows: Sequence[Row]) -> dict[str, float]:
         "false_alarms_with_nothing": sum(r["verdict"] != "adequate" for r in null),
         "false_discovery_share": len(false) / len(given) if given else 0.0,
         "faults": sum(r["verdict"] == "fault" for r in rows),
+        "not_made": len(rows) - len(made),
         "coverage_95_share": _share(abs(z) < Z95 for z in zs),
         "worst_relative_error": float(np.max(relative)) if relative else float("nan"),
         "median_seconds": float(np.median(seconds)) if seconds else float("nan"),
@@ -175,7 +177,7 @@ def _effects(rows: Sequence[Row]) -> list[dict[str, Any]]:
             }
             for size in sorted({r["size"] for r in members}, key=lambda s: SIZES.get(s, 0.0))
         }
-        known = [r for r in members if r["size"] in SIZES and r["verdict"] != "fault"]
+        known = [r for r in members if r["size"] in SIZES and counting.was_made(r)]
         fallen = falls(members)
         out.append(
             {
@@ -205,7 +207,7 @@ def _confusion(rows: Sequence[Row]) -> dict[str, dict[str, int]]:
     """Return hidden to answered first to logs; logs with several effects are not in it."""
     out: dict[str, dict[str, int]] = {}
     for r in rows:
-        if kind_of(r) != "several":
+        if kind_of(r) != "several" and counting.was_made(r):
             line = out.setdefault(r["hidden"], {})
             line[answer_of(r)] = line.get(answer_of(r), 0) + 1
     return out
