@@ -1,7 +1,8 @@
 """Where a model fails, which effect is missing, and how much better it gets with it."""
 
+from auvnn.diagnosis.actuators import ActuatorCheck, check_actuators
 from auvnn.diagnosis.compare import Comparison, compare
 from auvnn.diagnosis.diagnose import Diagnosis, diagnose
 from auvnn.diagnosis.improve import Improvement, add
 
-__all__ = ["Comparison", "Diagnosis", "Improvement", "add", "compare", "diagnose"]
+__all__ = ["ActuatorCheck", "Comparison", "Diagnosis", "Improvement", "add", "check_actuators", "compare", "diagnose"]
