@@ -18,7 +18,7 @@ Mask = NDArray[np.bool_]
 _SENTINEL_JUMP = 0.5  # m beyond what the fastest motion of the log covers in a step
 _FLAT = 3  # equal samples at the extreme make a clipped top
 _CLIPPED = 5  # samples at full scale before it is called so
-_EDGE = 0.02  # of full scale: how steeply a clipped signal runs into its limit
+_EDGE = 0.003  # of full scale: how steeply a clipped signal runs into its limit, most of the times
 _HELD = 0.05  # share of repeated samples from which equal neighbours mean nothing
 
 
@@ -118,4 +118,4 @@ def clipped(y: Array) -> tuple[Mask, float]:
         > _EDGE * scale
         for s, e in tops
     ]
-    return (at, scale) if tops and all(steep) else (none, scale)
+    return (at, scale) if tops and np.mean(steep) > 0.5 else (none, scale)

@@ -69,8 +69,9 @@ def check(log: Log) -> Vertical | None:
         gain, slope_gain = noise_gain(run.dt, h)
         noise = np.nan_to_num(np.asarray(noise_std(run.t, np.stack([down, run.position[:, 2]], axis=1))))
         spread = float(np.nanstd(smooth[:, 0])) if np.isfinite(smooth[:, 0]).any() else 0.0
-        # A depth whose noise hides the motion is no evidence against it.
-        if spread > max(_MOVES * gain * noise[0], _MOVES * slope_gain * noise[1], _SLOWEST):
+        moved = float(np.nanstd(slope[:, 1])) if np.isfinite(slope[:, 1]).any() else 0.0
+        # A depth whose noise hides the motion, in its own unit or in metres, is no evidence against it.
+        if spread > max(_MOVES * gain * noise[0], _SLOWEST) and max(spread, moved) > _MOVES * slope_gain * noise[1]:
             rates.append(slope[:, 1])
             speeds.append(smooth[:, 0])
     if not rates:
