@@ -4,5 +4,17 @@ from auvnn.diagnosis.actuators import ActuatorCheck, check_actuators
 from auvnn.diagnosis.compare import Comparison, compare
 from auvnn.diagnosis.diagnose import Diagnosis, diagnose
 from auvnn.diagnosis.improve import Improvement, add
+from auvnn.diagnosis.rank_one_step import Ranked, rank_one_step
 
-__all__ = ["ActuatorCheck", "Comparison", "Diagnosis", "Improvement", "add", "check_actuators", "compare", "diagnose"]
+__all__ = [
+    "ActuatorCheck",
+    "Comparison",
+    "Diagnosis",
+    "Improvement",
+    "Ranked",
+    "add",
+    "check_actuators",
+    "compare",
+    "diagnose",
+    "rank_one_step",
+]

@@ -17,13 +17,12 @@ TRACE = (28, 0.25)  # window of the first record, and s of it
 @style.styled
 def figure(data: Path, result: dict) -> Figure:
     """Draw a stretch of fast sine, one edge of the squares, and how well each explanation does on records left out."""
-    made = style.new_figure(style.PAGE, 2.7)
-    fig = made.figure if hasattr(made, "figure") else made
+    fig = style.new_figure(style.PAGE, 2.7)
     left, middle, right = fig.subplots(1, 3, width_ratios=(1.1, 1.1, 1.0))
     sine = study.windows([study.read(data, study.SINES[0])])
     square = study.windows([study.read(data, study.SQUARES[1])])
     for axes, batch, window, span, title in (
-        (left, sine, TRACE[0], (0.0, TRACE[1]), "Sine, about 10 Hz"),
+        (left, sine, TRACE[0], (0.0, TRACE[1]), "Sine, 10 Hz"),
         (middle, square, 5, (0.0, 0.6), "Square, about 2 Hz"),
     ):
         t = batch.times[window, batch.history :].numpy()
@@ -38,16 +37,17 @@ def figure(data: Path, result: dict) -> Figure:
         axes.set_xlabel("time (s)")
         axes.set_title(title)
     left.set_ylabel("force (N)")
-    left.legend(loc="upper center", bbox_to_anchor=(1.1, -0.24), ncols=3)
+    fig.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=3)
     names = list(study.CANDIDATES)
     values = [1.0 - result[n]["left_out_r2"] for n in names]
     right.barh(range(len(names)), values, color=style.BAR, edgecolor=style.INK, lw=0.5)
     for i, n in enumerate(names):
         each = [1.0 - x["r2"] for x in result[n]["left_out"]]
-        right.plot(each, [i] * len(each), "o", ms=2.5, color=style.INK)
+        right.plot(each, [i] * len(each), "o", ms=2.5, color=style.INK, clip_on=False)
     right.set_yticks(range(len(names)), [n.replace("_", " ") for n in names])
     right.invert_yaxis()
-    right.set_xlabel("unexplained share of the variance (1)")
+    right.set_xlim(0.0, 0.25)
+    right.set_xlabel("share unexplained (1)")
     right.set_title("Sines left out")
     return fig
 

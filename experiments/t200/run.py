@@ -32,13 +32,12 @@ LENGTH, HISTORY = 1.0, 0.3  # s of a window, and of what the actuators remember 
 STATIC = ("thruster_gain",)
 CANDIDATES = {
     "static": (),
+    "thruster_lag": ("thruster_lag",),
+    "actuation_delay": ("actuation_delay",),
+    "lag + delay": ("thruster_lag", "actuation_delay"),
     "thruster_deadband": ("thruster_deadband",),
     "thrust_overshoot": ("thrust_overshoot",),
-    "actuation_delay": ("actuation_delay",),
-    "thruster_lag": ("thruster_lag",),
-    "lag + delay": ("thruster_lag", "actuation_delay"),
     "lag + overshoot": ("thruster_lag", "thrust_overshoot"),
-    "lag + deadband": ("thruster_lag", "thruster_deadband"),
 }
 START = {
     "thruster_lag": [0.01],
@@ -78,18 +77,23 @@ def static_curve(data: Path, voltage: float = VOLTAGE) -> tuple[list[float], lis
     return ((pwm - NEUTRAL) / SPAN).tolist(), (KGF * ((1 - part) * force[0] + part * force[1])).tolist()
 
 
-def bench(data: Path, effects: tuple[str, ...]) -> GreyBox:
+def bench(data: Path, effects: tuple[str, ...], straight: bool = False) -> GreyBox:
     """Return a body with this one thruster and these effects; only its actuators are used."""
-    command, thrust = static_curve(data)
+    command, thrust = ([-1.0, 1.0], [-50.0, 50.0]) if straight else static_curve(data)
     unit = {"position": [0, 0, 0], "direction": [1, 0, 0], "curve": {"command": command, "thrust": thrust}}
     vehicle = plain_vehicle(thrusters=[unit], reference_voltage=VOLTAGE)
     return GreyBox(vehicle, [effect_class(n).build(vehicle, "thrusters") for n in (*STATIC, *effects)])
 
 
 def force_of(model: GreyBox, command: torch.Tensor, times: torch.Tensor, history: int) -> torch.Tensor:
-    """Return the force of the thruster at every row after the history, N, (B, T)."""
-    drive = model.actuators.drive(command.unsqueeze(-1), times, model.before_thrust, warmup=history)
-    thrust = torch.stack(drive.start, dim=-2)
+    """Return the force of the thruster around every row after the history, N, (B, T).
+
+    It is the mean over the steps before and after the row, which unlike the value at the row itself goes on smoothly
+    with a delay: commands are held, and so jump between rows.
+    """
+    drive = model.actuators.drive(command.unsqueeze(-1), times, model.before_thrust, warmup=history - 1)
+    means = torch.stack([step[0] for step in drive.mean], dim=-2)
+    thrust = 0.5 * (means[..., 1:, :] + means[..., :-1, :])
     still = torch.zeros(6, dtype=torch.float64)
     moment = Moment(times[..., history:], still[:3], torch.eye(3).double(), still, still, still, thrust)
     for effect in model.using("thrust"):
@@ -107,15 +111,18 @@ class Batch:
     history: int
 
 
-def windows(records: list[Record]) -> Batch:
-    """Cut records into windows with history; the first of each has its first sample as history."""
+def windows(records: list[Record], early: int = 0) -> Batch:
+    """Cut records into windows with history; the first of each has its first sample as history.
+
+    A row's command is held from its time on; with `early=1` from the row before it on.
+    """
     command, times, force = [], [], []
     history = rows = 0
     for record in records:
         dt = float(np.median(np.diff(record.t)))
         history, rows = round(HISTORY / dt), round(LENGTH / dt)
         for begin in range(0, len(record.t) - rows + 1, rows):
-            index = np.clip(np.arange(begin - history, begin + rows), 0, None)
+            index = np.clip(np.arange(begin - history, begin + rows) + early, 0, len(record.t) - 1)
             command.append(record.command[index])
             times.append(dt * np.arange(-history, rows))
             force.append(record.force[begin : begin + rows])
@@ -125,9 +132,9 @@ def windows(records: list[Record]) -> Batch:
 class Bench:
     """A model of the bench with its parameters as one vector: those of the effects, and the offset last."""
 
-    def __init__(self, data: Path, effects: tuple[str, ...]) -> None:
+    def __init__(self, data: Path, effects: tuple[str, ...], straight: bool = False) -> None:
         """Start from rough values."""
-        self.model = bench(data, effects)
+        self.model = bench(data, effects, straight)
         self.members = self.model.members
         values = [v for e in self.members for v in START[e.name]]
         low = [v for e in self.members for v in LOW.get(e.name, [-np.inf] * len(START[e.name]))]
@@ -160,7 +167,7 @@ class Bench:
                 free = ~((theta <= self.low) & (right < 0))
                 step = np.zeros(len(theta))
                 lhs = square[np.ix_(free, free)]
-                step[free] = np.linalg.solve(lhs + damping * np.diag(np.diag(lhs)), right[free])
+                step[free] = np.linalg.solve(lhs + damping * np.diag(np.diag(lhs) + 1e-12 * lhs.max()), right[free])
                 trial = np.maximum(theta + step, self.low)
                 trial_gap = batch.force - self.predict(trial, batch)
                 trial_cost = float((trial_gap**2).sum())
@@ -247,6 +254,17 @@ def ringing(bench_: Bench, squares: list[Batch]) -> float:
     return float(frequency[high][np.argmax(np.asarray(total)[high])])
 
 
+def conventions(data: Path) -> dict[str, float]:
+    """Return the time constant of the lag, s, by what is taken for granted: the static curve, when a row begins to act."""
+    found = {}
+    for curve, straight in (("vendor's curve", False), ("straight line", True)):
+        for acts, early in (("from its row on", 0), ("from the row before on", 1)):
+            fitted = Bench(data, CANDIDATES["thruster_lag"], straight)
+            fitted.fit(windows([read(data, n) for n in SINES], early))
+            found[f"{curve}, a command acts {acts}"] = float(fitted.theta[1])
+    return found
+
+
 def main() -> None:
     """Fit all candidates and write `result.json`, and the figure."""
     torch.set_num_threads(1)
@@ -282,7 +300,9 @@ def main() -> None:
             "parameters": dict(zip(fitted.names, fitted.theta, strict=True)),
             "std": dict(zip(fitted.names, std, strict=True)),
         }
+    result["lag by convention"] = conventions(data)
     result["ringing_Hz"] = ringing(lag, squares)
+    print("time constant by convention, ms:", {n: round(1e3 * v, 1) for n, v in result["lag by convention"].items()})
     print("squares' own fit:", {n: round(v["r2"], 3) for n, v in own.items()}, "ringing", result["ringing_Hz"], "Hz")
     (out / "result.json").write_text(json.dumps(plain(result), indent=1), encoding="utf-8")
     from figure import draw

@@ -149,7 +149,7 @@ def test_row_84_a_lag_far_below_the_step_is_exact_and_told():
     command = torch.zeros(21, 6).double()
     command[1:, 0] = 70.0
     start = torch.tensor([0.0, 0, 0, 1, 0, 0, 0]).double(), torch.zeros(6).double()
-    u = lagged.rollout(*start, command, t, max_step=0.1).nu[:, 0].numpy()
+    u = lagged.rollout(*start, command, t, max_step=0.1).nu[:, 0].detach().numpy()
     # u' = -u + T/70 with T' = (70 - T)/tau from 0.1 s on: 1 - (exp(-s) - tau exp(-s/tau)) / (1 - tau).
     s = np.maximum(t.numpy() - 0.1, 0.0)
     np.testing.assert_allclose(u, 1 - (np.exp(-s) - 0.001 * np.exp(-s / 0.001)) / 0.999, atol=2e-6)
@@ -215,7 +215,8 @@ def test_row_87_the_region_is_through_the_water():
 
 
 def test_row_87_training_keeps_its_region_and_compare_warns():
-    from auvnn.training import DampingProblem, fit_damping
+    from auvnn.training.fit_damping import fit_damping
+    from auvnn.training.problem import DampingProblem
 
     rng = np.random.default_rng(0)
     nu = torch.tensor(rng.uniform(-0.2, 0.2, (300, 6)))
