@@ -9,7 +9,7 @@ out is a fifth of every run in turn, so that every part of the fit has seen ever
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,8 @@ class Ranked:
         after: with it.
         std: standard error of the difference.
         values: its parameters, as linearised from the null, by name.
+        behind: by how much its error is larger than that of the best.
+        behind_std: standard error of that.
     """
 
     effect: str
@@ -49,6 +51,13 @@ class Ranked:
     after: float
     std: float
     values: dict[str, float]
+    behind: float = 0.0
+    behind_std: float = 0.0
+
+    @property
+    def tied(self) -> bool:
+        """Whether the best is better by no more than the uncertainty of the difference: one group with it."""
+        return self.behind <= self.behind_std
 
     @property
     def gain(self) -> float:
@@ -62,7 +71,7 @@ class Ranked:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
-        names = ("effect", "before", "after", "std", "values", "gain", "pays")
+        names = ("effect", "before", "after", "std", "values", "gain", "pays", "behind", "behind_std", "tied")
         return plain({n: getattr(self, n) for n in names})
 
 
@@ -105,7 +114,7 @@ def rank_one_step(
     nuisance, prior = _joined(columns_of, groups, len(base))
     weight = np.zeros_like(gap)
     weight[good] = _weights(gap[good], nuisance[good], prior)
-    found = []
+    found, errors = [], {}
     for name in usable:
         say(f"trying {name}")
         columns, null, scale = columns_of.get(name) or _columns(model, name, predicted, base)
@@ -123,7 +132,19 @@ def rank_one_step(
         values = {p.name: float(n + v) for p, n, v in zip(described, null, theta, strict=True)}
         std = _standard_error(before - after, block[rows])
         found.append(Ranked(name, float(before.mean()), float(after.mean()), std, values))
-    return sorted(found, key=lambda r: -r.gain)
+        errors[name] = np.full(len(gap), np.nan)
+        errors[name][rows] = before - after
+    found.sort(key=lambda r: -r.gain)
+    return [r if r is found[0] else _behind(r, errors[found[0].effect] - errors[r.effect], block) for r in found]
+
+
+def _behind(ranked: Ranked, difference: Array, block: NDArray[np.int64]) -> Ranked:
+    """Return an effect with how far its gain is behind that of the best, over the samples that both have."""
+    both = np.isfinite(difference)
+    if not both.any():
+        return replace(ranked, behind=float("inf"))
+    std = _standard_error(difference[both], block[both])
+    return replace(ranked, behind=float(difference[both].mean()), behind_std=std)
 
 
 def _joined(

@@ -48,6 +48,8 @@ def one_step_case(model: GreyBox, log: Log, removed: str | None) -> dict:
         "removed": removed,
         "rank": names.index(removed) + 1 if own is not None else None,
         "named_first": own is not None and names[0] == removed and own.pays,
+        "in_first_group": own is not None and own.tied and own.pays,
+        "group": [r.effect for r in ranking if r.tied and r.pays],
         "own": own and own.to_dict(),
         "ranking": [r.to_dict() for r in ranking[:SHOWN]],
         "seconds": round(time.monotonic() - began, 1),

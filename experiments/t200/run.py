@@ -255,7 +255,7 @@ def ringing(bench_: Bench, squares: list[Batch]) -> float:
 
 
 def conventions(data: Path) -> dict[str, float]:
-    """Return the time constant of the lag, s, by what is taken for granted: the static curve, when a row begins to act."""
+    """Return the time constant of the lag, s, by what is taken for granted: the curve, and when a row begins to act."""
     found = {}
     for curve, straight in (("vendor's curve", False), ("straight line", True)):
         for acts, early in (("from its row on", 0), ("from the row before on", 1)):
