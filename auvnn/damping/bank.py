@@ -12,6 +12,7 @@ from torch import Tensor, nn
 from auvnn.catalogue import unknown_name
 from auvnn.damping import DAMPING
 from auvnn.damping.base import AXES, DampingForm
+from auvnn.damping.region import Region
 from auvnn.errors import ConfigError
 
 Description = str | Mapping[str, Any]
@@ -55,6 +56,8 @@ class DampingBank(nn.Module):
         )
         order = [axis for form in self.groups() for axis in form.axes]
         self._order = None if order == list(range(6)) else [order.index(axis) for axis in range(6)]
+        # What the forms were trained on, where they were: plain numbers that travel with the model, not weights.
+        self.region: Region | None = None
         ones = torch.ones(6, dtype=torch.float64)
         self.register_buffer("input_scale", ones.clone() if input_scale is None else input_scale.clone())
         self.register_buffer("output_scale", ones.clone() if output_scale is None else output_scale.clone())

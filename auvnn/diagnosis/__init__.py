@@ -1,8 +1,21 @@
 """Where a model fails, which effect is missing, and how much better it gets with it."""
 
+from auvnn.diagnosis.actuators import ActuatorCheck, check_actuators
 from auvnn.diagnosis.answer import Diagnosis
 from auvnn.diagnosis.compare import Comparison, compare
 from auvnn.diagnosis.diagnose import diagnose
 from auvnn.diagnosis.improve import Improvement, add
+from auvnn.diagnosis.rank_one_step import Ranked, rank_one_step
 
-__all__ = ["Comparison", "Diagnosis", "Improvement", "add", "compare", "diagnose"]
+__all__ = [
+    "ActuatorCheck",
+    "Comparison",
+    "Diagnosis",
+    "Improvement",
+    "Ranked",
+    "add",
+    "check_actuators",
+    "compare",
+    "diagnose",
+    "rank_one_step",
+]

@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.answers import Answer, plain
+from auvnn.diagnosis.doubts import doubts
 from auvnn.diagnosis.locate import AXES, failures, locate
 from auvnn.errors import ConfigError
 from auvnn.logs import Log
 from auvnn.metrics.one_step import OneStep, choose_derivative, one_step, scores
 from auvnn.metrics.rollouts import HORIZONS, NAMES, Rolled, scale_of, table
 from auvnn.models import GreyBox
+from auvnn.models.excursions import region_of, words_of
 
 Array = NDArray[np.float64]
 
@@ -201,6 +203,8 @@ def _warnings(model: GreyBox, log: Log, rolled: dict[str, Rolled]) -> list[str]:
     gone = {h: int(r.diverged.sum()) for h, r in rolled.items() if r.diverged.any()}
     if gone:
         found.append("free runs diverged: " + ", ".join(f"{n} of horizon {h} s" for h, n in gone.items()))
+    found += _extrapolated(model, rolled)
+    found += doubts(model, log)
     if (
         log.runs[0].wrench is not None
         and log.runs[0].thrusters is not None
@@ -208,6 +212,18 @@ def _warnings(model: GreyBox, log: Log, rolled: dict[str, Rolled]) -> list[str]:
     ):
         found.append(_commanded_against_thrusters(model, log))
     return found
+
+
+def _extrapolated(model: GreyBox, rolled: dict[str, Rolled]) -> list[str]:
+    """Say where free runs leave the velocities that the damping was trained on."""
+    region = region_of(model)
+    if region is None or not rolled:
+        return []
+    import torch
+
+    predicted = np.concatenate([r.predicted.reshape(-1, 6) for r in rolled.values()])
+    beyond = region.words(torch.tensor(predicted))
+    return [f"free runs go {words_of(beyond)}"] if beyond else []
 
 
 def _commanded_against_thrusters(model: GreyBox, log: Log) -> str:

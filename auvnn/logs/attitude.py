@@ -103,7 +103,22 @@ def from_angles(angles: Array, t: Array, yaw_rate: Array, where: str) -> tuple[A
     if n_steep:
         words = "samples with a pitch within 5 degrees of the vertical, where roll and yaw run together"
         repairs.append(Repair(words, where, n_steep, "warning", "log the attitude as a quaternion"))
+    passes = _over_the_top(angles)
+    if passes:
+        words = "passes of the vertical, where roll and yaw jump by half a turn, carried on as quaternions"
+        repairs.append(Repair(words, where, passes))
     return continuous(from_euler(angles)), repairs
+
+
+def _over_the_top(angles: Array) -> int:
+    """Return how often the pitch passes +-90 degrees: beyond it, or by a jump of roll and yaw near it."""
+    rows = angles[np.isfinite(angles).all(axis=1)]
+    if len(rows) < 2:
+        return 0
+    beyond = np.cos(rows[:, 1]) < 0.0
+    turned = np.abs(np.remainder(np.diff(rows[:, [0, 2]], axis=0) + np.pi, 2.0 * np.pi) - np.pi) > 0.5 * np.pi
+    near = np.minimum(np.abs(np.cos(rows[1:, 1])), np.abs(np.cos(rows[:-1, 1]))) < math.cos(math.radians(60.0))
+    return int(((beyond[1:] != beyond[:-1]) | (turned.all(axis=1) & near)).sum())
 
 
 def _in_degrees(angles: Array, t: Array, yaw_rate: Array) -> bool:

@@ -11,7 +11,9 @@ ACCELERATION = ("du", "dv", "dw", "dp", "dq", "dr")
 POSITION = ("x", "y", "z")
 WRENCH = ("tau_X", "tau_Y", "tau_Z", "tau_K", "tau_M", "tau_N")
 SCALARS = ("altitude", "voltage")
-FIXED = ("run", "t", *EULER, *QUATERNION, *VELOCITY, *ACCELERATION, *POSITION, *WRENCH, *SCALARS)
+RESET = "reset"
+"""Counter of the estimator's resets, or number of its core: where it changes, the pose starts afresh."""
+FIXED = ("run", "t", *EULER, *QUATERNION, *VELOCITY, *ACCELERATION, *POSITION, *WRENCH, *SCALARS, RESET)
 
 _NUMBERED = re.compile(r"(thruster|fin)_([1-9][0-9]*)")
 _UNITS = {
@@ -28,6 +30,7 @@ _UNITS = {
     **dict.fromkeys(WRENCH[3:], "N m"),
     "altitude": "m",
     "voltage": "V",
+    RESET: "1",
 }
 
 

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from auvnn.logs import excitation as exciting
+from auvnn.logs import sensor_findings as sensors
 from auvnn.logs.channel_quality import Channel, frozen
 from auvnn.logs.channels import POSITION, VELOCITY
 from auvnn.logs.excitation import Excitation
+from auvnn.logs.finding import Finding
 from auvnn.logs.kinematics import Agreement
+from auvnn.logs.lags import Lag
 from auvnn.logs.repair import Level
 from auvnn.logs.rotation import rotate
 from auvnn.logs.segments import default_gap
+from auvnn.logs.vertical import Vertical
 
 if TYPE_CHECKING:
     from auvnn.logs.log import Log
@@ -26,33 +29,14 @@ _NAMES: dict[str, str] = {
 _ORDER = {"error": 0, "warning": 1, "repair": 2, "info": 3}
 
 
-@dataclass(frozen=True)
-class Finding:
-    """One thing worth knowing.
-
-    Args:
-        level: "error" forbids fitting, "warning" asks for care, "repair" was mended, "info" is a note.
-        where: channel, run or file, or a word for the subject ("excitation", "time").
-        what: what is the case.
-        cure: what to do about it, "" where nothing need be done.
-    """
-
-    level: Level
-    where: str
-    what: str
-    cure: str = ""
-
-    def to_dict(self) -> dict[str, str]:
-        """Return the entry of the quality answer."""
-        return asdict(self)
-
-
 def collect(
     log: Log,
     channels: dict[str, Channel],
     kinematics: dict[str, Agreement],
     excitation: dict[str, Excitation],
     order: str | None,
+    clocks: dict[tuple[str, ...], Lag] | None = None,
+    vertical: Vertical | None = None,
 ) -> list[Finding]:
     """Return all findings, errors first."""
     found = [
@@ -61,7 +45,10 @@ def collect(
         *_frozen(log, channels),
         *_signals(log, channels),
         *_attitude(log, order),
-        *_agreement(kinematics, order),
+        *sensors.agreement(kinematics, order, clocks or {}, vertical),
+        *sensors.restarts(log),
+        *sensors.levers(log, kinematics),
+        *sensors.stretches(log),
         *_excitation(log, excitation),
     ]
     if log.unknown:
@@ -177,23 +164,6 @@ def _attitude(log: Log, order: str | None) -> list[Finding]:
     if order in cures:
         what, cure = cures[order]
         found.append(Finding("error", "attitude", f"{what}: only so does it agree with p, q, r", cure))
-    return found
-
-
-def _agreement(kinematics: dict[str, Agreement], order: str | None) -> list[Finding]:
-    found = []
-    late: dict[str, float] = {}
-    for name, agreement in kinematics.items():
-        # A quaternion in the wrong order explains the rates' disagreement; one cause, one finding.
-        if agreement.level != "info" and order is None:
-            found.append(Finding(agreement.level, name, agreement.verdict, agreement.cure))
-        if abs(agreement.correlation) > 0.7 and abs(agreement.lag) > 0.05:
-            late[name] = agreement.lag
-    if late:
-        times = ", ".join(f"{n} {v:+.2f} s" for n, v in late.items())
-        what = f"velocities are not at the time of attitude and position (+ is late): {times}"
-        cure = "correct the stamps, or give the late columns a delay in the mapping, u: {delay: 0.2}"
-        found.append(Finding("warning", "delay", what, cure))
     return found
 
 

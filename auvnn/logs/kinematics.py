@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.logs import lags
 from auvnn.logs.channels import VELOCITY
 from auvnn.logs.derivatives import LocalPolynomial, noise_gain
+from auvnn.logs.lags import Lag
 from auvnn.logs.noise import noise_std
 from auvnn.logs.rotation import body_rates, conjugate, continuous, rotate
 from auvnn.logs.run import Run
@@ -36,6 +38,7 @@ _MIN_SAMPLES = 30
 _LONG = 60_000  # samples; of longer runs evenly spread blocks tell as much
 _BLOCKS, _BLOCK = 12, 5_000
 _LAG = 1.0  # s searched to either side
+_OTHER_CLOCK = 60.0  # s searched where nothing agrees as it is stamped
 _ANGULAR_UNITS = (
     (180.0 / np.pi, "degrees per second, or the angles were radians and read as degrees"),
     (np.pi / 180.0, "radians per second that were read as degrees, or the angles were degrees"),
@@ -54,6 +57,8 @@ class Agreement:
         level: "info" where it agrees or cannot be told, else "warning" or "error".
         cure: what to write into the mapping, or "".
         lag: by how much the measured component is late, s.
+        lag_interval: 95 % interval of that, s.
+        drift: change of the lag per second, where it changes beyond doubt.
         runs: (number, scale, correlation, moves) of every run.
     """
 
@@ -63,6 +68,8 @@ class Agreement:
     level: Literal["error", "warning", "info"] = "info"
     cure: str = ""
     lag: float = float("nan")
+    lag_interval: tuple[float, float] = (float("nan"), float("nan"))
+    drift: float = 0.0
     runs: tuple[tuple[int, float, float, bool], ...] = field(default=())
 
     def to_dict(self) -> dict[str, object]:
@@ -72,6 +79,8 @@ class Agreement:
             "scale": self.scale,
             "correlation": self.correlation,
             "lag_s": self.lag,
+            "lag_interval_s": list(self.lag_interval),
+            "lag_drift": self.drift,
             "verdict": self.verdict,
             "runs": runs,
         }
@@ -134,6 +143,30 @@ def check(log: Log) -> dict[str, Agreement]:
     return result
 
 
+def clocks(log: Log, agreement: dict[str, Agreement]) -> dict[tuple[str, ...], Lag]:
+    """Return the sensors that agree with attitude and position only under another clock, by their channels.
+
+    Looked for where none of a sensor's channels agrees as it is stamped.
+
+    Args:
+        log: the log.
+        agreement: what `check` says.
+    """
+    found = {}
+    runs = [run for run in log.runs if run.samples <= _LONG]
+    for names, pair_of in ((VELOCITY[:3], velocities), (VELOCITY[3:], rates)):
+        judged = [agreement[n] for n in names if n in agreement and np.isfinite(agreement[n].correlation)]
+        if not judged or max(abs(a.correlation) for a in judged) >= _CLEAR:
+            continue
+        pairs = [pair for run in runs if (pair := pair_of(run)) is not None]
+        if pairs:
+            dt = float(np.median([p.dt for p in pairs]))
+            lag = lags.other_clock([(p.derived, p.measured) for p in pairs], dt, _OTHER_CLOCK)
+            if lag is not None:
+                found[names] = lag
+    return found
+
+
 def attitude_order(log: Log) -> str | None:
     """Return which reading of the quaternion agrees with the rates where the given one does not.
 
@@ -182,7 +215,7 @@ def _judge(
     units: tuple[tuple[float, str], ...],
 ) -> Agreement:
     liveliest = max((_spread(p.measured[:, axis]) for p in pairs), default=0.0)
-    fits = [_fit(p.derived[:, axis], p.measured[:, axis]) for p in pairs]
+    fits = [fit(p.derived[:, axis], p.measured[:, axis]) for p in pairs]
     moving = [_moves(p, axis, liveliest) for p in pairs]
     runs = tuple((p.number, s, c, m) for p, (s, c), m in zip(pairs, fits, moving, strict=True))
     chosen = [p for p, m in zip(pairs, moving, strict=True) if m]
@@ -192,11 +225,18 @@ def _judge(
         return Agreement(np.nan, np.nan, verdict, runs=runs)
     x = np.concatenate([p.derived[:, axis] for p in chosen])
     y = np.concatenate([p.measured[:, axis] for p in chosen])
-    scale, correlation = _fit(x, y)
-    lag = _lag(chosen, axis) if abs(correlation) > _NONE else np.nan
+    scale, correlation = fit(x, y)
+    late = _lag(chosen, axis) if abs(correlation) > _NONE else Lag(np.nan)
     signs = {np.sign(s) for (s, c), m in zip(fits, moving, strict=True) if m and abs(c) > _NONE}
     share = "all runs that move" if len(signs) <= 1 else "most of the motion"
-    facts = {"scale": scale, "correlation": correlation, "lag": lag, "runs": runs}
+    facts = {
+        "scale": scale,
+        "correlation": correlation,
+        "lag": late.value,
+        "lag_interval": (late.low, late.high),
+        "drift": late.drift,
+        "runs": runs,
+    }
     if abs(correlation) >= _CLEAR:
         sign = " with the opposite sign" if scale < 0.0 else ""
         for factor, unit in units:
@@ -254,7 +294,7 @@ def _moves(pair: Pair, axis: int, liveliest: float) -> bool:
     return bool(above and derived_above and _spread(y) > _SHARE * liveliest)
 
 
-def _fit(x: Array, y: Array) -> tuple[float, float]:
+def fit(x: Array, y: Array) -> tuple[float, float]:
     """Return slope and correlation of y on x with a constant, outliers weighed down (Huber)."""
     good = np.isfinite(x) & np.isfinite(y)
     if good.sum() < _MIN_SAMPLES:
@@ -279,32 +319,13 @@ def _fit(x: Array, y: Array) -> tuple[float, float]:
 def _other_axis(pairs: list[Pair], axis: int, y: Array) -> tuple[int, float] | None:
     for j in range(3):
         if j != axis:
-            slope, correlation = _fit(np.concatenate([p.derived[:, j] for p in pairs]), y)
+            slope, correlation = fit(np.concatenate([p.derived[:, j] for p in pairs]), y)
             if abs(correlation) > 0.8:
                 return j, slope
     return None
 
 
-def _lag(pairs: list[Pair], axis: int) -> float:
-    """Return by how much the measured component is late, s: the shift of largest |correlation|."""
+def _lag(pairs: list[Pair], axis: int) -> Lag:
+    """Return by how much the measured component is late: the shift of largest |correlation|."""
     dt = float(np.median([p.dt for p in pairs]))
-    reach = int(np.clip(round(_LAG / dt), 1, 100))
-    shifts = np.arange(-reach, reach + 1)
-    strength = np.zeros(len(shifts))
-    for i, k in enumerate(shifts):
-        xy = xx = yy = 0.0
-        for pair in pairs:
-            x, y = pair.derived[:, axis], pair.measured[:, axis]
-            x, y = (x[: len(x) - k], y[k:]) if k >= 0 else (x[-k:], y[:k])
-            good = np.isfinite(x) & np.isfinite(y)
-            if good.sum() > 2:
-                dx, dy = x[good] - x[good].mean(), y[good] - y[good].mean()
-                xy, xx, yy = xy + float(dx @ dy), xx + float(dx @ dx), yy + float(dy @ dy)
-        strength[i] = abs(xy) / np.sqrt(xx * yy) if xx * yy > 0.0 else 0.0
-    best = int(np.argmax(strength))
-    offset = 0.0
-    if 0 < best < len(shifts) - 1:
-        left, middle, right = strength[best - 1 : best + 2]
-        bend = left - 2.0 * middle + right
-        offset = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
-    return float((shifts[best] + offset) * dt)
+    return lags.estimate([(p.derived[:, axis], p.measured[:, axis]) for p in pairs], dt, _LAG)

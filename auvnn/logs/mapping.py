@@ -4,6 +4,10 @@ A value passes through these steps, in this order: the curve `(value - neutral) 
 `value * scale + offset`, the unit (`angles`, `rates`, `time`), and last the frame (`FLU` to `FRD`, `ENU`
 to `NED`). A `scale: -1` therefore turns a sign in the frame in which the file was recorded.
 
+`valid: {from: bottom_lock, is: 1}` takes a value only where another column of the file says that it is good (`is` one
+value or a list, numbers or words; `above`, `below`); elsewhere it counts as missing. An estimator of several cores is
+followed by `from: [u_0, u_1], by: primary`, or, where each core has rows of its own, by `core: {column: C, primary: PI}`.
+
 A `delay` says by how many seconds a column lags behind the time it is stamped with (`auvnn check` measures it for
 the velocities): once the runs are told apart, each of them takes its values from that much later in the record.
 """
@@ -22,12 +26,14 @@ from numpy.typing import NDArray
 from auvnn.catalogue import unknown_name
 from auvnn.config import read_yaml
 from auvnn.errors import ConfigError, InputError
-from auvnn.logs.channels import EULER, FIXED, QUATERNION, is_canonical
+from auvnn.logs import cores
+from auvnn.logs.channels import EULER, FIXED, QUATERNION, RESET, is_canonical
 from auvnn.logs.readers.base import Table
 from auvnn.logs.repair import Repair
+from auvnn.logs.validity import Validity
 
-_KEYS = ("columns", "frame", "angles", "rates", "quaternion", "time", "run")
-_COLUMN_KEYS = ("from", "scale", "offset", "curve", "delay", "value")
+_KEYS = ("columns", "frame", "angles", "rates", "quaternion", "time", "run", "core")
+_COLUMN_KEYS = ("from", "scale", "offset", "curve", "delay", "value", "valid", "by")
 _TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _RATES = ("p", "q", "r", "dp", "dq", "dr")
 _NO_SIGNAL = 65535.0
@@ -36,7 +42,7 @@ _LONGEST_DELAY = 60.0  # s
 
 @dataclass(frozen=True)
 class Column:
-    """How one canonical column is made: from a column of the file, or a constant."""
+    """How one canonical column is made: from a column of the file, from one for each core, or a constant."""
 
     source: str | None
     scale: float = 1.0
@@ -45,6 +51,9 @@ class Column:
     span: float = 1.0
     value: float = 0.0
     delay: float = 0.0
+    cores: tuple[str, ...] = ()
+    by: str | None = None
+    valid: Validity | None = None
 
 
 @dataclass(frozen=True)
@@ -60,6 +69,7 @@ class Mapping:
         quaternion: "wxyz", or "xyzw" where the columns qw qx qy qz, in this order, hold x, y, z, w.
         time_unit: unit of `t`: "s", "ms", "us" or "ns".
         run: column that numbers or names the runs, None for `run`, "file" for one run per file.
+        core: columns that hold a row's core and the core in use, where each core has rows of its own.
         where: the mapping's file, for messages.
     """
 
@@ -72,6 +82,7 @@ class Mapping:
     time_unit: str = "s"
     run: str | None = None
     where: str = "mapping"
+    core: tuple[str, str] | None = None
 
     @classmethod
     def read(cls, source: str | Path | MappingType[str, Any] | Mapping | None) -> Mapping:
@@ -95,19 +106,36 @@ class Mapping:
         Raises:
             InputError: a column named in the mapping is not in the file, or is text.
         """
+        if self.core is not None:
+            table = cores.rows_of_primary(table, *self.core, where, self.where)
         result = Table({}, table.rows, {}, set(), list(table.repairs))
         used: set[str] = set()
         for name, column in self.columns.items():
             if column.source is None:
                 result.columns[name] = np.full(table.rows, column.value)
                 continue
-            values = self._source(table, name, column.source, where)
-            used.add(column.source)
+            if column.by is not None:
+                each = [self._source(table, name, c, where) for c in column.cores]
+                chosen = self._source(table, name, column.by, where)
+                values = cores.chosen(each, chosen, name, column.by, where)
+                used |= {*column.cores, column.by}
+                cores.note_switches(result, chosen, column.by, where)
+            else:
+                values = self._source(table, name, column.source, where)
+                used.add(column.source)
             if column.source in table.seconds:
                 result.seconds.add(name)
-            result.columns[name] = self._convert(values, column, name, where, result)
+            values = self._convert(values, column, name, where, result)
+            if column.valid is not None:
+                values, note = column.valid.mask(values, table, name, where, self.where)
+                result.repairs += note
+                used.add(column.valid.source)
+            result.columns[name] = values
         if self.run not in (None, "file"):
             self._source(table, "run", str(self.run), where, numbers=False)
+        if self.core is not None:
+            used |= set(self.core)
+            result.columns.setdefault(RESET, table.columns[self.core[1]])
         for name in table.names:
             if name in self.columns and name not in used:
                 words = f"column '{name}' of the file replaced by the mapping's"
@@ -189,7 +217,20 @@ def _build(data: dict[str, Any], where: str) -> Mapping:
         time_unit=_one_of(time.get("unit", "s"), tuple(_TIME_UNITS), f"{where}: time: unit"),
         run=_run(data.get("run"), where),
         where=where,
+        core=_core(data.get("core"), where),
     )
+
+
+def _core(value: Any, where: str) -> tuple[str, str] | None:
+    if value is None:
+        return None
+    if not isinstance(value, MappingType):
+        raise ConfigError(f"{where}: core must be {{column: ..., primary: ...}}, not {value!r}")
+    _known(value, ("column", "primary"), f"{where}: core")
+    pair = value.get("column"), value.get("primary")
+    if not all(isinstance(name, str) for name in pair):
+        raise ConfigError(f"{where}: core: 'column' and 'primary' must name columns of the file")
+    return str(pair[0]), str(pair[1])
 
 
 def _run(value: Any, where: str) -> str | None:
@@ -218,9 +259,17 @@ def _column(name: str, value: Any, where: str) -> Column:
         if len(value) > 1:
             raise ConfigError(f"{here}: 'value' is a constant and stands alone")
         return Column(None, value=_number(value["value"], f"{here}: value"))
-    source = value.get("from", name)
+    source, by = value.get("from", name), value.get("by")
+    several: tuple[str, ...] = ()
+    if by is not None:
+        if not (isinstance(source, list) and source and all(isinstance(s, str) for s in source)):
+            raise ConfigError(f"{here}: with 'by', 'from' must list one column for each core, [u_0, u_1]")
+        if not isinstance(by, str):
+            raise ConfigError(f"{here}: 'by' must name the column that says which core is in use, not {by!r}")
+        several, source = tuple(source), source[0]
     if not isinstance(source, str):
         raise ConfigError(f"{here}: 'from' must be a column's name, not {source!r}")
+    valid = Validity.read(value["valid"], f"{here}: valid") if "valid" in value else None
     numbers: dict[str, float] = {
         k: _number(value[k], f"{here}: {k}") for k in ("scale", "offset", "delay") if k in value
     }
@@ -243,7 +292,7 @@ def _column(name: str, value: Any, where: str) -> Column:
             numbers[key] = _number(curve[key], f"{here}: curve: {key}")
         if numbers["span"] == 0.0:
             raise ConfigError(f"{here}: curve: span must not be 0")
-    return Column(source, **numbers)
+    return Column(source, **numbers, cores=several, by=by, valid=valid)
 
 
 def _section(data: dict[str, Any], key: str, where: str) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -10,13 +10,13 @@ import numpy as np
 
 from auvnn.answers import Answer, plain
 from auvnn.errors import InputError
-from auvnn.logs import channel_quality, excitation, findings, kinematics
+from auvnn.logs import channel_quality, excitation, findings, kinematics, vertical
 from auvnn.logs.channel_quality import Channel
 from auvnn.logs.excitation import Excitation
 from auvnn.logs.findings import Finding
 from auvnn.logs.kinematics import Agreement
 from auvnn.logs.log import Log
-from auvnn.logs.repair import Level
+from auvnn.logs.repair import LEVELS, Level
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,6 +34,7 @@ class Quality(Answer):
         excitation: by velocity component.
         condition: of [nu, |nu| nu] over the excited components.
         runs: samples, duration, rate, jitter and gaps of every run.
+        actuators: what the log says of a model's actuators, where it was asked; plain data.
     """
 
     kind: ClassVar[str] = "quality"
@@ -45,6 +46,13 @@ class Quality(Answer):
     excitation: dict[str, Excitation]
     condition: float
     runs: list[dict[str, float]] = field(default_factory=list)
+    actuators: dict[str, Any] | None = None
+
+    def with_actuators(self, checked: Any) -> Quality:
+        """Return the report with what a check of a model's actuators said, its warnings among the findings."""
+        found = [Finding("warning", "actuators", w.removeprefix("actuators: ")) for w in checked.words]
+        findings = sorted([*self.findings, *found], key=lambda f: LEVELS.index(f.level))
+        return replace(self, findings=findings, actuators=checked.to_dict())
 
     def of_level(self, level: Level) -> list[Finding]:
         """Return the findings of one level."""
@@ -138,6 +146,7 @@ class Quality(Answer):
                 "findings": [f.to_dict() for f in self.findings],
                 "repairs": [r.to_dict() for r in log.repairs],
                 "kinematics": {name: a.to_dict() for name, a in self.kinematics.items()},
+                "actuators": self.actuators,
                 "excitation": {
                     "condition": self.condition,
                     "directions": {name: e.to_dict() for name, e in self.excitation.items()},
@@ -172,7 +181,9 @@ def _assess(log: Log) -> Quality:
         }
         for run in log.runs
     ]
-    found = findings.collect(log, channels, agreement, directions, order)
+    clocks = kinematics.clocks(log, agreement) if order is None else {}
+    depth = vertical.check(log)
+    found = findings.collect(log, channels, agreement, directions, order, clocks, depth)
     return Quality(log, channels, found, agreement, directions, condition, runs)
 
 

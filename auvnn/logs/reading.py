@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import ConfigError, InputError
-from auvnn.logs import attitude, clock, delays, frames, plausible, required
+from auvnn.logs import attitude, clock, delays, frames, masks, plausible, required
 from auvnn.logs.channels import (
     ACCELERATION,
     EULER,
     POSITION,
     QUATERNION,
+    RESET,
     VELOCITY,
     WRENCH,
     is_canonical,
@@ -225,8 +226,10 @@ def _run(
         fins=block(numbered("fin", columns)),
         altitude=columns.get("altitude"),
         voltage=columns.get("voltage"),
+        reset=columns.get(RESET),
         extra={n: columns[n] for n in outside},
     )
-    run, notes = plausible.check(run, where)
-    repairs.extend(notes)
+    for mend in (plausible.check, masks.apply):
+        run, notes = mend(run, where)
+        repairs.extend(notes)
     return run

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Level = Literal["error", "warning", "repair", "info"]
+LEVELS: tuple[Level, ...] = ("error", "warning", "repair", "info")
 
 
 @dataclass(frozen=True)

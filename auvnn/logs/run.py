@@ -11,13 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import InputError
-from auvnn.logs.channels import ACCELERATION, POSITION, QUATERNION, VELOCITY, WRENCH
+from auvnn.logs.channels import ACCELERATION, POSITION, QUATERNION, RESET, VELOCITY, WRENCH
 from auvnn.logs.rotation import to_euler
 from auvnn.logs.segments import stretches
 
 Array = NDArray[np.float64]
 
-_WIDTHS = {"quaternion": 4, "nu": 6, "nu_dot": 6, "position": 3, "wrench": 6, "altitude": 0, "voltage": 0}
+_WIDTHS = {
+    **{"quaternion": 4, "nu": 6, "nu_dot": 6, "position": 3, "wrench": 6},
+    **{"altitude": 0, "voltage": 0, "reset": 0},
+}
 _BLOCKS = {
     "quaternion": QUATERNION,
     "nu": VELOCITY,
@@ -44,6 +47,7 @@ class Run:
         fins: fin angles, rad, (N, m).
         altitude: height above the bottom, m, (N,).
         voltage: battery, V, (N,).
+        reset: counter of the estimator's resets or number of its core, (N,): where it changes, the pose starts afresh.
         extra: columns outside the contract, kept as they were, (N,) each.
 
     Raises:
@@ -61,6 +65,7 @@ class Run:
     fins: Array | None = None
     altitude: Array | None = None
     voltage: Array | None = None
+    reset: Array | None = None
     extra: dict[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -72,7 +77,7 @@ class Run:
             raise InputError(f"run {self.number}: t must be finite and strictly increasing")
         object.__setattr__(self, "number", int(self.number))
         object.__setattr__(self, "t", t)
-        for name in ("quaternion", "nu", "nu_dot", "position", "wrench", "thrusters", "fins", *_SCALAR):
+        for name in ("quaternion", "nu", "nu_dot", "position", "wrench", "thrusters", "fins", *_SCALAR, RESET):
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, self._checked(name, value))
@@ -148,6 +153,8 @@ class Run:
         for name in _SCALAR:
             if getattr(self, name) is not None:
                 yield name, getattr(self, name)
+        if self.reset is not None:
+            yield RESET, self.reset
         yield from self.extra.items()
 
     @cached_property
@@ -181,14 +188,33 @@ class Run:
         needed = [self.quaternion, self.nu, *([] if self.command is None else [self.command])]
         return np.logical_and.reduce([np.isfinite(a).all(axis=1) for a in needed])
 
+    @cached_property
+    def restarts(self) -> NDArray[np.intp]:
+        """First samples after the pose has started afresh: an estimator's reset, a moved origin, another core."""
+        from auvnn.logs.resets import restarts
+
+        return restarts(self)
+
+    def unbroken(
+        self, valid: NDArray[np.bool_], max_gap: float | None = None, min_samples: int = 2
+    ) -> list[slice]:
+        """Return the stretches of samples that count, without a gap in time or a fresh start of the pose.
+
+        Args:
+            valid: samples that count, (N,).
+            max_gap: longest step within a stretch, s; five median steps where None.
+            min_samples: shorter stretches are left out.
+        """
+        return stretches(self.t, valid, max_gap, min_samples, self.restarts)
+
     def segments(self, max_gap: float | None = None, min_samples: int = 2) -> list[slice]:
-        """Return the stretches without a gap in time and without a missing required sample.
+        """Return the stretches without a gap in time, a fresh start of the pose or a missing required sample.
 
         Args:
             max_gap: longest step within a stretch, s; five median steps where None.
             min_samples: shorter stretches are left out.
         """
-        return stretches(self.t, self.valid, max_gap, min_samples)
+        return self.unbroken(self.valid, max_gap, min_samples)
 
     def cut(self, part: slice, number: int | None = None) -> Run:
         """Return a part of the run as a run of its own, under the same number unless another is given."""

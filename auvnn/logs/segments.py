@@ -29,12 +29,23 @@ def stretches(
     valid: NDArray[np.bool_],
     max_gap: float | None = None,
     min_samples: int = 2,
+    restarts: NDArray[np.intp] | None = None,
 ) -> list[slice]:
-    """Return the slices of at least `min_samples` valid samples that no gap in time interrupts."""
+    """Return the slices of at least `min_samples` valid samples that no gap in time and no restart interrupts.
+
+    Args:
+        t: increasing time, s, (N,).
+        valid: samples that count, (N,).
+        max_gap: longest step within a stretch, s; five median steps where None.
+        min_samples: shorter stretches are left out.
+        restarts: samples with which a new stretch begins.
+    """
     if len(t) == 0:
         return []
     limit = default_gap(t) if max_gap is None else max_gap
     joined = valid[1:] & valid[:-1] & (np.diff(t) <= limit)
+    if restarts is not None:
+        joined[restarts[(restarts > 0) & (restarts < len(t))] - 1] = False
     edges = np.flatnonzero(~joined) + 1
     starts = np.concatenate([[0], edges])
     stops = np.concatenate([edges, [len(t)]])

@@ -14,13 +14,16 @@ from auvnn.physics.attitude import quat_multiply, rotvec_to_quat
 MAX_STEP = 0.05
 
 
-def predict(model: GreyBox, windows: Windows, initial: Tensor) -> tuple[Tensor, Tensor]:
+def predict(
+    model: GreyBox, windows: Windows, initial: Tensor, max_step: float = MAX_STEP
+) -> tuple[Tensor, Tensor]:
     """Run every window free from its initial state.
 
     Args:
         model: the model.
         windows: B windows of L samples.
         initial: (B, 13): position, quaternion, velocity.
+        max_step: longest step of the solver, s.
 
     Returns:
         eta (B, L, 7) and nu (B, L, 6), of the vehicle itself and not of what sensors report.
@@ -31,7 +34,7 @@ def predict(model: GreyBox, windows: Windows, initial: Tensor) -> tuple[Tensor, 
         initial[:, 7:],
         windows.inputs,
         windows.times,
-        max_step=MAX_STEP,
+        max_step=max_step,
         warmup=windows.warmup,
         check=False,
     )

@@ -11,7 +11,6 @@ from torch import Tensor
 
 from auvnn.errors import InputError
 from auvnn.logs import Log, Run
-from auvnn.logs.segments import stretches
 from auvnn.models.inputs import Inputs
 
 CHANNELS = (
@@ -130,8 +129,8 @@ def cut_windows(
 ) -> Windows:
     """Cut a log into windows.
 
-    Windows never cross a gap or a row without commands or fin angles; they start at samples whose state was
-    measured.
+    Windows never cross a gap, a fresh start of the pose or a row without commands or fin angles; they start at
+    samples whose state was measured.
 
     Args:
         log: the log.
@@ -154,7 +153,7 @@ def cut_windows(
         known = np.asarray(np.isfinite(command).all(axis=1))
         if run.fins is not None:
             known &= np.isfinite(run.fins).all(axis=1)
-        for part in stretches(run.t, known, None, 2):
+        for part in run.unbroken(known):
             span = float(run.t[part.stop - 1] - run.t[part.start]) if np.isinf(horizon) else horizon
             pieces += [
                 (run, command, a, b, part.start)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import torch
@@ -11,8 +11,11 @@ from torch import Tensor
 
 from auvnn.effects import Effect
 from auvnn.errors import ConfigError
+from auvnn.models.excursions import extrapolated
 from auvnn.models.inputs import Inputs
 from auvnn.models.limits import LIMIT
+from auvnn.models.stiffness import MAX_STEPS, fastest_rate, followed
+from auvnn.models.stiffness import words as stiff_words
 from auvnn.physics.attitude import quat_derivative, quat_to_matrix
 from auvnn.physics.kinematics import eta6_to_eta7
 from auvnn.physics.products import matvec
@@ -48,6 +51,8 @@ class Trajectory:
         nu: (..., T, 6), m/s and rad/s.
         thrust: (..., T, n), N, just after each row's command.
         divergences: empty where the run stayed sound; a diverged trajectory holds its last sound state.
+        notes: in words, steps that were cut because the model is stiff, and velocities beyond those that the damping
+            was trained on, where what it says is extrapolated.
     """
 
     times: Tensor
@@ -55,6 +60,7 @@ class Trajectory:
     nu: Tensor
     thrust: Tensor
     divergences: tuple[Divergence, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def diverged(self) -> bool:
@@ -66,7 +72,7 @@ def steps_per_interval(times: Tensor, max_step: float) -> int:
     """Return how many equal steps bring the longest interval below `max_step`.
 
     Raises:
-        ConfigError: the step is not positive, or a time is not finite.
+        ConfigError: the step is not positive, a time is not finite, or the steps would be too many.
     """
     if not max_step > 0:
         raise ConfigError(f"max_step={max_step!r} s: give a positive step")
@@ -75,7 +81,16 @@ def steps_per_interval(times: Tensor, max_step: float) -> int:
     longest = float((times[..., 1:] - times[..., :-1]).max())
     if not math.isfinite(longest):
         raise ConfigError("times hold NaN or infinity: remove those rows")
+    if longest / max_step > MAX_STEPS:
+        raise ConfigError(_over_budget(longest / max_step, max_step))
     return max(1, math.ceil(longest / max_step - 1e-9))
+
+
+def _over_budget(steps: float, max_step: float) -> str:
+    return (
+        f"max_step={max_step:g} s makes {steps:.3g} steps, more than the budget of {MAX_STEPS}: give a longer "
+        "max_step or a shorter run"
+    )
 
 
 def rollout(
@@ -102,14 +117,16 @@ def rollout(
         solver: "rk4", "midpoint" or "euler" (own, fixed step), or "torchdiffeq:METHOD".
         max_step: longest step of the own solvers, s; each interval is cut into equal steps.
         warmup: rows of history before the stretch, from which the actuators' state is worked out.
-        check: look for divergence; off inside function transforms.
+        check: look for divergence, cut the steps where the model is stiff, and note where it leaves the velocities
+            that its damping was trained on; off inside function transforms.
         **solver_options: handed to torchdiffeq (rtol, atol).
 
     Returns:
         The trajectory at the T times. One that diverges keeps its last sound state and is reported.
 
     Raises:
-        ConfigError: unknown solver or option, shapes that do not fit, times that decrease or are not finite.
+        ConfigError: unknown solver or option, shapes that do not fit, times that decrease or are not finite, or more
+            steps than the budget.
     """
     inputs = commands if isinstance(commands, Inputs) else Inputs(commands)
     batch = _leading_shape(model, eta0, nu0, inputs, times, warmup)
@@ -117,7 +134,15 @@ def rollout(
         eta0 = eta6_to_eta7(eta0)
     if check and times.shape[-1] > 1 and bool((times[..., 1:] < times[..., :-1]).any()):
         raise ConfigError("times decrease: sort the rows by time")
+    notes: list[str] = []
+    if check and solver in TABLEAUS:
+        rate = _rate(model, eta0, nu0, inputs.command[..., warmup, :], batch)
+        if followed(max_step, rate) < min(max_step, _longest(times)):
+            notes.append(stiff_words(rate, max_step))
+            max_step = followed(max_step, rate)
     substeps = steps_per_interval(times, max_step)
+    if substeps * (times.shape[-1] - warmup) > MAX_STEPS:
+        raise ConfigError(_over_budget(substeps * (times.shape[-1] - warmup), max_step))
     rows = torch.broadcast_shapes(inputs.command.shape[:-1], times.shape)
     members = [e for e in model.effects if isinstance(e, Effect)]
     drive = model.actuators.drive(
@@ -143,7 +168,21 @@ def rollout(
         )
     thrust = torch.stack([row.expand(*batch, row.shape[-1]) for row in drive.start], dim=-2)
     result = Trajectory(times, eta, nu, thrust)
-    return _checked(model, result, inputs) if check else result
+    if not check:
+        return result
+    result = _checked(model, result, inputs)
+    notes += extrapolated(model, result.times, result.eta, result.nu, inputs)
+    return replace(result, notes=tuple(notes)) if notes else result
+
+
+def _longest(times: Tensor) -> float:
+    return float((times[..., 1:] - times[..., :-1]).max()) if times.shape[-1] > 1 else 0.0
+
+
+def _rate(model: GreyBox, eta0: Tensor, nu0: Tensor, command: Tensor, batch: torch.Size) -> float:
+    """Return how fast the model settles at the starts of the trajectories, 1/s."""
+    states = (x.expand(*batch, x.shape[-1]).reshape(-1, x.shape[-1]) for x in (eta0, nu0, command))
+    return fastest_rate(model, *states)
 
 
 def _leading_shape(

@@ -16,6 +16,7 @@ from auvnn.vehicle import Vehicle, load_vehicle
 MODEL, WEIGHTS = "model.yaml", "weights.safetensors"
 SUBNETWORKS = "damping_subnetworks"
 STRUCTURE = "structure"
+REGION = "trained_region"
 
 
 def from_vehicle(vehicle: Vehicle, actuation: str | None = None) -> GreyBox:
@@ -53,6 +54,7 @@ def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None 
     # Parsed from the bytes whose hash was checked, not from the file, which may have changed since.
     data: dict[str, Any] = parse_yaml(files[MODEL].decode("utf-8"), str(path / MODEL))
     networks = data.pop(SUBNETWORKS, None)
+    region = data.pop(REGION, None)
     structure = data.pop(STRUCTURE, None)
     saved_actuation = data.pop("actuation", None)
     vehicle = Vehicle.from_dict(data, where=str(path / MODEL))
@@ -62,12 +64,14 @@ def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None 
     if networks is None:
         return model
     from auvnn.damping.bank import DampingBank
+    from auvnn.damping.region import Region
 
     if WEIGHTS not in files:
         raise ModelError(f"{path} describes damping subnetworks but holds no {WEIGHTS}: save the model again")
     bank = DampingBank.from_description(networks)
     expected = {k: (tuple(v.shape), v.dtype) for k, v in bank.state_dict().items()}
     bank.load_state_dict(tensors_from_bytes(files[WEIGHTS], expected))
+    bank.region = None if region is None else Region.read(region, str(path / MODEL))
     return GreyBox(model.vehicle, model.copied_effects(), bank, model.actuation)
 
 
@@ -119,6 +123,8 @@ def contents(model: GreyBox, path: Path) -> dict[str, bytes | str]:
         files[WEIGHTS] = tensors_to_bytes({k: v.double() for k, v in model.learned.state_dict().items()})
     elif model.damping is not None:
         data[SUBNETWORKS] = model.damping.describe()
+        if model.damping.region is not None:
+            data[REGION] = model.damping.region.to_dict()
         # Always in double precision, which holds single precision exactly: a folder has one form.
         files[WEIGHTS] = tensors_to_bytes({k: v.double() for k, v in model.damping.state_dict().items()})
     files[MODEL] = dump_yaml(data, str(path))

@@ -14,6 +14,7 @@ from torch import Tensor
 
 from auvnn.catalogue import unknown_name
 from auvnn.damping.bank import DampingBank
+from auvnn.damping.region import Region
 from auvnn.errors import ConfigError
 from auvnn.training.checkpoint import Checkpoints
 from auvnn.training.history import Callback, History, Record
@@ -164,6 +165,7 @@ def fit_damping(
     errors, held_errors = chosen.errors()
     unit = spread * working.output_scale.cpu().double()
     bank.load_state_dict(result.state_dict())
+    bank.region = Region.of(train.nu[(train.weights > 0).any(-1)])
     energy = tuple(energy_warnings(bank, train))
     return Fit(
         history=history,

@@ -32,7 +32,7 @@ def rich_log() -> Log:
                 nu_dot=rng.normal(size=(200, 6)) * 1e-300,
                 wrench=rng.normal(size=(200, 6)) * 1e7,
                 fins=rng.normal(size=(200, 2)),
-                altitude=rng.normal(size=200),
+                altitude=np.abs(rng.normal(size=200)),
                 extra={"my column / °C": rng.normal(size=200)},
             )
         )

@@ -7,7 +7,7 @@ from typing import Any
 
 from auvnn.diagnosis import add
 from auvnn.diagnosis.bake import baked
-from auvnn.diagnosis.diagnose import windows_for
+from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.explain import explain
 from auvnn.diagnosis.improve import paired_gain
 from auvnn.diagnosis.nuisance import lay_out

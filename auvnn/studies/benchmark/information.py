@@ -21,7 +21,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from auvnn.diagnosis.diagnose import windows_for
+from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.nuisance import FREE, Layout, lay_out, stated
 from auvnn.diagnosis.probes import Probed, extent_of, probed
 from auvnn.logs import Log

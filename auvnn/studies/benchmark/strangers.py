@@ -65,7 +65,7 @@ def sized_stranger(model: Any, name: str, size: str, *, seed: int = 0, **how: An
     """
     import torch
 
-    from auvnn.diagnosis.diagnose import windows_for
+    from auvnn.diagnosis.cut import windows_for
     from auvnn.metrics.free_run import initial_states
     from auvnn.simulate import simulate
     from auvnn.studies.benchmark.information import noise_sigma

@@ -1,0 +1,119 @@
+"""Knock-out on a real vehicle: take each effect out of the improved model and ask what is missing.
+
+    python experiments/beluga/knockout.py DATA [OUT] [effect ...] [--one-step]
+
+DATA is the folder with Beluga's six CSV files, OUT that of `run.py`, which left the improved model in it. Each effect
+of the model is removed alone, and `diagnose` gets the liveliest minute of each fitted run in windows of 2 s, the whole
+catalogue, and nothing of what was removed. The effect has come back when it is the first one named, or in the group
+that is declared as one that these data cannot tell apart. `random-2` takes no part.
+
+With `--one-step` the catalogue is ranked instead by what each effect gains one step ahead on fifths of the whole fitted
+runs left out (`auvnn.diagnosis.rank_one_step`), which is what the model's effects were chosen and fitted by.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+
+import torch
+from glitches import without_glitches
+from run import FILTER, FITTED, SECONDS, WINDOW, first, lively, read
+
+from auvnn.answers import plain
+from auvnn.diagnosis import diagnose, rank_one_step
+from auvnn.logs import Log
+from auvnn.models import GreyBox, load
+from auvnn.models.saving import remove
+
+MOST = 2  # names one after the other: the first decides, the second tells whether it comes back at all
+SHOWN = 6  # of the ranking
+
+
+def fitted_runs(data: Path) -> Log:
+    """Return the fitted runs, poses that contradict the velocities left out."""
+    log, _ = without_glitches(read(data, FITTED, "mapping.yaml"))
+    return Log.from_runs([*(first(r, SECONDS) for r in log.runs[:-1]), log.runs[-1]], name="beluga")
+
+
+def one_step_case(model: GreyBox, log: Log, removed: str | None) -> dict:
+    """Rank the catalogue one step ahead for the model without one effect, or as it is."""
+    began = time.monotonic()
+    ranking = rank_one_step(model if removed is None else remove(model, removed), log, derivative=FILTER)
+    names = [r.effect for r in ranking]
+    own = next((r for r in ranking if r.effect == removed), None)
+    return {
+        "removed": removed,
+        "rank": names.index(removed) + 1 if own is not None else None,
+        "named_first": own is not None and names[0] == removed and own.pays,
+        "in_first_group": own is not None and own.tied and own.pays,
+        "group": [r.effect for r in ranking if r.tied and r.pays],
+        "own": own and own.to_dict(),
+        "ranking": [r.to_dict() for r in ranking[:SHOWN]],
+        "seconds": round(time.monotonic() - began, 1),
+    }
+
+
+def case(model: GreyBox, log: Log, removed: str | None) -> dict:
+    """Diagnose the model without one effect, or as it is, and say whether the effect came back and how."""
+    began = time.monotonic()
+    lacking = model if removed is None else remove(model, removed)
+    found = diagnose(lacking, log, max_effects=MOST, window=WINDOW, advice=False)
+    steps = [{k: s[k] for k in ("verdict", "effects", "p_value")} for s in found.steps]
+    head = found.steps[0]["effects"]
+    entry = next((c for c in found.candidates if c["effect"] == removed), None)
+    by_p = sorted(
+        (c for c in found.candidates if c["p_value"] is not None), key=lambda c: (c["p_value"], -(c["explained"] or 0))
+    )
+    return {
+        "removed": removed,
+        "verdict": found.verdict,
+        "steps": steps,
+        "named_first": removed is not None and head[:1] == [removed] and found.verdict == "named",
+        "in_first_group": removed in head,
+        "named_later": any(removed in s["effects"] for s in found.steps[1:]),
+        "rank_by_evidence": [c["effect"] for c in found.candidates].index(removed) + 1 if removed else None,
+        "rank_by_p_value": [c["effect"] for c in by_p].index(removed) + 1 if entry and entry in by_p else None,
+        "p_value": entry and entry["p_value"],
+        "confusable_with": entry and entry["confusable_with"][:3],
+        "parameters": entry and entry["parameters"],
+        "ranking": [
+            {k: c[k] for k in ("effect", "p_value", "explained", "cv_before", "cv_after")}
+            for c in found.candidates[:SHOWN]
+        ],
+        "seconds": round(time.monotonic() - began, 1),
+    }
+
+
+def main() -> None:
+    """Go through the model's effects and write `knockout.json`."""
+    torch.set_num_threads(1)
+    if len(sys.argv) < 2 or not Path(sys.argv[1]).is_dir():
+        print("skipped: Beluga's logs are not here; give the folder that holds its six CSV files")
+        return
+    arguments = [a for a in sys.argv[1:] if not a.startswith("--")]
+    data, out = Path(arguments[0]), Path(arguments[1] if len(arguments) > 1 else "outputs/beluga")
+    model, log = load(out / "model"), fitted_runs(data)
+    one_step = "--one-step" in sys.argv
+    cases = []
+    for name in arguments[2:] or ["none", *model.effect_names]:
+        removed = None if name == "none" else name
+        found = one_step_case(model, log, removed) if one_step else case(model, lively(log), removed)
+        cases.append(found)
+        if one_step:
+            told = ", ".join(f"{r['effect']} {r['gain']:.3f} +- {r['std']:.3f}" for r in found["ranking"][:3])
+        else:
+            told = " then ".join(f"{s['verdict']} {' or '.join(s['effects'])}".strip() for s in found["steps"])
+        print(f"without {name}: {told} ({found['seconds']} s)", flush=True)
+        back = sum(bool(c["named_first"] or c.get("in_first_group")) for c in cases)
+        of = sum(c["removed"] is not None for c in cases)
+        answer = {"cases": cases, "came_back": back, "of": of}
+        file = out / ("knockout-one-step.json" if one_step else "knockout.json")
+        file.write_text(json.dumps(plain(answer), indent=1), encoding="utf-8")
+    print(f"came back: {back} of {of}")
+
+
+if __name__ == "__main__":
+    main()
