@@ -66,11 +66,13 @@ def restore(folder: str | Path, *, validated: bool = False) -> Adapter:
         plain = json.loads(files[PLAIN])
         watched = plain["monitor"]
         adapter = Adapter(
-            from_contents(files, path), plain["scheme"], guards=Guards(**plain["guards"]), watch=False
+            from_contents(files, path), plain["scheme"], guards=Guards(**plain["guards"]), watch=False,
+            compare=plain["compare"],
         )
         adapter._original.bank.load_state_dict(_part(tensors, "original"))
         adapter.scheme.load(_part(tensors, "scheme"))
         adapter._shadow.load(_part(tensors, "shadow"))
+        adapter._trial.load(_part(tensors, "trial"))
         adapter._noise.load(_part(tensors, "noise"))
         adapter._bounds.load(_part(tensors, "bounds"), adapter.weights)
         adapter._gate.load(plain["gate"])
@@ -106,6 +108,7 @@ def _plain(adapter: Adapter) -> dict[str, Any]:
     off = adapter._off_until
     return {
         "scheme": {"scheme": adapter.scheme.name, **adapter.scheme.options()},
+        "compare": adapter.compare,
         "guards": adapter.guards.to_dict(),
         "counts": asdict(adapter.counts),
         "gate": adapter._gate.state(),
@@ -127,6 +130,7 @@ def _tensors(adapter: Adapter) -> dict[str, Tensor]:
         "original": copy.deepcopy(adapter._original.bank).state_dict(),
         "scheme": adapter.scheme.state(),
         "shadow": adapter._shadow.state(),
+        "trial": adapter._trial.state(),
         "noise": adapter._noise.state(),
         "bounds": adapter._bounds.state(),
         "consistency": adapter._consistency.state(),

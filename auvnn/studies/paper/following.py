@@ -54,8 +54,8 @@ def adapted(
     options = dict(described)
     if "scheme" not in options:
         raise ConfigError(f"case.online: {described} names no scheme; choose sgd, replay or rls")
-    guards = options.pop("guards", "full")
-    adapter = Adapter(copy.deepcopy(model).requires_grad_(True), options, guards=guards)
+    how = {name: options.pop(name) for name in ("guards", "compare") if name in options}
+    adapter = Adapter(copy.deepcopy(model).requires_grad_(True), options, **how)
     snapshots = []
     assert run.position is not None and run.nu_dot is not None and run.command is not None
     for k in range(run.samples):

@@ -1,0 +1,99 @@
+"""Weights on trial: noise alone does not move what is used, a change of the vehicle does, and nothing is forgotten."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+import torch
+from online_world import driven, fed, vehicle, with_networks
+
+from auvnn.errors import ConfigError
+from auvnn.models import GreyBox
+from auvnn.online import Adapter
+from auvnn.online.trial import Trial
+from auvnn.online.weights import Weights
+
+PROVEN = {"proof": 5.0}
+
+
+def same(a: dict[str, torch.Tensor], b: dict[str, torch.Tensor]) -> bool:
+    return all(torch.equal(a[name], b[name]) for name in a)
+
+
+def test_the_evidence_is_the_log_likelihood_ratio_summed_above_zero():
+    bank = with_networks().damping
+    learning = Weights(copy.deepcopy(bank), "last")
+    trial = Trial(learning, 1e9)
+    generator = np.random.default_rng(0)
+    expected = np.zeros(6)
+    nu = torch.tensor([0.2, -0.1, 0.1, 0.05, 0.1, -0.2], dtype=torch.float64)
+    old = learning.value(nu).numpy()
+    for _ in range(20):
+        target, variance = generator.standard_normal(6), generator.uniform(0.1, 1.0, 6)
+        error = generator.standard_normal(6)
+        assert trial.take(learning, *map(torch.tensor, (target,)), nu, torch.tensor(error), torch.tensor(variance)) == 0
+        likelihoods = [-0.5 * e**2 / variance for e in (error, target - old)]
+        expected = np.maximum(0.0, expected + likelihoods[0] - likelihoods[1])
+    np.testing.assert_allclose(trial.evidence, expected, rtol=1e-12)
+    assert expected.max() > 0.5
+
+
+def test_noise_alone_seldom_brings_what_it_taught_into_use():
+    """The model is right: what is learned is noise, and by Ville's inequality hardly ever seems to be better."""
+    moved = []
+    for seed in range(3):
+        run = driven(vehicle(), duration=15.0, noise=(0.0, 0.5), seed=seed)
+        adapter = Adapter(vehicle(), {"scheme": "rls", "gain": 0.3, "shape": 0.3}, guards=PROVEN, watch=False)
+        before = adapter.snapshot()
+        fed(adapter, run)
+        assert adapter.counts.adapted > 100 and float(adapter.weights.read().abs().max()) > 0.0
+        moved.append(adapter.counts.proven)
+        assert same(adapter.snapshot(), before) == (adapter.counts.proven == 0)
+    assert sum(moved) <= 1, moved
+
+
+def test_a_change_of_the_vehicle_comes_into_use_within_a_second():
+    run = driven(vehicle(), lambda m: m.with_effects({"quadratic_damping": {"X": 4.0, "Y": 4.0}}), when=6.0, duration=10.0)
+    free, tried = (Adapter(vehicle(), guards=g, watch=False) for g in ("full", PROVEN))
+    fed(free, run)
+    fed(tried, run, range(0, 61))
+    assert tried.counts.proven == 0
+    updates = fed(tried, run, range(61, run.samples))
+    first = next(k for k, u in enumerate(updates) if u.proven)
+    assert first <= 10
+    # Judged where the drag changed, against the vehicle's own.
+    nu = torch.tensor(run.nu[70:])
+    with torch.no_grad():
+        used, learned = tried.model.damping(nu)[:, :2], free.model.damping(nu)[:, :2]
+    assert float((used - learned).norm()) < 0.15 * float(learned.norm()) and float(learned.norm()) > 10.0
+
+
+def test_what_is_used_is_what_model_and_snapshot_give_and_what_is_saved(tmp_path):
+    run = driven(vehicle(), lambda m: m.with_effects({"quadratic_damping": {"X": 4.0}}), when=3.0, duration=8.0)
+    adapter = Adapter(vehicle(), guards=PROVEN, watch=False)
+    fed(adapter, run, range(0, 45))
+    assert adapter.counts.proven > 0
+    model = adapter.model
+    assert isinstance(model, GreyBox) and model.damping is not None
+    assert same(adapter.snapshot(), dict(model.damping.named_parameters()))
+    adapter.save(tmp_path / "state")
+    again = Adapter.restore(tmp_path / "state")
+    for one in (adapter, again):
+        fed(one, run, range(45, 80))
+    assert same(adapter.snapshot(), again.snapshot()) and again.counts.proven == adapter.counts.proven
+
+
+def test_increments_are_compared_where_that_is_asked_for():
+    """Accelerations that are nothing but noise do no harm to one who does not look at them."""
+    run = driven(vehicle(), duration=8.0, noise=(0.0, 3.0))
+    blind, quiet = (Adapter(vehicle(), compare=c, watch=False) for c in ("increments", "measured"))
+    updates = fed(blind, run)
+    without = fed(quiet, run, measured=False)
+    for a, b in zip(updates[1:], without[1:], strict=True):
+        assert a.cause == b.cause
+        if a.residual is not None:
+            assert torch.equal(a.residual, b.residual)
+    with pytest.raises(ConfigError, match="measured or increments"):
+        Adapter(vehicle(), compare="guessed")
