@@ -66,7 +66,10 @@ def restore(folder: str | Path, *, validated: bool = False) -> Adapter:
         plain = json.loads(files[PLAIN])
         watched = plain["monitor"]
         adapter = Adapter(
-            from_contents(files, path), plain["scheme"], guards=Guards(**plain["guards"]), watch=False,
+            from_contents(files, path),
+            plain["scheme"],
+            guards=Guards(**plain["guards"]),
+            watch=False,
             compare=plain["compare"],
         )
         adapter._original.bank.load_state_dict(_part(tensors, "original"))

@@ -128,7 +128,9 @@ class LeastSquares:
         """Return which problems (members,) need no better optimum."""
         rows = self._winners()
         cost = self.state["best_cost"][rows]
-        return (cost <= self._exact_cost[rows]) | ((cost <= self._goal_cost[rows]) & (self.rules.goal is not None))
+        return (cost <= self._exact_cost[rows]) | (
+            (cost <= self._goal_cost[rows]) & (self.rules.goal is not None)
+        )
 
     def _winners(self) -> Tensor:
         """Return the row of each problem's best start (members,)."""

@@ -33,7 +33,12 @@ def test_the_evidence_is_the_log_likelihood_ratio_summed_above_zero():
     for _ in range(20):
         target, variance = generator.standard_normal(6), generator.uniform(0.1, 1.0, 6)
         error = generator.standard_normal(6)
-        assert trial.take(learning, *map(torch.tensor, (target,)), nu, torch.tensor(error), torch.tensor(variance)) == 0
+        assert (
+            trial.take(
+                learning, *map(torch.tensor, (target,)), nu, torch.tensor(error), torch.tensor(variance)
+            )
+            == 0
+        )
         likelihoods = [-0.5 * e**2 / variance for e in (error, target - old)]
         expected = np.maximum(0.0, expected + likelihoods[0] - likelihoods[1])
     np.testing.assert_allclose(trial.evidence, expected, rtol=1e-12)
@@ -55,7 +60,8 @@ def test_noise_alone_seldom_brings_what_it_taught_into_use():
 
 
 def test_a_change_of_the_vehicle_comes_into_use_within_a_second():
-    run = driven(vehicle(), lambda m: m.with_effects({"quadratic_damping": {"X": 4.0, "Y": 4.0}}), when=6.0, duration=10.0)
+    quicker = {"quadratic_damping": {"X": 4.0, "Y": 4.0}}
+    run = driven(vehicle(), lambda m: m.with_effects(quicker), when=6.0, duration=10.0)
     free, tried = (Adapter(vehicle(), guards=g, watch=False) for g in ("full", PROVEN))
     fed(free, run)
     fed(tried, run, range(0, 61))
@@ -71,7 +77,9 @@ def test_a_change_of_the_vehicle_comes_into_use_within_a_second():
 
 
 def test_what_is_used_is_what_model_and_snapshot_give_and_what_is_saved(tmp_path):
-    run = driven(vehicle(), lambda m: m.with_effects({"quadratic_damping": {"X": 4.0}}), when=3.0, duration=8.0)
+    run = driven(
+        vehicle(), lambda m: m.with_effects({"quadratic_damping": {"X": 4.0}}), when=3.0, duration=8.0
+    )
     adapter = Adapter(vehicle(), guards=PROVEN, watch=False)
     fed(adapter, run, range(0, 45))
     assert adapter.counts.proven > 0

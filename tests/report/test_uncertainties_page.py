@@ -91,7 +91,9 @@ def test_identifiability_places_every_parameter_and_cuts_at_the_axis():
     assert len(figure.axes[0].get_yticks()) == 2
 
 
-@pytest.mark.parametrize("draw", [lambda: swallowed({}), lambda: identifiability({}), lambda: identifiability({"a": []})])
+@pytest.mark.parametrize(
+    "draw", [lambda: swallowed({}), lambda: identifiability({}), lambda: identifiability({"a": []})]
+)
 def test_nothing_to_draw_is_told(draw):
     with pytest.raises(NoData):
         draw()

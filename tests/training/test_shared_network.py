@@ -1,4 +1,4 @@
-"""One network with several outputs: normal equations, output layer and fit against automatic differentiation and scipy."""
+"""One network with several outputs: against automatic differentiation, least squares and scipy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,11 @@ from auvnn.training.shared_network import SharedProblems
 def made(samples: int = 40, hidden: int = 3) -> tuple[SharedProblems, torch.Tensor, torch.Tensor]:
     found = problem(samples)
     x = torch.cat([found.nu, found.nu.abs()], 1) / 0.3
-    return SharedProblems(x, found.target / found.target.std(0), hidden), x, found.target / found.target.std(0)
+    return (
+        SharedProblems(x, found.target / found.target.std(0), hidden),
+        x,
+        found.target / found.target.std(0),
+    )
 
 
 def outputs(x: torch.Tensor, theta: torch.Tensor, beta: torch.Tensor, hidden: int) -> torch.Tensor:
@@ -31,12 +35,19 @@ def test_the_normal_equations_are_those_of_the_whole_jacobian():
     beta = torch.randn(2, problems.outer_size, generator=generator, dtype=torch.float64)
     found = problems.normal(theta, beta, torch.zeros(2, dtype=torch.int64))
     for k in range(2):
+
         def residual(t, b):
             return (outputs(x, t, b, 3) - y).flatten()
 
         by_theta, by_beta = torch.autograd.functional.jacobian(residual, (theta[k], beta[k]))
         left = residual(theta[k], beta[k])
-        expected = (by_theta.T @ by_theta, by_theta.T @ by_beta, by_beta.T @ by_beta, by_theta.T @ left, by_beta.T @ left)
+        expected = (
+            by_theta.T @ by_theta,
+            by_theta.T @ by_beta,
+            by_beta.T @ by_beta,
+            by_theta.T @ left,
+            by_beta.T @ left,
+        )
         for ours, wanted in zip(found.tensors(), expected, strict=True):
             torch.testing.assert_close(ours[k], wanted, rtol=1e-9, atol=1e-9 * float(wanted.abs().max()))
         cost = problems.cost(theta, beta, torch.zeros(2, dtype=torch.int64))[k]
@@ -58,7 +69,9 @@ def test_the_output_layer_is_the_least_squares_solution():
 def test_it_ends_where_scipy_cannot_improve():
     problems, x, y = made(60, 2)
     one = torch.ones(1, dtype=torch.float64)
-    solver = LeastSquares(problems, None, one, Rules(2, 50, 400, 1e-12, 20, 30, 0.3, None), None, torch.Generator())
+    solver = LeastSquares(
+        problems, None, one, Rules(2, 50, 400, 1e-12, 20, 30, 0.3, None), None, torch.Generator()
+    )
     while solver.running:
         solver.step()
     theta, beta, cost, _ = solver.best()

@@ -55,7 +55,7 @@ def adapted(
     if "scheme" not in options:
         raise ConfigError(f"case.online: {described} names no scheme; choose sgd, replay or rls")
     how = {name: options.pop(name) for name in ("guards", "compare") if name in options}
-    adapter = Adapter(copy.deepcopy(model).requires_grad_(True), options, **how)
+    adapter = Adapter(copy.deepcopy(model).requires_grad_(True), options, watch=False, **how)
     snapshots = []
     assert run.position is not None and run.nu_dot is not None and run.command is not None
     for k in range(run.samples):
