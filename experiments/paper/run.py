@@ -3,8 +3,9 @@
     python experiments/paper/run.py [OUT] [SEEDS] [WORDS ...]
 
 OUT is where the answers go (outputs/paper), SEEDS how many (10); WORDS are further options of `auvnn study`, such as
-effort=smoke. Each study is the command `auvnn study case=CASE seed=SEED out=OUT/CASE/SEED`; one that is there already is
-not run again, so that an interrupted run goes on. `table.json` holds the medians and all seeds, printed as a table.
+effort=smoke. Each study is the command `auvnn study case=CASE seed=SEED out=OUT/CASE/SEED`, with page and figures for seed 0
+(report=true for all); one that is there already is not run again, so that an interrupted run goes on. `table.json` holds
+the medians and all seeds, printed as a table.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ STUDIES = {
     "noise_free": ["case=noise_free"],
     "noisy": ["case=noisy"],
     "payload": ["case=payload"],
-    "payload_physical": ["case=payload", "case.variant=physical"],
+    # The same networks of the empty vehicle: not trained twice.
+    "payload_physical": ["case=payload", "case.variant=physical", "case.offline.model={out}/payload/{seed}/model"],
     "payload_manoeuvre": ["case=payload", "case.offline.data=manoeuvre"],
 }
 # Study, metric, target (at most, or at least where it ends in +), words.
@@ -59,7 +61,9 @@ def run(out: Path, seeds: int, words: list[str]) -> None:
             if (folder / "study.json").exists():
                 continue
             print(f"== {name}, seed {seed}", flush=True)
-            status = main(["study", *options, f"seed={seed}", f"out={folder}", *words])
+            drawn = [] if seed == 0 else ["report=false"]
+            options = [word.format(out=out, seed=seed) for word in options]
+            status = main(["study", *options, f"seed={seed}", f"out={folder}", *drawn, *words])
             if status:
                 print(f"   failed with status {status}")
 
