@@ -12,7 +12,7 @@ def _run(job: Job) -> Answering:
     model = job.model(log)
     adaptation = adapt(
         model, log, job["learner"], guards=job["guards"], damping=job["damping"],
-        compare=job["compare"], state=job.folder / "state", progress=job.say.progress,
+        state=job.folder / "state", progress=job.say.progress,
     )  # fmt: skip
     adaptation.model.save(job.folder / "model")
     adaptation.write(job.folder)

@@ -70,7 +70,6 @@ def adapt(
     *,
     guards: Guards | str | Mapping[str, Any] | None = "full",
     damping: Description = "polynomial",
-    compare: str = "measured",
     state: str | Path | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Adaptation:
@@ -82,7 +81,6 @@ def adapt(
         scheme: of adaptation, or its options with `scheme`.
         guards: "full", "none", or numbers by name.
         damping: form of the subnetworks for a model that has none.
-        compare: "measured" accelerations where there are any, or "increments" of velocity; see `Adapter`.
         state: folder for the adapter's state at the end, from which `Adapter.restore` goes on.
         progress: told in words after each run.
 
@@ -95,7 +93,7 @@ def adapt(
             f"{log.name} is driven by {log.kind}, the model by {model.actuation}: load the model with "
             f"actuation='{log.kind}'"
         )
-    adapter = Adapter(model, scheme, guards=guards, damping=damping, compare=compare)
+    adapter = Adapter(model, scheme, guards=guards, damping=damping)
     started = adapter.snapshot()
     changes: list[dict[str, Any]] = []
     updates: list[list[Update]] = []
@@ -116,7 +114,7 @@ def adapt(
     if state is not None:
         adapter.save(state)
     every = [u for own in updates for u in own]
-    measured = compare == "measured" and all(run.nu_dot is not None for run in log.runs)
+    measured = all(run.nu_dot is not None for run in log.runs)
     compared = (
         "measured accelerations"
         if measured

@@ -31,7 +31,6 @@ from auvnn.online.weights import Weights
 SPEED = 0.3
 ACCELERATION = 0.3
 MOST_HELD = 64
-COMPARED = ("measured", "increments")
 
 
 @dataclass(frozen=True)
@@ -98,8 +97,6 @@ class Adapter:
         scheme: `rls`, `sgd`, `replay`, or a mapping of its options with `scheme`.
         guards: "full", "none" (weights follow every sample, as in the paper), or numbers by name.
         damping: form of the subnetworks for a model that has none.
-        compare: "measured" compares accelerations where they are given; "increments" always compares increments of
-            velocity, which is better where accelerations are the noisier of the two.
         watch: say what kind of change was seen (`changes`); costs about as much as the adaptation itself.
         clock: seconds, for the budget; another one for tests.
 
@@ -114,14 +111,11 @@ class Adapter:
         *,
         guards: Guards | str | Mapping[str, Any] | None = "full",
         damping: Description = "polynomial",
-        compare: str = "measured",
         watch: bool = True,
         clock: Callable[[], float] = clocks.perf_counter,
     ) -> None:
         """Copy the model and begin."""
-        if compare not in COMPARED:
-            raise ConfigError(f"compare={compare!r}: choose {' or '.join(COMPARED)}")
-        self.guards, self.compare = build_guards(guards), compare
+        self.guards = build_guards(guards)
         self.scheme = build_online_scheme(scheme)
         self.counts = Counts()
         self.clock = clock
@@ -242,7 +236,6 @@ class Adapter:
             ConfigError: a vector has the wrong size.
         """
         begin = self.clock()
-        nu_dot = nu_dot if self.compare == "measured" else None
         update = self._step(t, eta, nu, command, nu_dot, now, fault, channels)
         self.counts.samples += 1
         if update.adapted:

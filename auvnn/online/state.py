@@ -70,7 +70,6 @@ def restore(folder: str | Path, *, validated: bool = False) -> Adapter:
             plain["scheme"],
             guards=Guards(**plain["guards"]),
             watch=False,
-            compare=plain["compare"],
         )
         adapter._original.bank.load_state_dict(_part(tensors, "original"))
         adapter.scheme.load(_part(tensors, "scheme"))
@@ -111,7 +110,6 @@ def _plain(adapter: Adapter) -> dict[str, Any]:
     off = adapter._off_until
     return {
         "scheme": {"scheme": adapter.scheme.name, **adapter.scheme.options()},
-        "compare": adapter.compare,
         "guards": adapter.guards.to_dict(),
         "counts": asdict(adapter.counts),
         "gate": adapter._gate.state(),

@@ -5,11 +5,9 @@ from __future__ import annotations
 import copy
 
 import numpy as np
-import pytest
 import torch
 from online_world import driven, fed, vehicle, with_networks
 
-from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
 from auvnn.online import Adapter
 from auvnn.online.trial import Trial
@@ -91,17 +89,3 @@ def test_what_is_used_is_what_model_and_snapshot_give_and_what_is_saved(tmp_path
     for one in (adapter, again):
         fed(one, run, range(45, 80))
     assert same(adapter.snapshot(), again.snapshot()) and again.counts.proven == adapter.counts.proven
-
-
-def test_increments_are_compared_where_that_is_asked_for():
-    """Accelerations that are nothing but noise do no harm to one who does not look at them."""
-    run = driven(vehicle(), duration=8.0, noise=(0.0, 3.0))
-    blind, quiet = (Adapter(vehicle(), compare=c, watch=False) for c in ("increments", "measured"))
-    updates = fed(blind, run)
-    without = fed(quiet, run, measured=False)
-    for a, b in zip(updates[1:], without[1:], strict=True):
-        assert a.cause == b.cause
-        if a.residual is not None:
-            assert torch.equal(a.residual, b.residual)
-    with pytest.raises(ConfigError, match="measured or increments"):
-        Adapter(vehicle(), compare="guessed")

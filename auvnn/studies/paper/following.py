@@ -55,7 +55,7 @@ def adapted(
     options = dict(described)
     if "scheme" not in options:
         raise ConfigError(f"case.online: {described} names no scheme; choose sgd, replay or rls")
-    how = {name: options.pop(name) for name in ("guards", "compare") if name in options}
+    how = {name: options.pop(name) for name in ("guards",) if name in options}
     adapter = Adapter(copy.deepcopy(model).requires_grad_(True), options, watch=False, **how)
     snapshots = []
     assert run.position is not None and run.nu_dot is not None and run.command is not None
@@ -117,7 +117,7 @@ def _stretches(
     """Return first and last rows of the stretches over which neither weights nor physics change."""
     starts = {0} if cut is None else {0, cut}
     if not isinstance(snapshots, Mapping):
-        pairs = zip(snapshots, snapshots[1:], strict=False)
+        pairs = pairwise(snapshots)
         starts |= {k + 1 for k, (a, b) in enumerate(pairs) if any(not torch.equal(a[n], b[n]) for n in a)}
     edges = [*sorted(k for k in starts if k < samples - 1), samples - 1]
     return list(pairwise(edges))

@@ -148,7 +148,9 @@ def _offline(
         return model, {"training_s": fit.seconds}, list(fit.details.get("warnings", []))
     bank = load(str(given), actuation="wrench").damping
     if bank is None:
-        raise ConfigError(f"case.offline.model={given}: has no damping subnetworks; give the model of a study")
+        raise ConfigError(
+            f"case.offline.model={given}: has no damping subnetworks; give the model of a study"
+        )
     model = GreyBox(without_damping(plant.vehicle), (), bank, "wrench").requires_grad_(False)
     return model, {}, []
 
