@@ -43,10 +43,6 @@ class FormProblems:
         self._form.load_state_dict(saved)
         return theta
 
-    def renew(self, theta: Tensor, number: int, generator: torch.Generator) -> Tensor:
-        """Draw everything anew: forms other than networks have no units to tell apart."""
-        return self.draw(generator)
-
     def _output(self, theta: Tensor, nu: Tensor, member: int) -> Tensor:
         state = {name: tensor[member : member + 1] for name, tensor in self._buffers.items()}
         start = 0

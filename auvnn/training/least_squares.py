@@ -33,7 +33,6 @@ class Rules:
     patience: int
     damping: float
     goal: float | None
-    renewals: int = 0
 
 
 class LeastSquares:
@@ -46,10 +45,6 @@ class LeastSquares:
     hardly matter yet take huge steps and saturate, and ends in poorer optima. mu follows how well the last
     step was predicted (Nielsen's rule). A step that does not lower the cost, or gives no finite one, is taken
     back; problems that have ended leave the batch.
-
-    With `renewals`, all starting points but the first then become copies of the best solution in which one hidden
-    unit each is drawn anew, and race again (iterated local search). A poor optimum of so small a network mostly
-    has one unit that is wasted: replacing it costs less than hoping for a start without one.
 
     Args:
         problems: what is fitted.
@@ -78,36 +73,31 @@ class LeastSquares:
         draws = [problems.draw(generator) for _ in range(rules.restarts)]
         if start is not None:
             draws[0] = start
-        self.iteration = self.round = self.since = 0
-        self._seed = generator.initial_seed()
+        self.iteration = 0
         self.member = torch.arange(problems.members).repeat(rules.restarts)
         self._goal_cost = ((rules.goal or 0.0) * spread).square()[self.member]
         self._exact_cost = (1e-13 * spread).square()[self.member]
-        self.state: dict[str, Tensor] = self._begun(torch.cat(draws), self.member)
-        self._end(torch.arange(len(self.member)))
-
-    def _begun(self, theta: Tensor, member: Tensor) -> dict[str, Tensor]:
-        """Return the state of problems that stand at theta (B, Q) and have not stepped yet."""
-        beta, cost = self.problems.solve_outer(theta, member)
+        theta = torch.cat(draws)
+        beta, cost = problems.solve_outer(theta, self.member)
         cost = torch.nan_to_num(cost, nan=torch.inf)
         count = len(theta)
-        held = self._held(theta, beta, member)
-        state = {
+        held = self._held(theta, beta, self.member)
+        self.state: dict[str, Tensor] = {
             "theta": theta,
             "beta": beta,
             "cost": cost,
-            "mu": theta.new_full((count,), self.rules.damping),
-            "status": torch.full((count,), RUNNING, dtype=torch.int64),
+            "mu": theta.new_full((count,), rules.damping),
+            "status": torch.zeros(count, dtype=torch.int64),
             "best_theta": theta.clone(),
             "best_beta": beta.clone(),
             "best_cost": cost.clone(),
             "best_score": cost.clone() if held is None else held,
             "since_best": torch.zeros(count, dtype=torch.int64),
-            "recent": cost[:, None].repeat(1, self.rules.window),
+            "recent": cost[:, None].repeat(1, rules.window),
         }
-        normal = self.problems.normal(theta, beta, member)
-        state.update(zip(_NORMAL, normal.tensors(), strict=True))
-        return state
+        normal = problems.normal(theta, beta, self.member)
+        self.state.update(zip(_NORMAL, normal.tensors(), strict=True))
+        self._end(torch.arange(count))
 
     def _held(self, theta: Tensor, beta: Tensor, member: Tensor) -> Tensor | None:
         if self.held_out is None:
@@ -116,49 +106,13 @@ class LeastSquares:
 
     @property
     def running(self) -> bool:
-        """Whether a problem is still in the batch, or will come back into it."""
-        return bool((self.state["status"] == RUNNING).any()) or self._left
-
-    @property
-    def _left(self) -> bool:
-        """Whether there is a renewal left, and a problem that could gain by it."""
-        return self.round < self.rules.renewals and self.rules.restarts > 1 and not bool(self._done().all())
-
-    def _done(self) -> Tensor:
-        """Return which problems (members,) need no better optimum."""
-        rows = self._winners()
-        cost = self.state["best_cost"][rows]
-        return (cost <= self._exact_cost[rows]) | (
-            (cost <= self._goal_cost[rows]) & (self.rules.goal is not None)
-        )
-
-    def _winners(self) -> Tensor:
-        """Return the row of each problem's best start (members,)."""
-        best = self.state["best_score"].view(self.rules.restarts, -1).argmin(0)
-        return best * self.problems.members + torch.arange(self.problems.members)
-
-    def _renew(self) -> None:
-        """Put the best start first and make the others copies of it with one hidden unit drawn anew."""
-        s, members = self.state, self.problems.members
-        self.round, self.since = self.round + 1, self.iteration
-        winners = self._winners()
-        kept = {name: tensor[winners] for name, tensor in s.items()}
-        # A seed of its own for each round, so that a fit that is taken up again draws the same.
-        generator = torch.Generator().manual_seed(1_000_003 * self.round + self._seed)
-        starts = range(self.rules.restarts - 1)
-        theta = torch.cat([self.problems.renew(kept["best_theta"], k, generator) for k in starts])
-        fresh = self._begun(theta, self.member[members:])
-        fresh["status"][self._done().repeat(len(starts))] = OUTPACED
-        self.state = {name: torch.cat([kept[name], fresh[name]]) for name in s}
+        """Whether a problem is still in the batch."""
+        return bool((self.state["status"] == RUNNING).any())
 
     def step(self) -> None:
         """Try one step in every problem that is still in the batch."""
         s = self.state
         rows = (s["status"] == RUNNING).nonzero()[:, 0]
-        if not len(rows) and self._left:
-            self._renew()
-            s = self.state
-            rows = (s["status"] == RUNNING).nonzero()[:, 0]
         if not len(rows):
             return
         self.iteration += 1
@@ -216,7 +170,7 @@ class LeastSquares:
         s, rules = self.state, self.rules
         cost, status = s["cost"][rows], s["status"][rows]
         oldest = s["recent"][rows, (self.iteration + 1) % rules.window]
-        settled = (self.iteration - self.since >= rules.window) & (cost > oldest * (1.0 - rules.tolerance))
+        settled = (self.iteration >= rules.window) & (cost > oldest * (1.0 - rules.tolerance))
         settled |= cost <= self._exact_cost[rows]
         ends = [(CONVERGED, settled), (STUCK, s["mu"][rows] > 1e10)]
         if rules.goal is not None:
@@ -229,42 +183,42 @@ class LeastSquares:
         if rules.goal is not None:  # one start that gets there ends the other starts of its problem
             reached = torch.isin(self.member, self.member[s["status"] == GOAL])
             s["status"][reached & (s["status"] == RUNNING)] = OUTPACED
-        done = self.iteration - self.since
-        if rules.restarts > 1 and done and done % rules.halve_every == 0:
+        if rules.restarts > 1 and self.iteration and self.iteration % rules.halve_every == 0:
             self._race()
-        if done >= rules.max_iterations:
+        if self.iteration >= rules.max_iterations:
             s["status"][s["status"] == RUNNING] = LIMIT
 
     def _race(self) -> None:
         """Drop the worse half of the starts that are left for each problem, but never the leading one."""
         s = self.state
-        rank = (self.iteration - self.since) // self.rules.halve_every
+        rank = self.iteration // self.rules.halve_every
         allowed = max(1, self.rules.restarts >> rank)
-        score = s["best_score"].view(self.rules.restarts, -1)
-        if self.round:  # what a renewal began with does not race: newcomers need time to pass it
-            score = torch.cat([score.new_full((1, score.shape[1]), torch.inf), score[1:]])
-        order = score.argsort(dim=0, stable=True)
+        order = s["best_score"].view(self.rules.restarts, -1).argsort(dim=0, stable=True)
         place = order.argsort(dim=0, stable=True).flatten()
         s["status"][(place >= allowed) & (s["status"] == RUNNING)] = OUTPACED
 
     def best(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Return the best start of each problem: inner and outer parameters, training cost and score."""
-        s, rows = self.state, self._winners()
+        s = self.state
+        rows = s["best_score"].view(self.rules.restarts, -1).argmin(0) * self.problems.members
+        rows = rows + torch.arange(self.problems.members)
         return s["best_theta"][rows], s["best_beta"][rows], s["best_cost"][rows], s["best_score"][rows]
 
     def reasons(self) -> list[int]:
         """Return why the winning start of each problem ended, as a key of `REASONS`."""
-        return self.state["status"][self._winners()].tolist()
+        s = self.state
+        winners = s["best_score"].view(self.rules.restarts, -1).argmin(0) * self.problems.members
+        return s["status"][winners + torch.arange(self.problems.members)].tolist()
 
     def save(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
         """Return everything that the next step depends on."""
-        return dict(self.state), {"iteration": self.iteration, "round": self.round, "since": self.since}
+        return dict(self.state), {"iteration": self.iteration}
 
     def load(self, tensors: dict[str, Tensor], plain: dict[str, Any]) -> None:
         """Take up what `save` returned."""
         # A fresh allocation: alignment may decide how a product is summed, and with it the last bit.
         self.state = {name: tensor.clone() for name, tensor in tensors.items()}
-        self.iteration, self.round, self.since = (int(plain[k]) for k in ("iteration", "round", "since"))
+        self.iteration = int(plain["iteration"])
 
 
 _NORMAL = tuple(f"normal_{name}" for name in Normal.__dataclass_fields__)

@@ -46,10 +46,6 @@ class Problems(Protocol):
         """Return initial inner parameters (members, Q)."""
         ...
 
-    def renew(self, theta: Tensor, number: int, generator: torch.Generator) -> Tensor:
-        """Return the inner parameters (members, Q) with a part of them, chosen by `number`, drawn anew."""
-        ...
-
     def solve_outer(self, theta: Tensor, member: Tensor) -> tuple[Tensor, Tensor]:
         """Return the best outer parameters (B, q) for theta (B, Q), and the cost (B,)."""
         ...
@@ -114,13 +110,6 @@ class NetworkProblems:
         weight = 0.5 * weight / spread.clamp_min(1e-6)
         bias = -(self.x[rows][..., :-1] * weight).sum(-1, keepdim=True)
         return torch.cat([weight, bias], -1).reshape(self.members, self.inner_size)
-
-    def renew(self, theta: Tensor, number: int, generator: torch.Generator) -> Tensor:
-        """Draw hidden unit `number` (modulo their count) of each network anew and leave the others."""
-        unit = number % self.hidden
-        out = theta.view(self.members, self.hidden, -1).clone()
-        out[:, unit] = self.draw(generator).view_as(out)[:, unit]
-        return out.view_as(theta)
 
     def _chunks(self, problems: int) -> Iterator[slice]:
         # Blocks that stay in the cache: 3 times faster than whole columns for a few hundred networks.

@@ -276,22 +276,3 @@ def test_a_network_too_wide_for_the_scheme_is_sent_to_another():
     bank = DampingBank.from_description({"form": "mlp", "hidden": 300})
     with pytest.raises(ConfigError, match="scheme=adam"):
         fit_damping(bank, problem(50))
-
-
-def test_renewals_only_ever_improve_and_replace_one_unit_at_a_time():
-    made = problem(200)
-    plain = {"restarts": 3, "halve_every": 5, "max_iterations": 20}
-    first = fit_damping(DampingBank.from_description("mlp"), made, scheme=plain)
-    found = fit_damping(DampingBank.from_description("mlp"), made, scheme={**plain, "renewals": 3})
-    errors = np.array([record.train for record in found.history.records])
-    assert bool((np.diff(errors, axis=0) <= 0).all()) and len(errors) > len(first.history.records)
-    # The beginning is the same fit; then each degree of freedom is as good or better.
-    np.testing.assert_array_equal(errors[len(first.history.records) - 1], first.relative_rmse)
-    gain = np.array(first.relative_rmse) / np.array(found.relative_rmse)
-    assert gain.min() >= 1.0 and np.median(gain) > 1.1
-    inputs = torch.randn(50, 12, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
-    problems = NetworkProblems(inputs, torch.zeros(2, 50, dtype=torch.float64), None, 5)
-    theta = problems.draw(torch.Generator().manual_seed(2))
-    renewed = problems.renew(theta, 8, torch.Generator().manual_seed(3))
-    changed = (renewed != theta).view(2, 5, 13).any(-1)
-    assert changed.tolist() == [[False, False, False, True, False]] * 2

@@ -24,7 +24,6 @@ from auvnn.training.history import History, Progress, Record
 MIXED = {"form": "mlp", "each": {"Y": "dissipative", "K": "polynomial", "M": "zero"}}
 SCHEMES = {
     "lm": {"scheme": "levenberg_marquardt", "max_iterations": 14, "restarts": 3, "halve_every": 4},
-    "renewed": {"scheme": "levenberg_marquardt", "max_iterations": 4, "restarts": 3, "renewals": 3},
     "sgd": {"scheme": "sgd", "epochs": 14, "batch_size": 16},
     "adam": {"scheme": "adam", "epochs": 14, "schedule": "cosine", "batch_size": 50},
 }

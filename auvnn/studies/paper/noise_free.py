@@ -79,8 +79,8 @@ def noise_free(options: Options, progress: Callable[[str], None]) -> Study:
     metrics["rich_relative_residual"] = _residual(wide_fit)
     metrics["rich_training_s"] = wide_fit.seconds
     if case.get("larger"):
-        how = _hunt({**case["rich"].get("hunt", {}), **case.get("larger_hunt", {})})
-        large, large_fit = six_networks(plant, options, rich, how, hidden=int(case["larger"]))
+        size = int(case["larger"])
+        large, large_fit = six_networks(plant, options, rich, _hunt(case.get("larger_hunt")), hidden=size)
         metrics["larger_hidden_units"] = int(case["larger"])
         metrics["larger_parameters"] = large_fit.parameters
         metrics["larger_relative_residual"] = _residual(large_fit)

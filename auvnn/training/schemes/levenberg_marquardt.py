@@ -37,8 +37,6 @@ class LevenbergMarquardt(Scheme):
         patience: accepted steps without a better held-out error after which a problem stops.
         damping: first value of the damping parameter mu.
         goal: stop a degree of freedom at this relative error; None: go on until it converges.
-        renewals: how often the best start is then copied over the others, with one hidden unit of each drawn anew,
-            to race again; 0: never. `max_iterations` holds for each such round.
     """
 
     name = "levenberg_marquardt"
@@ -54,7 +52,6 @@ class LevenbergMarquardt(Scheme):
         patience: int = 30,
         damping: float = 0.3,
         goal: float | None = None,
-        renewals: int = 0,
     ) -> None:
         """Check the options."""
         self.rules = Rules(
@@ -66,7 +63,6 @@ class LevenbergMarquardt(Scheme):
             patience=whole(patience, "patience"),
             damping=positive(damping, "damping"),
             goal=None if goal is None else positive(goal, "goal"),
-            renewals=whole(renewals, "renewals", least=0),
         )
         self.warnings = []
 
