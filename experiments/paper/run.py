@@ -78,6 +78,8 @@ def run(out: Path, seeds: int, words: list[str]) -> None:
             drawn = [] if seed == 0 else ["report=false"]
             options = [word.format(out=out, seed=seed) for word in options]
             status = main(["study", *options, f"seed={seed}", f"out={folder}", *drawn, *words])
+            if status in (130, 143):  # asked to end: not by this study alone
+                raise SystemExit(status)
             if status:
                 print(f"   failed with status {status}")
 

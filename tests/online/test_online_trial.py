@@ -67,11 +67,14 @@ def test_a_change_of_the_vehicle_comes_into_use_within_a_second():
     updates = fed(tried, run, range(61, run.samples))
     first = next(k for k, u in enumerate(updates) if u.proven)
     assert first <= 10
-    # Judged where the drag changed, against the vehicle's own.
-    nu = torch.tensor(run.nu[70:])
-    with torch.no_grad():
-        used, learned = tried.model.damping(nu)[:, :2], free.model.damping(nu)[:, :2]
-    assert float((used - learned).norm()) < 0.15 * float(learned.norm()) and float(learned.norm()) > 10.0
+    # Judged by accelerations that neither has seen as such: what is used lags behind what learns, but not by much.
+    rows = slice(80, None)
+    eta, nu, tau = (torch.tensor(x[rows]) for x in (run.eta, run.nu, run.wrench))
+    errors = []
+    for model in (vehicle(), free.model, tried.model):
+        with torch.no_grad():
+            errors.append(float(np.linalg.norm((model(eta, nu, tau).numpy() - run.nu_dot[rows])[:, :2])))
+    assert errors[1] < 0.3 * errors[0] and errors[2] < 0.5 * errors[0], errors
 
 
 def test_what_is_used_is_what_model_and_snapshot_give_and_what_is_saved(tmp_path):
