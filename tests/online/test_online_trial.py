@@ -47,11 +47,11 @@ def test_noise_alone_seldom_brings_what_it_taught_into_use():
     """The model is right: what is learned is noise, and by Ville's inequality hardly ever seems to be better."""
     moved = []
     for seed in range(3):
-        run = driven(vehicle(), duration=15.0, noise=(0.0, 0.5), seed=seed)
+        run = driven(vehicle(), duration=8.0, noise=(0.0, 0.5), seed=seed)
         adapter = Adapter(vehicle(), {"scheme": "rls", "gain": 0.3, "shape": 0.3}, guards=PROVEN, watch=False)
         before = adapter.snapshot()
         fed(adapter, run)
-        assert adapter.counts.adapted > 100 and float(adapter.weights.read().abs().max()) > 0.0
+        assert adapter.counts.adapted > 50 and float(adapter.weights.read().abs().max()) > 0.0
         moved.append(adapter.counts.proven)
         assert same(adapter.snapshot(), before) == (adapter.counts.proven == 0)
     assert sum(moved) <= 1, moved
