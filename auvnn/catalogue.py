@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import difflib
 import importlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib.metadata import entry_points
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from auvnn.errors import ConfigError
+
+T = TypeVar("T")
 
 
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
@@ -62,3 +64,27 @@ class Catalogue:
         if name in self._others():
             return self._others()[name].load()
         raise ConfigError(unknown_name(self.kind, name, self.names()))
+
+    def build(self, description: str | Mapping[str, Any] | T, base: type[T], key: str, default: str) -> T:
+        """Return a member built from its name or from `{key: name, <options>}`; one that is built already as it is.
+
+        Args:
+            description: what to build.
+            base: what every member is; it states its options by `options()`.
+            key: under which a mapping gives the name.
+            default: the name where it gives none.
+
+        Raises:
+            ConfigError: an unknown member or option, or a value out of range.
+        """
+        if isinstance(description, base):
+            return description
+        options = (
+            {key: description} if isinstance(description, str) else dict(cast(Mapping[str, Any], description))
+        )
+        kind = self.get(str(options.pop(key, default)))
+        known = list(kind().options())
+        for option in options:
+            if option not in known:
+                raise ConfigError(unknown_name(f"option of {self.kind} '{kind.name}'", str(option), known))
+        return kind(**options)

@@ -12,7 +12,7 @@ def _run(job: Job) -> Answering:
 
     study = run_study({key: job[key] for key in TAKEN}, progress=job.say.progress)
     study.model.save(job.folder / "model")
-    study.write(job.folder)
+    study.write(job.folder, report=bool(job["report"]))
     data = study.to_dict()
     for words in data["assumed"]:
         job.say(f"assumed   {words}")

@@ -247,6 +247,7 @@ def _metrics(adapter: Adapter, updates: list[Update], frozen: list[dict[str, Any
         "updates_reverted": counts.reverted,
         "updates_validated": counts.validated,
         "sudden_changes_believed": counts.believed,
+        "proven_on_trial": counts.proven,
         "changes_seen": len(adapter.changes),
     }
     compared = [u for u in updates if u.prediction_error is not None and u.unadapted_error is not None]

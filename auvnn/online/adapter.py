@@ -24,6 +24,7 @@ from auvnn.online.noise import Gate, NoiseLevel
 from auvnn.online.residual import Predictor, Residual, Sample
 from auvnn.online.schemes.base import Lesson, OnlineScheme, anchors, build_online_scheme
 from auvnn.online.shadow import Shadow
+from auvnn.online.trial import Trial
 from auvnn.online.weights import Weights
 
 # Scales of subnetworks that an adapter adds itself: of velocity, and of acceleration for the force.
@@ -48,6 +49,7 @@ class Update:
         force_change: (6,) change of the damping at this velocity, N and N m, or None.
         reverted: whether an update was taken back.
         validated: whether the weights became the validated ones.
+        proven: degrees of freedom whose learned weights came into use (with `guards.proof`).
         believed: whether a sudden residual was accepted as a change of the vehicle.
     """
 
@@ -62,6 +64,7 @@ class Update:
     force_change: Tensor | None = None
     reverted: bool = False
     validated: bool = False
+    proven: int = 0
     believed: bool = False
 
 
@@ -75,6 +78,7 @@ class Counts:
     reverted: int = 0
     validated: int = 0
     believed: int = 0
+    proven: int = 0
     skipped: dict[str, int] = field(default_factory=lambda: dict.fromkeys(REASONS, 0))
 
 
@@ -130,6 +134,7 @@ class Adapter:
         self._gate = Gate(self.guards.gate, self.guards.gate_floor, self.guards.persist)
         self._shadow = Shadow(self.weights, self.guards.judge, self.guards.worse)
         self._shadow.close(scheme_state=self.scheme.state())
+        self._trial = Trial(self.weights, self.guards.proof if self.guards.enabled else 0.0)
         self._bounds = Bounds(self.weights, self.guards)
         self._consistency = Consistency()
         self._monitor = Monitor(self._unadapted(), bank.output_scale) if watch else None
@@ -151,10 +156,12 @@ class Adapter:
 
     @property
     def model(self) -> GreyBox:
-        """A copy of the model as it is adapted now, for others to use and keep."""
+        """A copy of the model as it is adapted now, for others to use and keep; with `guards.proof`, what is proven."""
         found = copy.deepcopy(self._model)
         for parameter in found.parameters():
             parameter.grad = None
+        if self._trial.on and found.damping is not None:
+            Weights(found.damping, self.weights.layers).write(self._trial.used)
         return found
 
     @property
@@ -166,8 +173,8 @@ class Adapter:
         return found
 
     def snapshot(self) -> dict[str, Tensor]:
-        """Return the subnetworks' parameters as they are now, by name, for `frozen_errors`."""
-        bank = self._model.damping
+        """Return the subnetworks' parameters in use now, by name, for `frozen_errors`."""
+        bank = self._trial.bank if self._trial.on else self._model.damping
         assert bank is not None
         return {name: p.detach().clone() for name, p in bank.named_parameters()}
 
@@ -324,6 +331,9 @@ class Adapter:
             self._held = [*self._held[-MOST_HELD:], (found.sample, found.nu, missing)]
             return self._no(sample.t, "gated", **told)
         self._noise.add(error)
+        proven = self._trial.take(self.weights, target, found.nu, error, lesson.variance)
+        self.counts.proven += proven
+        told["proven"] = proven
         held_back, self._held = self._held, []
         if believed and self._monitor is not None:
             for row in held_back:

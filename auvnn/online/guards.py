@@ -46,6 +46,8 @@ class Guards:
         settle: samples from which the noise is estimated before anything is learned.
         judge: updates are judged against the last validated weights over this many seconds.
         worse: mean relative disadvantage in squared error (from -1 to 1) that takes an update back.
+        proof: logarithm of the odds that learned weights must show, by predicting samples that they have not learned
+            from better than those in use, before they are used; 0: at once. See `Trial`.
         bound: no weight leaves its start by more than this many times its row's size.
         output_bound: the damping stays below this many times the force scale.
         rate: change of the damping per second, in the force scale, where the vehicle is.
@@ -66,6 +68,7 @@ class Guards:
     settle: int = 10
     judge: float = 1.0
     worse: float = 0.05
+    proof: float = 0.0
     bound: float = 20.0
     output_bound: float = 50.0
     rate: float = 50.0

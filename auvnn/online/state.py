@@ -66,11 +66,15 @@ def restore(folder: str | Path, *, validated: bool = False) -> Adapter:
         plain = json.loads(files[PLAIN])
         watched = plain["monitor"]
         adapter = Adapter(
-            from_contents(files, path), plain["scheme"], guards=Guards(**plain["guards"]), watch=False
+            from_contents(files, path),
+            plain["scheme"],
+            guards=Guards(**plain["guards"]),
+            watch=False,
         )
         adapter._original.bank.load_state_dict(_part(tensors, "original"))
         adapter.scheme.load(_part(tensors, "scheme"))
         adapter._shadow.load(_part(tensors, "shadow"))
+        adapter._trial.load(_part(tensors, "trial"))
         adapter._noise.load(_part(tensors, "noise"))
         adapter._bounds.load(_part(tensors, "bounds"), adapter.weights)
         adapter._gate.load(plain["gate"])
@@ -127,6 +131,7 @@ def _tensors(adapter: Adapter) -> dict[str, Tensor]:
         "original": copy.deepcopy(adapter._original.bank).state_dict(),
         "scheme": adapter.scheme.state(),
         "shadow": adapter._shadow.state(),
+        "trial": adapter._trial.state(),
         "noise": adapter._noise.state(),
         "bounds": adapter._bounds.state(),
         "consistency": adapter._consistency.state(),

@@ -12,7 +12,6 @@ from typing import Any, Literal
 import torch
 from torch import Tensor
 
-from auvnn.catalogue import unknown_name
 from auvnn.damping.bank import DampingBank
 from auvnn.damping.region import Region
 from auvnn.errors import ConfigError
@@ -59,15 +58,7 @@ def build_scheme(description: str | Mapping[str, Any] | Scheme) -> Scheme:
     Raises:
         ConfigError: an unknown scheme or option, or a value out of range.
     """
-    if isinstance(description, Scheme):
-        return description
-    options = {"scheme": description} if isinstance(description, str) else dict(description)
-    kind = SCHEMES.get(str(options.pop("scheme", "levenberg_marquardt")))
-    known = list(kind().options())
-    for option in options:
-        if option not in known:
-            raise ConfigError(unknown_name(f"option of training scheme '{kind.name}'", str(option), known))
-    return kind(**options)
+    return SCHEMES.build(description, Scheme, "scheme", "levenberg_marquardt")
 
 
 def fit_damping(

@@ -25,7 +25,9 @@ from auvnn.physics.attitude import quat_to_matrix
 from auvnn.physics.products import matvec
 from auvnn.training.fit_damping import fit_damping
 from auvnn.training.joint_least_squares import fit_jointly
+from auvnn.training.least_squares import REASONS, LeastSquares, Rules
 from auvnn.training.problem import DampingProblem
+from auvnn.training.shared_network import SharedProblems
 
 
 @dataclass(frozen=True)
@@ -121,9 +123,9 @@ def fit_structure(
 ) -> StructureFit:
     """Fit what a structure learns to a log with measured accelerations; the model is changed in place.
 
-    Damping banks are fitted by `fit_damping` to equation 14. One network with several outputs, and the networks
-    of figure 3, are joint least-squares problems: `fit_jointly` from several starting points, the best of which is
-    kept.
+    Damping banks are fitted by `fit_damping` to equation 14, one network with several outputs by the same iteration
+    with a shared hidden layer (`SharedProblems`). The networks of figure 3 are joint least-squares problems:
+    `fit_jointly` from several starting points, the best of which is kept.
 
     Args:
         model: a structure.
@@ -152,7 +154,8 @@ def fit_structure(
         details = {"iterations": fit.iterations, "relative_rmse_of_wrench": list(fit.relative_rmse),
                    "warnings": list(fit.warnings)}  # fmt: skip
     else:
-        stopped = _fit_joint(model, bare, data, spread, seed, restarts, max_iterations, progress)
+        fit_it = _fit_shared if isinstance(model, Parallel | OneNetwork) else _fit_joint
+        stopped = fit_it(model, bare, data, spread, seed, restarts, max_iterations, progress)
     error = (data.predicted(model) - data.nu_dot).square().mean(0).sqrt()
     count = sum(p.numel() for p in learned_parameters(model))
     return StructureFit(
@@ -211,6 +214,46 @@ def _fit_joint(
     return best[2]
 
 
+def _fit_shared(
+    model: GreyBox,
+    bare: GreyBox,
+    data: OneStepData,
+    spread: Tensor,
+    seed: int,
+    restarts: int,
+    max_iterations: int,
+    progress: Callable[[str], None] | None,
+) -> str:
+    """Fit one network with several outputs as the six are fitted: starts side by side, the output layer solved for."""
+    assert isinstance(model, Parallel | OneNetwork)
+    if isinstance(model, Parallel):
+        wrench = data.thrust @ model.actuators.allocation.mT
+        x, y = model.features(data.nu, wrench, data.rotation), data.nu_dot - data.predicted(bare)
+    else:
+        x, y = velocity_features(data.nu), data.damping_wrench(bare)
+    network = cast(Networks, next(iter(model.learned.values())))
+    generator = torch.Generator().manual_seed(1000 * seed)
+    network.fit_to_data(x, y, generator)
+    scale = y.std(0).clamp_min(1e-12)
+    rules = Rules(max(1, restarts), 20, max_iterations, 1e-3, 20, 30, 0.3, None)
+    problems = SharedProblems(x / network.input_scale, y / scale, network.hidden)
+    solver = LeastSquares(problems, None, torch.ones(1, dtype=torch.float64), rules, None, generator)
+    while solver.running:
+        solver.step()
+        if progress is not None and solver.iteration % 50 == 0:
+            error = float(solver.best()[2]) ** 0.5
+            progress(f"{model.structure}, iteration {solver.iteration}: relative error {error:.3g}")
+    theta, beta, _, _ = solver.best()
+    layer = beta.view(network.outputs, network.hidden + 1) * (scale / network.output_scale)[:, None]
+    hidden = theta.view(network.hidden, -1)
+    with torch.no_grad():
+        network.hidden_weight.copy_(hidden[:, :-1])
+        network.hidden_bias.copy_(hidden[:, -1])
+        network.output_weight.copy_(layer[:, :-1])
+        network.output_bias.copy_(layer[:, -1])
+    return REASONS[solver.reasons()[0]]
+
+
 class _Whole(nn.Module):
     """A model's acceleration as a function of what changes from sample to sample."""
 
@@ -227,15 +270,6 @@ def _task(
     model: Structure, bare: GreyBox, data: OneStepData, spread: Tensor, generator: torch.Generator
 ) -> tuple[nn.Module, tuple[Tensor, ...], Tensor, Tensor]:
     """Return what is fitted, its inputs, targets and scales, from a fresh starting point."""
-    if isinstance(model, Parallel | OneNetwork):
-        if isinstance(model, Parallel):
-            wrench = data.thrust @ model.actuators.allocation.mT
-            x, y = model.features(data.nu, wrench, data.rotation), data.nu_dot - data.predicted(bare)
-        else:
-            x, y = velocity_features(data.nu), data.damping_wrench(bare)
-        network = cast(Networks, next(iter(model.learned.values())))
-        network.fit_to_data(x, y, generator)
-        return network, (x,), y, y.std(0).clamp_min(1e-12)
     if isinstance(model, Separate):
         wrench = data.damping_wrench(bare)
         if "velocity" in model.learned:

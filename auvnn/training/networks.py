@@ -89,7 +89,7 @@ class NetworkProblems:
         self.inner_size = hidden * (p + 1)
         self.outer_size = hidden + (0 if zero_at_rest else 1)
         self._pairs = torch.triu_indices(p + 1, p + 1)
-        self._units = torch.triu_indices(hidden, hidden)
+        self._pairs_of_units = torch.triu_indices(hidden, hidden)
         small = samples * self._pairs.shape[1] * inputs.element_size() <= KEPT_BYTES
         self._squares = self.x[:, self._pairs[0]] * self.x[:, self._pairs[1]] if small else None
 
@@ -177,7 +177,7 @@ class NetworkProblems:
     def normal(self, theta: Tensor, beta: Tensor, member: Tensor) -> Normal:
         """Return the normal equations at (theta, beta); see the head of this file."""
         count, h, p = len(theta), self.hidden, self.x.shape[1]
-        first, second = self._units
+        first, second = self._pairs_of_units
         left, right = self._pairs
         squares = theta.new_zeros(count * len(first), len(left))
         mixed = theta.new_zeros(count * h * (h + 2), p)

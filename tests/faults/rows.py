@@ -87,9 +87,17 @@ ROWS = {
     101: "a kill while saving",
     102: "a training resumed with other data or options",
     103: "reports of hostile names, very many points, or missing parts",
+    106: "messages that are late, repeated, out of order or not numbers, while it adapts",
+    107: "no excitation while it adapts",
+    108: "a sensor fault that looks like a missing effect",
+    109: "parameters that jump or diverge",
+    110: "an update that makes the prediction worse",
+    111: "an update that takes too long",
+    112: "power lost while the state is written",
 }
 
 _CSV, _PARQUET = "tests/logs/test_logs_csv.py", "tests/logs/test_logs_parquet.py"
+_ONLINE = "tests/online/test_online_faults.py"
 _PAGES = "tests/report/test_report_pages.py"
 _ADD, _DIAGNOSE = "tests/diagnosis/test_diagnosis_add.py", "tests/diagnosis/test_diagnosis_diagnose.py"
 _RESUME, _GRADIENT = "tests/training/test_resume.py", "tests/training/test_gradient_schemes.py"
@@ -182,5 +190,35 @@ ELSEWHERE = {
         f"{_PAGES}::test_a_million_samples_are_drawn_within_ten_seconds",
         f"{_PAGES}::test_whatever_is_missing_costs_only_its_own_place",
         f"{_PAGES}::test_a_figure_that_cannot_be_rendered_leaves_a_note",
+    ],
+    106: [
+        f"{_ONLINE}::test_row_106_bad_messages_hold_the_model_and_are_counted",
+        f"{_ONLINE}::test_row_106_a_gap_is_not_bridged_by_an_increment",
+    ],
+    107: [
+        f"{_ONLINE}::test_row_107_an_hour_at_rest_moves_nothing",
+        f"{_ONLINE}::test_row_107_forgetting_does_not_wind_up",
+    ],
+    108: [
+        f"{_ONLINE}::test_row_108_a_spike_is_not_learned_and_a_lasting_change_is",
+        f"{_ONLINE}::test_row_108_a_gyro_that_contradicts_the_attitude_is_not_learned",
+        f"{_ONLINE}::test_row_108_a_flagged_fault_switches_adaptation_off_for_a_while",
+    ],
+    109: [
+        f"{_ONLINE}::test_row_109_wild_proposals_never_leave_the_set",
+        f"{_ONLINE}::test_row_109_drag_never_begins_to_add_energy",
+    ],
+    110: [
+        f"{_ONLINE}::test_row_110_an_update_that_makes_the_prediction_worse_is_taken_back",
+        f"{_ONLINE}::test_row_110_a_good_update_is_validated",
+    ],
+    111: [
+        f"{_ONLINE}::test_row_111_overruns_are_paid_back_by_skipping",
+        f"{_ONLINE}::test_row_111_memory_does_not_grow",
+    ],
+    112: [
+        f"{_ONLINE}::test_row_112_power_loss_leaves_the_old_state",
+        f"{_ONLINE}::test_row_112_a_damaged_state_is_refused",
+        f"{_ONLINE}::test_row_112_a_restart_may_begin_from_the_validated_weights",
     ],
 }

@@ -69,7 +69,7 @@ def test_every_test_of_this_folder_can_fail():
 
 
 def test_the_list_is_the_one_that_was_asked_for():
-    """Files as far as they are CSV or Parquet, time, signals, options, physics and numbers, models on disk."""
+    """Files as far as they are CSV or Parquet, time, signals, options, physics, numbers, models on disk, adaptation."""
     asked = {*range(1, 8), 14, *range(19, 25), *range(26, 29), *range(32, 36), 37, *range(40, 73)}
-    asked |= {*range(79, 96), *range(97, 104)}
+    asked |= {*range(79, 96), *range(97, 104), *range(106, 113)}
     assert set(ROWS) == asked

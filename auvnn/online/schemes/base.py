@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
-from auvnn.catalogue import unknown_name
 from auvnn.errors import ConfigError
 from auvnn.online.schemes import ONLINE_SCHEMES
 from auvnn.online.weights import Weights
@@ -79,15 +78,7 @@ def build_online_scheme(description: str | Mapping[str, Any] | OnlineScheme) -> 
     Raises:
         ConfigError: an unknown scheme or option, or a value out of range.
     """
-    if isinstance(description, OnlineScheme):
-        return description
-    options = {"scheme": description} if isinstance(description, str) else dict(description)
-    kind = ONLINE_SCHEMES.get(str(options.pop("scheme", "rls")))
-    known = list(kind().options())
-    for option in options:
-        if option not in known:
-            raise ConfigError(unknown_name(f"option of online scheme '{kind.name}'", str(option), known))
-    return kind(**options)
+    return ONLINE_SCHEMES.build(description, OnlineScheme, "scheme", "rls")
 
 
 def number(value: Any, name: str, low: float, high: float) -> float:

@@ -64,8 +64,8 @@ class AdaptationPage(Page):
                 "prediction_error",
                 "Prediction error of the acceleration, with and without adaptation",
                 lambda: _one_step(view),
-                "Before each sample is learned from. Following every residual makes this small by itself: the "
-                "next figure shows what was learned of the vehicle.",
+                "Before each sample is learned from; grey lines part runs. Following every residual makes this small "
+                "by itself: the next figure shows what was learned of the vehicle.",
             ),
             Plot(
                 "frozen_error",
@@ -171,7 +171,10 @@ def _drawn(view: View, key: str, adapted: str, unadapted: str, names: Any) -> Fi
     runs, offsets, changes = _joined(view, key)
     t = [np.asarray(h["t"], dtype=float) + offsets.get(h.get("run"), 0.0) for h in runs]
     values = [np.concatenate([_table(h[n]) for h in runs]) if runs else [] for n in (adapted, unadapted)]
-    return with_and_without(np.concatenate(t) if t else [], *values, names=names, changes=changes)
+    return with_and_without(
+        np.concatenate(t) if t else [], *values, names=names, changes=changes,
+        lengths=[len(part) for part in t],
+    )  # fmt: skip
 
 
 def _one_step(view: View) -> Figure:

@@ -10,7 +10,7 @@ from auvnn.report.page import Page, Plot
 from auvnn.report.plots.identifiability import identifiability
 from auvnn.report.plots.swallowed import swallowed
 from auvnn.report.view import View
-from auvnn.report.words import number, percent
+from auvnn.report.words import finite, number, percent
 
 
 class UncertaintiesPage(Page):
@@ -28,7 +28,23 @@ class UncertaintiesPage(Page):
 
     def brief(self, view: View) -> list[str]:
         """Return the verdict in plain words."""
-        return [f"{line.rstrip('.')}." for line in view.texts("story")]
+        together, beside, swallow = [], [], []
+        for name, one in _manoeuvres(view).items():
+            rows = one.get("parameters") or []
+            known = sum(p.get("verdict") == "identified" for p in rows)
+            together.append(f"{name} {known} of {len(rows)}")
+            free = [p for p in rows if p.get("verdict_with_networks") is not None]
+            left = sum(p["verdict_with_networks"] == "identified" for p in free)
+            beside += [f"{name} {left} of {len(free)}"] if free else []
+            shares = [finite(s.get("share")) for s in (one.get("swallowed") or {}).values()]
+            most = max((s for s in shares if s is not None), default=None)
+            swallow += [] if most is None else [f"{name} {percent(most)}"]
+        out = [f"Parameters identified with all uncertain at once: {', '.join(together)}."]
+        if beside:
+            out.append(f"Beside networks as damping, of those that are not damping: {', '.join(beside)}.")
+        if swallow:
+            out.append(f"Most that networks of the velocity swallow of an effect: {', '.join(swallow)}.")
+        return out
 
     def plots(self, view: View) -> list[Plot]:
         """Return the figures."""
@@ -86,7 +102,7 @@ class UncertaintiesPage(Page):
         return [
             Table("Standard error over that beforehand", head, rows),
             Table(
-                "What each group's information is its own",
+                "How much of each group's information is its own",
                 ["manoeuvre", "group", "own", *(f"like {n}" for n in names)],
                 groups,
                 "Own: left after the other two groups are projected out. Like: what the other group alone imitates.",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,9 @@ from auvnn.report.decimate import LIMIT, decimate
 from auvnn.report.panels import NoData, six_panels
 from auvnn.report.words import label
 
+# Of the largest error: what lies lower is not shown.
+DECADES = 1e-5
+
 
 @style.styled
 def with_and_without(
@@ -23,6 +27,7 @@ def with_and_without(
     *,
     names: Sequence[tuple[str, str]],
     changes: Sequence[tuple[float, str]] = (),
+    lengths: Sequence[int] = (),
 ) -> Figure:
     """Draw a root mean square error of six channels over time, with adaptation and without.
 
@@ -32,6 +37,7 @@ def with_and_without(
         unadapted: (N, 6).
         names: symbol and unit of each channel.
         changes: time and kind of the changes that were seen.
+        lengths: rows of each run, where there are several: no line is drawn from one to the next.
 
     Raises:
         NoData: there is nothing to compare.
@@ -40,6 +46,7 @@ def with_and_without(
     both = [np.asarray(v, dtype=float).reshape(-1, 6) for v in (adapted, unadapted)]
     if not t.size or not any(np.isfinite(v).any() for v in both):
         raise NoData("no sample could be compared with the model")
+    edges = np.cumsum([0, *lengths]) if lengths else np.array([0, t.size])
     figure, axes = six_panels(4.8)
     for i, ax in enumerate(axes):
         drawn = []
@@ -49,14 +56,19 @@ def with_and_without(
             y = values[:, i]
             if np.isfinite(y).any():
                 drawn.append(y[np.isfinite(y)])
-                ax.plot(*decimate(t, y, LIMIT), color=look.color, ls=look.dashes, lw=look.width, label=name)
+                ink = {"color": look.color, "ls": look.dashes, "lw": look.width}
+                for first, last in pairwise(edges):
+                    words = {"label": name} if first == 0 else {}
+                    ax.plot(*decimate(t[first:last], y[first:last], LIMIT), **ink, **words)
         if drawn:
             found = np.concatenate(drawn)
             found = found[found > 0]
             if found.size and found.max() > 100 * np.quantile(found, 0.1):
                 ax.set_yscale("log")
-                # A few samples that happen to fit exactly must not stretch the axis over many decades.
-                ax.set_ylim(bottom=float(np.quantile(found, 0.01)) / 1.5)
+                # Samples that happen to fit exactly must not stretch the axis over many decades.
+                ax.set_ylim(bottom=max(float(np.quantile(found, 0.01)) / 1.5, DECADES * float(found.max())))
+        for edge in edges[1:-1]:
+            ax.axvline(t[edge], color=style.FAINT, lw=0.6)
         _mark(ax, changes, words=i in (0, 3))
         ax.set_ylabel(style.axis_label(*names[i]))
         style.show_grid(ax)

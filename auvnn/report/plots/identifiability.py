@@ -51,8 +51,7 @@ def identifiability(manoeuvres: Mapping[str, Sequence[Mapping[str, Any]]], known
         ax.set_xlim(LEAST * 0.7, 1.6)
         ax.set_title(label(name, 20))
         ax.grid(axis="y")
-    middle = grid[len(grid) // 2]
-    middle.set_xlabel("standard error over that before the manoeuvre (1)")
+    figure.supxlabel("standard error over that before the manoeuvre (1)", fontsize=9)
     grid[0].set_yticks(where, [f"{label(str(r['effect']), 20)} {r['parameter']}" for r in rows])
     grid[0].set_ylim(len(rows) - 0.4, -0.6)
     figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=len(handles))

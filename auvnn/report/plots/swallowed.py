@@ -33,7 +33,9 @@ def swallowed(shares: Mapping[str, Mapping[str, float | None]], *, cmap: str = "
         [[np.nan if finite(shares[m].get(e)) is None else shares[m][e] for m in manoeuvres] for e in effects],
         dtype=float,
     )
-    figure = style.new_figure(min(style.PAGE, 2.3 + 0.62 * len(manoeuvres)), 1.4 + 0.32 * len(effects))
+    figure = style.new_figure(
+        min(style.PAGE, 2.3 + 0.62 * len(manoeuvres)), max(1.4 + 0.32 * len(effects), 2.8)
+    )
     ax = figure.subplots()
     mesh = ax.pcolormesh(
         np.ma.masked_invalid(table), vmin=0, vmax=1, cmap=cmap, edgecolors="white", linewidth=0.5

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -54,8 +55,8 @@ def adapted(
     options = dict(described)
     if "scheme" not in options:
         raise ConfigError(f"case.online: {described} names no scheme; choose sgd, replay or rls")
-    guards = options.pop("guards", "full")
-    adapter = Adapter(copy.deepcopy(model).requires_grad_(True), options, guards=guards)
+    how = {name: options.pop(name) for name in ("guards",) if name in options}
+    adapter = Adapter(copy.deepcopy(model).requires_grad_(True), options, watch=False, **how)
     snapshots = []
     assert run.position is not None and run.nu_dot is not None and run.command is not None
     for k in range(run.samples):
@@ -89,27 +90,37 @@ def tracked(
         jump: matrix (6, 6) by which the velocity is multiplied at the change, known to both.
     """
     assert run.position is not None and run.command is not None
-    single = isinstance(snapshots, Mapping)
     now = copy.deepcopy(model).requires_grad_(False)
     later = None if change is None else copy.deepcopy(change.model).requires_grad_(False)
     eta = torch.tensor(np.concatenate([run.position[0], run.quaternion[0]]))
     nu = torch.tensor(run.nu[0])
     times, command = torch.tensor(run.t), torch.tensor(run.command)
-    out = [nu]
-    for k in range(run.samples - 1):
-        if change is not None and later is not None and k == change.row:
+    out = [nu[None]]
+    cut = None if change is None else change.row
+    for first, last in _stretches(snapshots, run.samples, cut):
+        if later is not None and first == cut:
             now = later
             nu = nu if jump is None else torch.tensor(jump) @ nu
-            out[-1] = nu
-        if k == 0 or not single or (change is not None and k == change.row):
-            own = snapshots if isinstance(snapshots, Mapping) else snapshots[k]
-            _load(now, own)
-        rows = slice(k, k + 2)
+            out[-1] = torch.cat([out[-1][:-1], nu[None]])
+        _load(now, snapshots if isinstance(snapshots, Mapping) else snapshots[first])
+        rows = slice(first, last + 1)
         with torch.no_grad():
             run_on = now.rollout(eta, nu, command[rows], times[rows], max_step=step)
         eta, nu = run_on.eta[-1], run_on.nu[-1]
-        out.append(nu)
-    return torch.stack(out).numpy()
+        out.append(run_on.nu[1:])
+    return torch.cat(out).numpy()
+
+
+def _stretches(
+    snapshots: Sequence[Snapshot] | Snapshot, samples: int, cut: int | None
+) -> list[tuple[int, int]]:
+    """Return first and last rows of the stretches over which neither weights nor physics change."""
+    starts = {0} if cut is None else {0, cut}
+    if not isinstance(snapshots, Mapping):
+        pairs = pairwise(snapshots)
+        starts |= {k + 1 for k, (a, b) in enumerate(pairs) if any(not torch.equal(a[n], b[n]) for n in a)}
+    edges = [*sorted(k for k in starts if k < samples - 1), samples - 1]
+    return list(pairwise(edges))
 
 
 def _load(model: GreyBox, snapshot: Snapshot) -> None:

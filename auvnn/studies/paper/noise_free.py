@@ -17,12 +17,13 @@ from auvnn.models.structures.base import parameter_count
 from auvnn.studies.paper.answer import Study
 from auvnn.studies.paper.curves import damping_curves_of
 from auvnn.studies.paper.options import Options
-from auvnn.studies.paper.plant import by_axis, free_run, load_plant, manoeuvre_log, over_range, rich_log
+from auvnn.studies.paper.plant import by_axis, free_runs, load_plant, manoeuvre_log, over_range, rich_log
 from auvnn.training.fit_structure import StructureFit, fit_structure
 
 Array = np.ndarray
 # Seeds of what is held out, far from those of what is fitted.
 HELD_OUT_SEED = 100_000
+HELD_OUT = ("multisine", "manoeuvre")
 # Structures under a name of their own: with options that make them something else.
 VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
     "one_network": ("damping", {"networks": "one"}),
@@ -44,7 +45,9 @@ def noise_free(options: Options, progress: Callable[[str], None]) -> Study:
     known = build_structure("known", plant.vehicle, actuation="wrench")
     model, fit = six_networks(plant, options, log)
     progress(f"six networks on the paper's manoeuvre: {fit.stopped}")
-    drawn, zero = free_run(model, run, options.step), free_run(known, run, options.step)
+    held = _held_out(plant, options, run)
+    moved = {name: free_runs(m, held, options.step) for name, m in (("manoeuvre", model), ("known", known))}
+    drawn, zero = moved["manoeuvre"]["manoeuvre"], moved["known"]["manoeuvre"]
     metrics: dict[str, Any] = {
         **by_axis("manoeuvre_rmse_over_range", over_range(drawn, run.nu)),
         **by_axis("manoeuvre_zero_damping_rmse_over_range", over_range(zero, run.nu)),
@@ -62,44 +65,47 @@ def noise_free(options: Options, progress: Callable[[str], None]) -> Study:
             "model without damping. The first two lie on top of each other, as in the paper.",
         }
     ]  # fmt: skip
-    held = _held_out(plant, options, run)
     rich = rich_log(plant, options, case["rich"], seed=options.seed)
     table: list[dict[str, Any]] = []
-    wide, wide_fit = six_networks(plant, options, rich, case["rich"].get("restarts"))
+    wide, wide_fit = six_networks(plant, options, rich, _hunt(case["rich"].get("hunt")))
     progress(f"six networks on the rich manoeuvre: {wide_fit.stopped}")
-    for name, found in (("manoeuvre", model), ("rich", wide)):
-        for where, error in _errors(found, held, options).items():
+    moved["rich"] = free_runs(wide, held, options.step)
+    for name in ("manoeuvre", "rich"):
+        for where, error in _errors(moved[name], held).items():
             metrics |= by_axis(f"{name}_trained_held_out_{where}_rmse_over_range", error)
     metrics["held_out_rmse_over_range_worst"] = max(
         metrics[f"rich_trained_held_out_{where}_rmse_over_range_worst"] for where in held
     )
     metrics["rich_relative_residual"] = _residual(wide_fit)
+    metrics["rich_training_s"] = wide_fit.seconds
     if case.get("larger"):
-        large, large_fit = six_networks(
-            plant, options, rich, case["rich"].get("restarts"), hidden=int(case["larger"])
-        )
+        size = int(case["larger"])
+        large, large_fit = six_networks(plant, options, rich, _hunt(case.get("larger_hunt")), hidden=size)
         metrics["larger_hidden_units"] = int(case["larger"])
         metrics["larger_parameters"] = large_fit.parameters
         metrics["larger_relative_residual"] = _residual(large_fit)
-        worst = [by_axis("x", e)["x_worst"] for e in _errors(large, held, options).values()]
-        metrics["larger_held_out_rmse_over_range_worst"] = max(worst)
+        for where, error in _errors(free_runs(large, held, options.step), held).items():
+            metrics[f"larger_held_out_{where}_rmse_over_range_worst"] = float(error.max())
+        metrics["larger_held_out_rmse_over_range_worst"] = max(
+            metrics[f"larger_held_out_{where}_rmse_over_range_worst"] for where in held
+        )
         progress(f"{case['larger']} hidden units: {large_fit.stopped}")
     if case.get("best_of"):
         metrics |= _best_of(
             plant, options, rich, int(case["best_of"]), metrics["rich_relative_residual"], progress
         )
     for data, words in ((rich, "rich"), (log, "manoeuvre")):
-        table += _compare(
-            plant, options, data, words, held, {"rich": wide, "manoeuvre": model}[words], progress
-        )
+        ours = {"damping": (wide, wide_fit) if words == "rich" else (model, fit)}
+        done = {"damping": moved[words], "known": moved["known"]}
+        table += _compare(plant, options, data, words, held, ours, done, progress)
     metrics |= _ratios(table)
-    first = next(iter(held.values()))
+    first = held["multisine"]
     figures += [
         {
             "name": "held_out", "kind": "velocity", "t": first.t,
             "lines": {
-                "plant": first.nu, "trained on rich data": free_run(wide, first, options.step),
-                "trained on the paper's manoeuvre": free_run(model, first, options.step),
+                "plant": first.nu, "trained on rich data": moved["rich"]["multisine"],
+                "trained on the paper's manoeuvre": moved["manoeuvre"]["multisine"],
             },
             "title": "A manoeuvre that nothing was trained on",
             "caption": "Agreement on the training manoeuvre does not show that the damping was identified: the paper's "
@@ -129,31 +135,48 @@ def six_networks(
     plant: GreyBox,
     options: Options,
     log: Log,
-    restarts: int | None = None,
+    hunt: Mapping[str, Any] | None = None,
     hidden: int | None = None,
     **how: Any,
 ) -> tuple[GreyBox, StructureFit]:
-    """Return the six networks of `options.damping` in the known model, trained on a log, and how that went."""
+    """Return the six networks of `options.damping` in the known model, trained on a log, and how that went.
+
+    Args:
+        plant: gives the known part.
+        options: the form of the networks and the scheme.
+        log: what they are trained on.
+        hunt: options of Levenberg-Marquardt that replace the scheme's, where local minima matter.
+        hidden: units in the place of those of `options.damping`.
+        **how: to `fit_structure`.
+    """
     known = build_structure("known", plant.vehicle, actuation="wrench")
     form = dict(options.damping) if hidden is None else {**options.damping, "hidden": hidden}
     bank = DampingBank.from_description(form, options.seed)
     model = GreyBox(known.vehicle, (), bank, "wrench")
     scheme = dict(options.scheme)
-    if restarts is not None and "restarts" in scheme:
-        scheme |= {"restarts": int(restarts), "halve_every": max(int(scheme.get("halve_every", 20)), 40)}
+    if scheme.get("scheme") == "levenberg_marquardt":
+        scheme |= dict(hunt or {})
     fit = fit_structure(model, log, scheme=scheme, seed=options.seed, **how)
     return model.requires_grad_(False), fit
 
 
 def _held_out(plant: GreyBox, options: Options, run: Run) -> dict[str, Run]:
-    """Return manoeuvres that nothing is trained on; the paper's own is one for networks trained on rich data."""
-    rich = {**options.case["rich"], "runs": 1}
+    """Return manoeuvres that nothing is trained on; the paper's own is one for networks trained on rich data.
+
+    The multisine has the manoeuvre's times, so that models run free on both side by side.
+    """
+    rich = {**options.case["rich"], "runs": 1, "duration": options.duration, "rate": options.rate}
     fresh = rich_log(plant, options, rich, seed=HELD_OUT_SEED + options.seed)
-    return {"multisine": fresh.runs[0], "manoeuvre": run}
+    return dict(zip(HELD_OUT, (fresh.runs[0], run), strict=True))
 
 
-def _errors(model: GreyBox, held: Mapping[str, Run], options: Options) -> dict[str, Array]:
-    return {name: over_range(free_run(model, run, options.step), run.nu) for name, run in held.items()}
+def _hunt(described: Mapping[str, Any] | None) -> dict[str, int]:
+    """Return options of the search for a good optimum as whole numbers."""
+    return {str(k): int(v) for k, v in (described or {}).items()}
+
+
+def _errors(moved: Mapping[str, Array], held: Mapping[str, Run]) -> dict[str, Array]:
+    return {name: over_range(moved[name], run.nu) for name, run in held.items()}
 
 
 def _residual(fit: StructureFit) -> float:
@@ -179,10 +202,14 @@ def _best_of(
 
 
 def _compare(
-    plant: GreyBox, options: Options, data: Log, words: str, held: Mapping[str, Run], six: GreyBox,
+    plant: GreyBox, options: Options, data: Log, words: str, held: Mapping[str, Run],
+    ours: Mapping[str, tuple[GreyBox, StructureFit]], done: Mapping[str, Mapping[str, Array]],
     progress: Callable[[str], None],
 ) -> list[dict[str, Any]]:  # fmt: skip
-    """Return one row for each structure: what it learns, and how far it runs free on manoeuvres held out."""
+    """Return one row for each structure: what it learns, and how far it runs free on manoeuvres held out.
+
+    `ours` are structures that are trained already, `done` those that have run free already.
+    """
     rows = []
     for name in options.case["structures"]:
         structure, given = VARIANTS.get(name, (name, {}))
@@ -190,9 +217,8 @@ def _compare(
             raise ConfigError(
                 f"case.structures: {unknown_name('structure', str(name), [*STRUCTURES.names(), *VARIANTS])}"
             )
-        seconds = 0.0
-        if name == "damping":
-            model = six
+        if name in ours:
+            model, fit = ours[name]
         else:
             model = build_structure(structure, plant.vehicle, actuation="wrench", seed=options.seed, **given)
             limits = {k: int(options.case["joint"][k]) for k in ("restarts", "iterations")}
@@ -200,14 +226,15 @@ def _compare(
                 model, data, seed=options.seed, restarts=limits["restarts"], max_iterations=limits["iterations"],
                 progress=progress,
             )  # fmt: skip
-            seconds = fit.seconds
         row = {
             "structure": name,
             "trained_on": words,
             "parameters": parameter_count(model),
-            "training_s": seconds,
+            "one_step_relative_rmse": float(np.sqrt(np.mean(np.square(fit.relative_rmse)))),
+            "training_s": fit.seconds,
         }
-        for where, error in _errors(model, held, options).items():
+        moved = done.get(name) or free_runs(model, held, options.step)
+        for where, error in _errors(moved, held).items():
             row[f"{where}_rmse_over_range_worst"] = float(error.max())
         rows.append(row)
     return rows
@@ -220,8 +247,14 @@ def _ratios(table: list[dict[str, Any]]) -> dict[str, float]:
     for words in ("rich", "manoeuvre"):
         ours, other = found.get(("damping", words)), found.get(("parallel", words))
         if ours and other:
-            key = "multisine_rmse_over_range_worst"
-            out[f"parallel_over_six_held_out_{words}"] = other[key] / ours[key]
+            out[f"parallel_over_six_one_step_{words}"] = (
+                other["one_step_relative_rmse"] / ours["one_step_relative_rmse"]
+            )
+            for key in HELD_OUT:
+                end = "" if key == "multisine" else f"_on_the_{key}"
+                if (key, words) != ("manoeuvre", "manoeuvre"):
+                    error = f"{key}_rmse_over_range_worst"
+                    out[f"parallel_over_six_held_out_{words}{end}"] = other[error] / ours[error]
     return out
 
 

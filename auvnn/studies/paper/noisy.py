@@ -29,6 +29,7 @@ from auvnn.studies.paper.options import Options, number, word
 from auvnn.studies.paper.plant import (
     by_axis,
     free_run,
+    free_runs,
     load_plant,
     manoeuvre_log,
     over_range,
@@ -161,7 +162,9 @@ def _global(
     nu = torch.tensor(np.concatenate([run.nu for run in held]))
     wrong, true = drag(own, nu) - drag(plant, nu), drag(plant, nu)
     shape = (wrong.square().mean(0) / true.square().mean(0)).sqrt()
-    runs = [over_range(free_run(own, run, options.step), run.nu).max() for run in held]
+    named = {str(i): run for i, run in enumerate(held)}
+    moved = free_runs(own, named, options.step)
+    runs = [over_range(moved[name], run.nu).max() for name, run in named.items()]
     return float(shape.max()), float(np.mean(runs))
 
 

@@ -14,6 +14,7 @@ EFFORTS = ("full", "smoke")
 SMOKE_SCHEME = {"restarts": 1, "max_iterations": 40, "epochs": 40}
 SMOKE_MOST = {
     "duration": 12.0, "rate": 10.0, "runs": 1, "iterations": 8, "restarts": 1, "best_of": 2, "larger": 6, "repeats": 1,
+    "max_iterations": 40,
     "ahead": 2.0, "settle": 1.0,
 }  # fmt: skip
 

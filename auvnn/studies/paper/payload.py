@@ -11,7 +11,7 @@ import torch
 
 from auvnn.errors import ConfigError
 from auvnn.logs import Run
-from auvnn.models import GreyBox, Inputs
+from auvnn.models import GreyBox, Inputs, load
 from auvnn.models.structures.base import without_damping
 from auvnn.physics.attitude import quat_to_matrix
 from auvnn.simulate.noise import Draws, make_noise
@@ -70,9 +70,7 @@ def payload(options: Options, progress: Callable[[str], None]) -> Study:
     plant, case = load_plant(options.model), options.case
     variant = word(case["variant"], "case.variant", VARIANTS)
     _check_time(options)  # before minutes of training
-    training = training_log(plant, options, "none")
-    model, fit = six_networks(plant, options, training)
-    progress(f"six networks on the empty vehicle: {fit.stopped}")
+    model, trained, warned = _offline(plant, options, progress)
     mission = pick_up(plant, options, variant)
     truth, live = mission.truth, mission.live
     known = GreyBox(without_damping(mission.loaded.vehicle), (), model.damping, "wrench")
@@ -88,8 +86,8 @@ def payload(options: Options, progress: Callable[[str], None]) -> Study:
         counts[f"{name}_reverted"] = adapter.counts.reverted
         progress(f"online, {name}: {adapter.counts.adapted} of {adapter.counts.samples} samples learned from")
     metrics: dict[str, Any] = {
-        "training_s": fit.seconds,
-        "parameters": fit.parameters,
+        **trained,
+        "parameters": sum(p.numel() for p in weights["offline"].values()),
         "mass_ratio": float(mission.loaded.vehicle.mass / plant.vehicle.mass),
         "surge_speed_ratio_at_pick_up": 1.0 if mission.jump is None else float(mission.jump[0, 0]),
         **counts,
@@ -125,12 +123,36 @@ def payload(options: Options, progress: Callable[[str], None]) -> Study:
         metrics[f"{name}_frozen_over_offline"] = metrics[f"{name}_frozen_rmse_over_range_worst"] / base
     before = over_range(tracks["offline"][: mission.row], truth.nu[: mission.row])
     metrics["offline_before_pick_up_rmse_over_range_worst"] = float(before.max())
-    assumed = [*options.assumed(), training_words(options), *_assumed(case, mission)]
+    given = case["offline"].get("model")
+    how = training_words(options) if given is None else f"ours: the networks are those of {given}"
+    assumed = [*options.assumed(), how, *_assumed(case, mission)]
     return Study(
         "payload", plant.vehicle.name, options.to_dict(), assumed,
         metrics, table,
-        _figures(truth, tracks, windows, mission, ahead, late), model, list(fit.details.get("warnings", [])),
+        _figures(truth, tracks, windows, mission, ahead, late), model, warned,
     )  # fmt: skip
+
+
+def _offline(
+    plant: GreyBox, options: Options, progress: Callable[[str], None]
+) -> tuple[GreyBox, dict[str, float], list[str]]:
+    """Return the networks that know the empty vehicle, what their training cost, and its warnings.
+
+    Raises:
+        ConfigError: `case.offline.model` has no damping subnetworks.
+    """
+    given = options.case["offline"].get("model")
+    if given is None:
+        model, fit = six_networks(plant, options, training_log(plant, options, "none"))
+        progress(f"six networks on the empty vehicle: {fit.stopped}")
+        return model, {"training_s": fit.seconds}, list(fit.details.get("warnings", []))
+    bank = load(str(given), actuation="wrench").damping
+    if bank is None:
+        raise ConfigError(
+            f"case.offline.model={given}: has no damping subnetworks; give the model of a study"
+        )
+    model = GreyBox(without_damping(plant.vehicle), (), bank, "wrench").requires_grad_(False)
+    return model, {}, []
 
 
 def pick_up(plant: GreyBox, options: Options, variant: str) -> Mission:

@@ -111,6 +111,31 @@ def free_run(model: GreyBox, run: Run, step: float, *, start: int = 0, end: int 
     return found.nu.numpy()
 
 
+def free_runs(model: GreyBox, runs: Mapping[str, Run], step: float) -> dict[str, Array]:
+    """Return `free_run` of several runs from their start; those with the same times are integrated side by side."""
+    out: dict[str, Array] = {}
+    left = dict(runs)
+    while left:
+        first = next(iter(left.values()))
+        alike = {n: r for n, r in left.items() if np.array_equal(r.t, first.t)}
+        starts, commands = [], []
+        for run in alike.values():
+            assert run.command is not None and run.position is not None
+            starts.append(np.concatenate([run.position[0], run.quaternion[0]]))
+            commands.append(run.command)
+        with torch.no_grad():
+            found = model.rollout(
+                torch.tensor(np.stack(starts)),
+                torch.tensor(np.stack([run.nu[0] for run in alike.values()])),
+                torch.tensor(np.stack(commands)),
+                torch.tensor(first.t),
+                max_step=step,
+            )
+        out |= dict(zip(alike, found.nu.numpy(), strict=True))
+        left = {n: r for n, r in left.items() if n not in alike}
+    return {name: out[name] for name in runs}
+
+
 def over_range(model: Array, plant: Array) -> Array:
     """Return the root mean square of the velocity's error over the range of the plant's velocity, (6,).
 

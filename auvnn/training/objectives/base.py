@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from auvnn.catalogue import unknown_name
-from auvnn.errors import ConfigError
 from auvnn.logs import Log
 from auvnn.models import GreyBox
 from auvnn.training.objectives import OBJECTIVES
@@ -71,12 +69,4 @@ def build_objective(description: str | Mapping[str, Any] | Objective) -> Objecti
     Raises:
         ConfigError: an unknown objective or option, or a value out of range.
     """
-    if isinstance(description, Objective):
-        return description
-    options = {"objective": description} if isinstance(description, str) else dict(description)
-    kind = OBJECTIVES.get(str(options.pop("objective", "one_step")))
-    known = list(kind().options())
-    for option in options:
-        if option not in known:
-            raise ConfigError(unknown_name(f"option of training objective '{kind.name}'", str(option), known))
-    return kind(**options)
+    return OBJECTIVES.build(description, Objective, "objective", "one_step")
