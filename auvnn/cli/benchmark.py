@@ -41,7 +41,12 @@ def _run(job: Job) -> Answering:
     options = {key: job[key] for key in TAKEN} | {"plan": job.options.get("plan")}
     # Not among the answer's files yet: those of a run that is interrupted are taken away.
     journal = job.out / WORK / JOURNAL
-    answer = benchmark(options, progress=job.say.progress, journal=journal, any_code=job["any_code"])
+    try:
+        answer = benchmark(options, progress=job.say.progress, journal=journal, any_code=job["any_code"])
+    except KeyboardInterrupt as end:
+        raise type(end)(
+            "the rows that are done are kept, and the same command goes on with the others"
+        ) from None
     answer.write(job.folder)
     if journal.exists():
         shutil.copyfile(journal, job.folder / JOURNAL)

@@ -71,3 +71,14 @@ def test_one_log_from_the_command_line_to_the_report(auvnn):
     page = Path("out/report.html").read_text(encoding="utf-8")
     assert f"In {line['named_first']} of 1" in page and "could not be drawn" not in page
     assert {"confusion.png", "recovery.svg"} <= {p.name for p in Path("out/figures").iterdir()}
+
+
+def test_whoever_ends_it_is_told_that_it_goes_on(auvnn, monkeypatch):
+    from auvnn.studies import benchmark as study
+
+    def interrupted(case):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(study, "run_case", interrupted)
+    status, out, err = auvnn("benchmark", *TINY, "out=out")
+    assert status == 130 and "the same command goes on" in err and "result" not in out

@@ -223,8 +223,9 @@ def test_rows_keep_the_order_of_the_cases_whichever_ends_first(monkeypatch):
 
 @pytest.fixture(scope="module")
 def small() -> dict[str, Any]:
-    """One log of two runs of 20 s with a medium net buoyancy, all the way."""
-    (case,) = cases(TINY)
+    """One log of two runs of 20 s with a medium net buoyancy, all the way, and a run held out."""
+    more = {"held_out": 1, "ties": True, "candidates": ["constant_force", "net_buoyancy", "thruster_lag"]}
+    (case,) = cases({**TINY, **more})
     return run_case(case)
 
 
@@ -247,3 +248,22 @@ def test_errors_are_relative_to_the_effect_and_in_standard_errors(small):
     # Hidden at ten standard errors of an oracle; whoever knows less cannot be surer, nor miss it by far.
     assert found["std"] > 0.9 * abs(truth) / 10
     assert abs(small["errors"]["force"]["z"]) < 4
+
+
+def test_what_was_found_is_tried_on_a_run_that_was_held_out(small):
+    fall = small["fall"]
+    assert fall["fault"] is None and 0 < fall["true"] < fall["refitted"]
+    if fall["share"] is not None:
+        share = (fall["refitted"] - fall["found"]) / (fall["refitted"] - fall["true"])
+        assert fall["share"] == pytest.approx(share)
+    # Nothing else than what is hidden does better than by its noise.
+    assert fall["found"] > 0.9 * fall["true"]
+
+
+def test_who_could_pass_for_the_hidden_effect_is_worked_out(small):
+    (distances,) = small["imitation"].values()
+    assert list(small["imitation"]) == ["net_buoyancy"]
+    assert set(distances) == {"nothing", "constant_force", "thruster_lag"}
+    # Hidden at ten standard errors of who knows everything else; a rival only helps to explain it away.
+    assert 2 < distances["nothing"] < 10.2
+    assert all(0 <= d <= distances["nothing"] + 1e-9 for d in distances.values())
