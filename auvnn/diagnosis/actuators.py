@@ -62,8 +62,10 @@ class Assignment:
                     at = self.place[at]
                 seen |= set(cycle)
                 turned = [names[c] for c in cycle if self.sign[c] < 0]
-                what = " and ".join(names[c] for c in cycle) if len(cycle) == 2 else " -> ".join(
-                    names[c] for c in [*cycle, cycle[0]]
+                what = (
+                    " and ".join(names[c] for c in cycle)
+                    if len(cycle) == 2
+                    else " -> ".join(names[c] for c in [*cycle, cycle[0]])
                 )
                 out.append(f"{what} are exchanged" + (f" ({', '.join(turned)} reversed)" if turned else ""))
         return out
@@ -115,11 +117,19 @@ class ActuatorCheck:
     def story(self) -> list[str]:
         """The answer in sentences, whatever it is."""
         if len(self.untold) == len(self.names):
-            return ["the log does not move the actuators independently of one another: nothing can be said of them"]
+            return [
+                "the log does not move the actuators independently of one another: nothing can be said of them"
+            ]
         odds = f"confidence {100 * min(self.confidence, 0.999):.3g} %"
-        out = [f"{'; '.join(self.findings)} ({odds})" if self.findings else f"as the model file states them ({odds})"]
+        out = [
+            f"{'; '.join(self.findings)} ({odds})"
+            if self.findings
+            else f"as the model file states them ({odds})"
+        ]
         if self.untold:
-            out.append(f"nothing can be said of {', '.join(self.untold)}: not moved independently of the others")
+            out.append(
+                f"nothing can be said of {', '.join(self.untold)}: not moved independently of the others"
+            )
         out += [f"{' and '.join(pair)} cannot be told from each other" for pair in self.alike]
         return out
 
@@ -177,15 +187,31 @@ def check_actuators(model: GreyBox, log: Log) -> ActuatorCheck:
     least = float(cost.min())
     rivals = np.exp(-0.5 * (cost - least))
     alike = [[names[told[i]], names[told[j]]] for i, j in problem.ties(best, costs)]
-    confidence = float(np.exp(-0.5 * (costs[best] - least)) / (rivals.sum() - sum(
-        rivals[k] for k, a in enumerate(costs) if a != best and costs[a] - least < TIE and problem.same(a, best)
-    )))
+    confidence = float(
+        np.exp(-0.5 * (costs[best] - least))
+        / (
+            rivals.sum()
+            - sum(
+                rivals[k]
+                for k, a in enumerate(costs)
+                if a != best and costs[a] - least < TIE and problem.same(a, best)
+            )
+        )
+    )
     gains[told] = problem.gains(best)
     words = found.words(names)
     dead = [i for i in told if gains[i] < DEAD]
     words += [f"{names[i]} gives {100 * gains[i]:.0f} % of the stated thrust" for i in dead]
     return ActuatorCheck(
-        names, not words, words, confidence, found, gains, untold, alike, float(np.sqrt(problem.distance(best)))
+        names,
+        not words,
+        words,
+        confidence,
+        found,
+        gains,
+        untold,
+        alike,
+        float(np.sqrt(problem.distance(best))),
     )
 
 
@@ -278,7 +304,8 @@ class _Problem:
         gains = self.gains(a)
         gap = self.estimate - self.columns(a) * gains
         return float(
-            np.einsum("di,d,dj,ij->", gap, self.weight, gap, self.gram) + (((gains - GAIN) / SPREAD) ** 2).sum()
+            np.einsum("di,d,dj,ij->", gap, self.weight, gap, self.gram)
+            + (((gains - GAIN) / SPREAD) ** 2).sum()
         )
 
     def search(self) -> tuple[Assignment, dict[Assignment, float]]:

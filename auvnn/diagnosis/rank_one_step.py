@@ -103,7 +103,9 @@ def rank_one_step(
     def predicted(of: GreyBox) -> Array:
         return np.concatenate([accelerations(of, run, how)[1] for run in log.runs])
 
-    measured, base = (np.concatenate(x) for x in zip(*(accelerations(model, r, how) for r in log.runs), strict=True))
+    measured, base = (
+        np.concatenate(x) for x in zip(*(accelerations(model, r, how) for r in log.runs), strict=True)
+    )
     groups = stated(model)
     columns_of = {name: _columns(model, name, predicted, base) for name in groups}
     block, fifth = _parts(log)
@@ -135,7 +137,9 @@ def rank_one_step(
         errors[name] = np.full(len(gap), np.nan)
         errors[name][rows] = before - after
     found.sort(key=lambda r: -r.gain)
-    return [r if r is found[0] else _behind(r, errors[found[0].effect] - errors[r.effect], block) for r in found]
+    return [
+        r if r is found[0] else _behind(r, errors[found[0].effect] - errors[r.effect], block) for r in found
+    ]
 
 
 def _behind(ranked: Ranked, difference: Array, block: NDArray[np.int64]) -> Ranked:

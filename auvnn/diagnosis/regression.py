@@ -83,7 +83,9 @@ def _of_run(model: GreyBox, run: Run, how: Derivative) -> tuple[Array, Array, Ar
     if how.method != "measured":
         smooth = LocalPolynomial(run.t, how.half_width, how.order)
         signals = smooth(integrated(run.t, np.where(np.isfinite(signals), signals, np.nan)))[1]
-    good = np.isfinite(measured - predicted).all(1) & np.isfinite(signals).all(1) & np.isfinite(command).all(1)
+    good = (
+        np.isfinite(measured - predicted).all(1) & np.isfinite(signals).all(1) & np.isfinite(command).all(1)
+    )
     n = thrust.shape[1]
     w, x, y, z = run.quaternion[good].T
     rotation = np.stack(

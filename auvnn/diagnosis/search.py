@@ -140,7 +140,8 @@ class Search:
         unexplained = float(np.clip(after / before, 0.0, 1.0)) if before > 0 else 0.0
         depends = {}
         if verdict == "unknown" or steps[-1]["verdict"] == "unknown":
-            depends = depends_on(last.fitted.model, log, self.windows)
+            self.say("tracing what is left to the measured inputs")
+            depends = depends_on(last, self.windows)
         return Diagnosis(
             model.vehicle.name,
             log.name,

@@ -1,112 +1,79 @@
-"""What nobody can name: on which measured inputs the remaining residual depends."""
+"""What nobody can name: on which measured inputs the remaining residual depends, by degree of freedom."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.locate import AXES
-from auvnn.logs import Log
-from auvnn.metrics.one_step import choose_derivative, one_step
+from auvnn.diagnosis.explain import Explanation, folds, left_out
+from auvnn.diagnosis.input_forces import AXES, InputForces
+from auvnn.diagnosis.left_over import excess
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
+from auvnn.training.prediction_error import Priors, Statistics, answers, reduce
 
 Array = NDArray[np.float64]
-FOLDS = 4
-# Ridge, in units of the standardised features' variance: keeps collinear inputs from trading huge weights.
-RIDGE = 1e-2
-# Explained on held-out data, below which a dependence is not worth a word.
-LEAST = 0.02
+# Share of what is unexplained, below which a dependence is not worth a word; standard errors of its gain, below which
+# it may be chance; and inputs that are told at most.
+LEAST, SURE, MOST = 0.02, 2.0, 8
 
 
-def inputs_of(log: Log) -> dict[str, list[Array]]:
-    """Return the measured inputs that a residual may depend on, each (N,) by run."""
-    found: dict[str, list[Array]] = {}
-    for run in log.runs:
-        columns = {n: run.nu[:, k] for k, n in enumerate("uvwpqr")}
-        for k, n in enumerate(("phi", "theta", "psi")):
-            columns[n] = run.euler[:, k]
-        if run.command is not None:
-            names = (
-                [f"thruster_{i + 1}" for i in range(run.command.shape[1])]
-                if run.thrusters is not None
-                else [f"tau_{a}" for a in AXES]
-            )
-            columns.update({n: run.command[:, i] for i, n in enumerate(names)})
-        if run.position is not None:
-            columns.update({n: run.position[:, k] for k, n in enumerate("xyz")})
-        for n in ("altitude", "voltage"):
-            value = getattr(run, n)
-            if value is not None:
-                columns[n] = value
-        if run.fins is not None:
-            columns.update({f"fin_{i + 1}": run.fins[:, i] for i in range(run.fins.shape[1])})
-        columns["t"] = run.t - run.t[0]
-        for n, x in columns.items():
-            found.setdefault(n, []).append(x)
-    return found
+def depends_on(explanation: Explanation, windows: Windows) -> dict[str, dict[str, float]]:
+    """Return by degree of freedom the share of the unexplained error that each measured input explains.
 
+    Forces that are simple functions of one input each (`InputForces`) are added to free running, the input and the
+    degree of freedom first that gains most on what is left out, then the next beside it, for as long as the gain is
+    beyond its own uncertainty. So of two inputs that go together only the one that says more is told, and smooth
+    residuals in position and attitude count, which no derivative would show.
 
-def _features(name: str, x: Array) -> Array:
-    if name in ("phi", "theta", "psi"):
-        return np.stack([np.sin(x), np.cos(x), np.sin(2 * x), np.cos(2 * x)], axis=1)
-    size = np.nanstd(x)
-    z = x / size if size > 0 else x
-    return np.stack([z, np.abs(z) * z, z * z, np.tanh(2 * z)], axis=1)
+    Args:
+        explanation: what was found; what it leaves is looked at.
+        windows: those it was fitted to.
 
-
-def depends_on(
-    model: GreyBox, log: Log, windows: Windows, derivative: dict | None = None
-) -> dict[str, dict[str, float]]:
-    """Return by degree of freedom the share of the residual's energy that each measured input explains.
-
-    A ridge regression on simple functions of every input is fitted on all folds but one and judged on that
-    one. What it explains there is divided among the inputs by how much the held-out error grows when each
-    one's values are exchanged between samples. Shares below one per cent are left out, and so is a degree of
-    freedom of which the inputs together explain less than two.
-
-    Reference: Breiman (2001), Machine Learning 45, for permutation importance.
+    Returns:
+        degree of freedom to {input: share}, the largest first; empty where nothing measured explains anything.
     """
-    del windows
-    parts = one_step(model, log, choose_derivative(log, derivative))
-    wrench = np.concatenate([p.wrench for p in parts])
-    columns = {n: np.concatenate(x) for n, x in inputs_of(log).items()}
-    columns = {n: x for n, x in columns.items() if np.isfinite(x).any() and np.nanstd(x) > 0}
-    good = np.isfinite(wrench).all(1) & np.all([np.isfinite(x) for x in columns.values()], axis=0)
-    if good.sum() < 200 or not columns:
-        return {axis: {} for axis in AXES}
-    blocks = {n: _features(n, x[good]) for n, x in columns.items()}
-    x = np.concatenate(list(blocks.values()), axis=1)
-    x = (x - x.mean(0)) / np.maximum(x.std(0), 1e-12)
-    y = wrench[good]
-    where, at = {}, 0
-    for n, b in blocks.items():
-        where[n] = slice(at, at + b.shape[1])
-        at += b.shape[1]
-    fold = np.arange(len(y)) * FOLDS // len(y)
-    shuffle = np.random.default_rng(0)
-    lost = {n: np.zeros(6) for n in blocks}
-    total, left = np.zeros(6), np.zeros(6)
-    for f in range(FOLDS):
-        fit, out = fold != f, fold == f
-        mean = y[fit].mean(0)
-        gram = x[fit].T @ x[fit] + RIDGE * fit.sum() * np.eye(x.shape[1])
-        weights = np.linalg.solve(gram, x[fit].T @ (y[fit] - mean))
-        error = np.sum((y[out] - mean - x[out] @ weights) ** 2, axis=0)
-        total += np.sum((y[out] - y[out].mean(0)) ** 2, axis=0)
-        left += error
-        for n, part in where.items():
-            changed = x[out].copy()
-            changed[:, part] = changed[shuffle.permutation(out.sum())][:, part]
-            lost[n] += np.sum((y[out] - mean - changed @ weights) ** 2, axis=0) - error
-    found: dict[str, dict[str, float]] = {}
-    for k, axis in enumerate(AXES):
-        explained = 1.0 - left[k] / total[k] if total[k] > 0 else 0.0
-        weights = {n: max(float(v[k]), 0.0) for n, v in lost.items()}
-        whole = sum(weights.values())
-        if explained < LEAST or whole <= 0:
-            found[axis] = {}
-            continue
-        shares = {n: explained * w / whole for n, w in weights.items()}
-        found[axis] = dict(sorted(((n, v) for n, v in shares.items() if v >= 0.01), key=lambda i: -i[1]))
+    fitted = explanation.fitted
+    found: dict[str, dict[str, float]] = {axis: {} for axis in AXES}
+    whole = excess(explanation, explanation)
+    if whole <= 0:
+        return found
+    probe = InputForces(fitted.model, windows)
+    model = fitted.model
+    asked = GreyBox(model.vehicle, [*model.copied_effects(), probe], model.damping, model.actuation)
+    names = [*explanation.names, str(probe.name)]
+    sums, _, _ = reduce(windows, answers(asked, windows, fitted.initial, names), fitted.sigma)
+    known = len(fitted.theta)
+    scale = np.array([p.scale for p in probe.parameters_of])
+    chosen = list(range(known))
+    fold = folds(windows)
+    left = _left(sums, chosen, explanation, scale, fold)
+    open_ = [(i, n) for i in range(6) for n in probe.inputs]
+    for _ in range(MOST):
+        gains = {}
+        for i, n in open_:
+            more = [*chosen, *(known + probe.columns(i, n))]
+            gains[i, n] = left - _left(sums, more, explanation, scale, fold)
+        (axis, name), gain = max(gains.items(), key=lambda item: float(item[1].sum()))
+        total = float(gain.sum())
+        if total < LEAST * whole or total < SURE * np.sqrt(len(gain)) * float(gain.std(ddof=1)):
+            break
+        found[AXES[axis]][name] = float(np.clip(total / whole, 0.0, 1.0))
+        chosen += list(known + probe.columns(axis, name))
+        left = left - gain
+        open_.remove((axis, name))
     return found
+
+
+def _left(
+    sums: Statistics, columns: list[int], explanation: Explanation, scale: Array, fold: NDArray[np.int64]
+) -> Array:
+    """Return each window's error fitted without its fold, with some of the probe's forces beside what was found."""
+    fitted = explanation.fitted
+    known = len(fitted.theta)
+    own = np.array([c - known for c in columns if c >= known], dtype=int)
+    held = Priors(
+        np.concatenate([fitted.priors.mean, np.zeros(len(own))]),
+        np.concatenate([fitted.priors.precision, scale[own] ** -2.0]),
+    )
+    return left_out(sums.columns(columns), np.concatenate([fitted.theta, np.zeros(len(own))]), held, fold)

@@ -12,7 +12,7 @@ from strange_effects import BottomPull, ClockForce, HeadingForce, HeavePush, lis
 
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.cut import windows_for
-from auvnn.diagnosis.unknown import inputs_of
+from auvnn.diagnosis.input_forces import InputForces
 from auvnn.effects import EFFECTS
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run
@@ -127,9 +127,9 @@ def test_a_force_that_nobody_can_name_is_unknown_and_its_cause_is_traced(model):
     assert (found.verdict, found.missing) == ("unknown", []) and found.steps[0]["effects"] == []
     assert found.unexplained > 0.5
     sway = found.depends_on["Y"]
-    assert next(iter(sway)) == "psi" and sway["psi"] > 0.4
+    assert next(iter(sway)) == "psi" and sway["psi"] > 0.8
     for axis in "XZKMN":
-        assert found.depends_on[axis].get("psi", 0.0) < 0.1, axis
+        assert sum(found.depends_on[axis].values()) < 0.05, axis
     assert "Something is missing that no effect of the catalogue explains." in found.story
     assert any("Y on psi" in line for line in found.story)
     json.dumps(found.to_dict(), allow_nan=False)
@@ -140,7 +140,9 @@ def test_a_force_that_depends_on_nothing_measured_is_unknown_and_not_blamed_on_a
                    duration=12.0, noise=1.0)
     found = diagnose(model, log)
     assert (found.verdict, found.missing) == ("unknown", [])
-    assert max((s for shares in found.depends_on.values() for s in shares.values()), default=0.0) < 0.1
+    # It beats with the clock, and the clock may be told.
+    told = [s for shares in found.depends_on.values() for name, s in shares.items() if name != "t"]
+    assert max(told, default=0.0) < 0.1
 
 
 @pytest.fixture
@@ -257,9 +259,11 @@ def test_one_run_is_said_to_be_one_run(current, model):
     assert any("no coefficient of the model is uncertain" in w for w in found.warnings)
 
 
-def test_a_dependence_is_looked_for_among_all_that_is_measured(current):
+def test_a_dependence_is_looked_for_among_all_that_is_measured(current, model):
     log, _, _ = current
-    found = inputs_of(log)
-    assert set(found) == {*"uvwpqr", "phi", "theta", "psi", *(f"thruster_{i}" for i in range(1, 9)), *"xyz", "t"}
-    assert all(len(columns) == 3 for columns in found.values())
-    np.testing.assert_array_equal(found["thruster_2"][1], log.runs[1].thrusters[:, 1])
+    probe = InputForces(model, windows_for(model, log))
+    assert set(probe.inputs) == {*"uvwpqr", "phi", "theta", "psi", *(f"thruster_{i}" for i in range(1, 9)), *"xyz", "t"}
+    each = np.concatenate([probe.columns(i, n) for i in range(6) for n in probe.inputs])
+    assert sorted(each) == list(range(len(probe.parameters_of)))
+    names = [probe.parameters_of[k].name for k in probe.columns(4, "thruster_2")]
+    assert names == ["M_thruster_2_1", "M_thruster_2_2", "M_thruster_2_3"]
