@@ -92,6 +92,9 @@ class Chooser:
         best = paying[0]
         rivals = [e for e in paying[1:] if not self._told_apart(best, e)]
         if rivals:
+            both = self._joined(best, rivals[0], at, base, factor)
+            if both is not None:
+                return Choice("named", both, tried, [])
             plainer = effect_class(best.effects[-1]).plainer
             group = sorted([best, *rivals], key=lambda e: e.effects[-1] not in plainer)
             names = tuple(e.effects[-1] for e in group)
@@ -106,6 +109,41 @@ class Chooser:
             guess=replace(at, model=best.fitted.model),
         )
         return Choice("named", final, [final, *tried[1:]] if tried[0] is best else [final, *tried], [])
+
+    def _joined(
+        self, best: Explanation, other: Explanation, at: Layout, base: list[str], factor: float
+    ) -> Explanation | None:
+        """Return two explanations as one, where each is needed beside the other; then they are no rivals.
+
+        Of two effects that are both missing, one alone may do as badly as the other.
+        """
+        names = (*best.effects, other.effects[-1])
+        self.say(f"fitting {best.effects[-1]} and {other.effects[-1]} together")
+        guess = at.model.rebuilt(at.model.copied_effects())
+        for each in (best, other):
+            name = each.effects[-1]
+            set_parameters(guess, [name], parameters_of(each.fitted.model, [name]))
+        both = explain(
+            self.layout,
+            self.windows,
+            base,
+            names,
+            start=best.fitted,
+            guess=replace(at, model=guess),
+            sigma=best.fitted.sigma,
+            iterations=6,
+        )
+        gain = weigh(self.layout, both, factor).evidence - best.evidence
+        if gain < ODDS or not pays(both, best):
+            return None
+        return explain(
+            self.layout,
+            self.windows,
+            base,
+            names,
+            start=both.fitted,
+            guess=replace(at, model=both.fitted.model),
+        )
 
     def withdrawn(self, taken: Explanation, base: Sequence[str]) -> tuple[Explanation, list[str]]:
         """Return the explanation without those effects that it no longer needs, and their names.

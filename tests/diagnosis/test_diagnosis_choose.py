@@ -63,3 +63,11 @@ def test_a_withdrawn_effect_is_told_and_not_counted_as_missing(model, two, monke
     assert [s["verdict"] for s in found.steps][:3] == ["named", "named", "withdrawn"]
     assert any(line.startswith(f"Withdrawn: {plain.missing[0]}") for line in found.story)
     assert not any(line.startswith(f"Missing: {plain.missing[0]}") for line in found.story)
+
+
+def test_two_effects_that_do_as_badly_alone_are_named_together(model, two, monkeypatch):
+    """As if neither were ahead of the other; alone they leave what both together explain."""
+    monkeypatch.setattr(Chooser, "_told_apart", lambda self, best, other: False)
+    found = diagnose(model, two, NAMES)
+    assert found.steps[0]["verdict"] == "named" and set(found.steps[0]["effects"]) == set(NAMES)
+    assert set(found.missing) == set(NAMES)
