@@ -53,7 +53,7 @@ class Lever:
     @property
     def words(self) -> str:
         """The place with its interval."""
-        parts = (f"{a} {v:+.2f} +- {h:.2f}" for a, v, h in zip("xyz", self.place, self.half, strict=True))
+        parts = (f"{a} {v:+.3f} +- {h:.3f}" for a, v, h in zip("xyz", self.place, self.half, strict=True))
         return ", ".join(parts) + " m"
 
 

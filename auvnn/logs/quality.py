@@ -146,7 +146,7 @@ class Quality(Answer):
                 "findings": [f.to_dict() for f in self.findings],
                 "repairs": [r.to_dict() for r in log.repairs],
                 "kinematics": {name: a.to_dict() for name, a in self.kinematics.items()},
-                "actuators": self.actuators,
+                **({} if self.actuators is None else {"actuators": self.actuators}),
                 "excitation": {
                     "condition": self.condition,
                     "directions": {name: e.to_dict() for name, e in self.excitation.items()},

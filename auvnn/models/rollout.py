@@ -14,7 +14,7 @@ from auvnn.errors import ConfigError
 from auvnn.models.excursions import extrapolated
 from auvnn.models.inputs import Inputs
 from auvnn.models.limits import LIMIT
-from auvnn.models.stiffness import MAX_STEPS, fastest_rate, followed
+from auvnn.models.stiffness import MAX_STEPS, MOST_CUT, UNSTABLE, fastest_rate, followed
 from auvnn.models.stiffness import words as stiff_words
 from auvnn.physics.attitude import quat_derivative, quat_to_matrix
 from auvnn.physics.kinematics import eta6_to_eta7
@@ -117,8 +117,8 @@ def rollout(
         solver: "rk4", "midpoint" or "euler" (own, fixed step), or "torchdiffeq:METHOD".
         max_step: longest step of the own solvers, s; each interval is cut into equal steps.
         warmup: rows of history before the stretch, from which the actuators' state is worked out.
-        check: look for divergence, cut the steps where the model is stiff, and note where it leaves the velocities
-            that its damping was trained on; off inside function transforms.
+        check: look for divergence, try shorter steps where that is the step's fault, and note where it leaves the
+            velocities that its damping was trained on; off inside function transforms.
         **solver_options: handed to torchdiffeq (rtol, atol).
 
     Returns:
@@ -134,12 +134,6 @@ def rollout(
         eta0 = eta6_to_eta7(eta0)
     if check and times.shape[-1] > 1 and bool((times[..., 1:] < times[..., :-1]).any()):
         raise ConfigError("times decrease: sort the rows by time")
-    notes: list[str] = []
-    if check and solver in TABLEAUS:
-        rate = _rate(model, eta0, nu0, inputs.command[..., warmup, :], batch)
-        if followed(max_step, rate) < min(max_step, _longest(times)):
-            notes.append(stiff_words(rate, max_step))
-            max_step = followed(max_step, rate)
     substeps = steps_per_interval(times, max_step)
     if substeps * (times.shape[-1] - warmup) > MAX_STEPS:
         raise ConfigError(_over_budget(substeps * (times.shape[-1] - warmup), max_step))
@@ -171,7 +165,15 @@ def rollout(
     if not check:
         return result
     result = _checked(model, result, inputs)
-    notes += extrapolated(model, result.times, result.eta, result.nu, inputs)
+    notes = extrapolated(model, result.times, result.eta, result.nu, inputs)
+    step = min(max_step, _longest(times))
+    if result.diverged and solver in TABLEAUS and (rate := _rate(model, result, inputs, batch)) * step > UNSTABLE:
+        finer = followed(step, rate)
+        if step / finer <= MOST_CUT:
+            # Too long a step makes a stiff model explode that is sound by itself: only a finer one can tell.
+            again = rollout(model, eta0, nu0, whole[0], whole[1], solver=solver, max_step=finer, warmup=warmup)
+            if not again.diverged:
+                return replace(again, notes=(stiff_words(rate, step), *again.notes))
     return replace(result, notes=tuple(notes)) if notes else result
 
 
@@ -179,10 +181,14 @@ def _longest(times: Tensor) -> float:
     return float((times[..., 1:] - times[..., :-1]).max()) if times.shape[-1] > 1 else 0.0
 
 
-def _rate(model: GreyBox, eta0: Tensor, nu0: Tensor, command: Tensor, batch: torch.Size) -> float:
-    """Return how fast the model settles at the starts of the trajectories, 1/s."""
-    states = (x.expand(*batch, x.shape[-1]).reshape(-1, x.shape[-1]) for x in (eta0, nu0, command))
-    return fastest_rate(model, *states)
+def _rate(model: GreyBox, run: Trajectory, inputs: Inputs, batch: torch.Size) -> float:
+    """Return how fast the model settles at the first and the last sound states of its trajectories, 1/s."""
+    found = []
+    for at in (0, -1):
+        command = inputs.command[..., at, :].expand(*batch, inputs.command.shape[-1])
+        states = (run.eta[..., at, :], run.nu[..., at, :], command)
+        found.append(fastest_rate(model, *(x.reshape(-1, x.shape[-1]) for x in states)))
+    return max(found)
 
 
 def _leading_shape(

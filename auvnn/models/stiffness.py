@@ -18,10 +18,13 @@ from auvnn.physics.attitude import quat_to_matrix
 if TYPE_CHECKING:
     from auvnn.models.grey_box import GreyBox
 
-# Step times rate at which the error of rk4 is below a percent of what changes; it explodes beyond 2.8.
-LARGEST = 1.0
+# Step times rate: rk4 explodes beyond 2.8; steps are cut to where its error is below a percent of what changes. Steps
+# that are merely coarse are the caller's choice.
+UNSTABLE, FINE = 2.0, 1.0
 # More steps than this a rollout does not take: minutes would become days without a word.
 MAX_STEPS = 5_000_000
+# A run that diverged is tried again with steps shorter by at most this factor.
+MOST_CUT = 200.0
 
 
 def fastest_rate(model: GreyBox, eta: Tensor, nu: Tensor, command: Tensor) -> float:
@@ -54,8 +57,8 @@ def fastest_rate(model: GreyBox, eta: Tensor, nu: Tensor, command: Tensor) -> fl
 
 
 def followed(max_step: float, rate: float) -> float:
-    """Return the step that follows a rate, s: `max_step` unless that is too long."""
-    return min(max_step, LARGEST / rate) if rate > 0.0 else max_step
+    """Return the step that follows a rate, s: `max_step` unless that is too long to be stable."""
+    return FINE / rate if rate * max_step > UNSTABLE else max_step
 
 
 def words(rate: float, max_step: float) -> str:
