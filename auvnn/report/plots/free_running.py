@@ -40,5 +40,6 @@ def free_running(
                 ax.annotate(
                     label(mark_words), (mark, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -2),
                     textcoords="offset points", fontsize=7, va="top", color="#505050",
+                    bbox={"fc": "white", "ec": "none", "alpha": 0.75, "pad": 0.6}, zorder=5,
                 )  # fmt: skip
     return figure

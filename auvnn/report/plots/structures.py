@@ -56,5 +56,6 @@ def structures(rows: Sequence[Mapping[str, Any]], errors: Mapping[str, str]) -> 
         range(len(names)), [f"{label(n.replace('_', ' '))} ({count(sizes[n])})" for n in names]
     )
     panels[0].set_ylim(len(names) - 0.5, -0.5)
+    panels[0].set_ylabel("structure (numbers learned)")
     figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=len(handles))
     return figure

@@ -85,6 +85,7 @@ def noisy(options: Options, progress: Callable[[str], None]) -> Study:
         tracks[name] = tracked(model, truth, weights[name], options.step)
         counts[f"{name}_updates"] = adapter.counts.adapted
         counts[f"{name}_reverted"] = adapter.counts.reverted
+        counts[f"{name}_proven"] = adapter.counts.proven
         progress(f"online, {name}: {adapter.counts.adapted} of {adapter.counts.samples} samples learned from")
     metrics: dict[str, Any] = {"offline_training_s": fit.seconds, "offline_samples": training.samples}
     metrics["parameters"] = sum(p.numel() for p in still.values())

@@ -84,6 +84,7 @@ def payload(options: Options, progress: Callable[[str], None]) -> Study:
         weights[name], adapter = adapted(model, live, described, change)
         counts[f"{name}_updates"] = adapter.counts.adapted
         counts[f"{name}_reverted"] = adapter.counts.reverted
+        counts[f"{name}_proven"] = adapter.counts.proven
         progress(f"online, {name}: {adapter.counts.adapted} of {adapter.counts.samples} samples learned from")
     metrics: dict[str, Any] = {
         **trained,
