@@ -30,6 +30,8 @@ FIFTHS = 5
 MOVED = 0.25  # of the plausible scale by which a parameter is moved to find its column
 BLOCK = 5.0  # s of neighbouring samples that count as one when a gain's uncertainty is judged
 ROUNDS = 3
+# Linearisations at most, and the step, in plausible scales, below which one more is not needed.
+LINEARISED, SETTLED = 4, 0.05
 
 
 @dataclass(frozen=True)
@@ -125,13 +127,27 @@ def rank_one_step(
         rows = good & np.isfinite(columns).all((1, 2))
         if rows.sum() < 0.5 * good.sum() or not np.abs(columns[rows]).max() > 0.0:
             continue
-        x = np.concatenate([others[rows], columns[rows]], axis=-1)
         loose = np.concatenate([narrow, FREE * scale])
         before = _left_out(gap[rows], nuisance[rows], prior, weight[rows], fifth[rows])
-        after = _left_out(gap[rows], x, loose, weight[rows], fifth[rows])
-        theta = _solve(gap[rows], x, loose, weight[rows])[len(narrow) :]
         described = effect_class(name).describe(model.vehicle, model.actuation)
-        values = {p.name: float(n + v) for p, n, v in zip(described, null, theta, strict=True)}
+        at, left, mean = null.copy(), gap, np.zeros(len(loose))
+        # Where an effect is large its square counts too: it is linearised again where the fit has come to.
+        for again in range(LINEARISED):
+            x = np.concatenate([others[rows], columns[rows]], axis=-1)
+            step = _solve(left[rows], x, loose, weight[rows], mean)[len(narrow) :]
+            if again == LINEARISED - 1 or np.all(np.abs(step) < SETTLED * scale):
+                break
+            at = np.clip(at + step, [p.low for p in described], [p.high for p in described])
+            there = {p.name: float(v) for p, v in zip(described, at, strict=True)}
+            with torch.no_grad():
+                now = predicted(model.with_effects({name: there}))
+            moved, _, _ = _columns(model, name, predicted, now, there)
+            if not (np.isfinite(now[rows]).all() and np.isfinite(moved[rows]).all()):
+                break
+            columns, left = moved, measured - now
+            mean = np.concatenate([np.zeros(len(narrow)), null - at])
+        after = _left_out(left[rows], x, loose, weight[rows], fifth[rows], mean)
+        values = {p.name: float(v) for p, v in zip(described, at + step, strict=True)}
         std = _standard_error(before - after, block[rows])
         found.append(Ranked(name, float(before.mean()), float(after.mean()), std, values))
         errors[name] = np.full(len(gap), np.nan)
@@ -168,21 +184,28 @@ def _standard_error(difference: Array, block: NDArray[np.int64]) -> float:
 
 
 def _columns(
-    model: GreyBox, name: str, predicted: Callable[[GreyBox], Array], base: Array
+    model: GreyBox,
+    name: str,
+    predicted: Callable[[GreyBox], Array],
+    base: Array,
+    at: Mapping[str, float] | None = None,
 ) -> tuple[Array, Array, Array]:
-    """Return d(acceleration)/d(parameter) of an effect, (N, 6, p), its nulls and its plausible scales, (p,)."""
+    """Return d(acceleration)/d(parameter) of an effect, (N, 6, p), its nulls and its plausible scales, (p,).
+
+    The slopes are those at the null, or where `at` says; `base` is what the model predicts there.
+    """
     kind = effect_class(name)
     described = kind.describe(model.vehicle, model.actuation)
     columns = []
     for parameter in described:
-        step = MOVED * parameter.scale
-        if not parameter.low <= parameter.null + step <= parameter.high:
+        step, here = MOVED * parameter.scale, (at or {}).get(parameter.name, parameter.null)
+        if not parameter.low <= here + step <= parameter.high:
             step = -step
         if parameter.shape:
             columns.append(np.zeros_like(base))
             continue
         with torch.no_grad():
-            moved = predicted(model.with_effects({name: {parameter.name: parameter.null + step}}))
+            moved = predicted(model.with_effects({name: {**(at or {}), parameter.name: here + step}}))
         columns.append((moved - base) / step)
     null, scale = (np.array([getattr(p, k) for p in described]) for k in ("null", "scale"))
     return np.stack(columns, axis=-1), null, scale
@@ -200,10 +223,10 @@ def _parts(log: Log) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return np.concatenate(blocks), np.concatenate(fifths)
 
 
-def _solve(gap: Array, x: Array, spread: Array, weight: Array) -> Array:
-    """Return the parameters' departures that fit the gap best within their priors, (p,)."""
+def _solve(gap: Array, x: Array, spread: Array, weight: Array, mean: Array | float = 0.0) -> Array:
+    """Return the parameters' departures that fit the gap best within their priors about `mean`, (p,)."""
     square = np.einsum("nik,ni,nil->kl", x, weight, x, optimize=True) + np.diag(spread**-2.0)
-    right = np.einsum("nik,ni,ni->k", x, weight, gap, optimize=True)
+    right = np.einsum("nik,ni,ni->k", x, weight, gap, optimize=True) + spread**-2.0 * mean
     scale = 1.0 / np.sqrt(np.diag(square))
     return scale * np.linalg.solve(square * np.outer(scale, scale), scale * right)
 
@@ -218,13 +241,15 @@ def _weights(gap: Array, x: Array, spread: Array) -> Array:
     return weight
 
 
-def _left_out(gap: Array, x: Array, spread: Array, weight: Array, fifth: NDArray[np.int64]) -> Array:
+def _left_out(
+    gap: Array, x: Array, spread: Array, weight: Array, fifth: NDArray[np.int64], mean: Array | float = 0.0
+) -> Array:
     """Return each sample's weighted squared error by the fit on the other fifths, (N,)."""
     out = np.zeros(len(gap))
     for k in range(FIFTHS):
         held = fifth == k
         if not held.any() or held.all():
             continue
-        theta = _solve(gap[~held], x[~held], spread, weight[~held])
+        theta = _solve(gap[~held], x[~held], spread, weight[~held], mean)
         out[held] = (weight[held] * (gap[held] - x[held] @ theta) ** 2).sum(1)
     return out

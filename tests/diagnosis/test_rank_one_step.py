@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_logs import make_log, small_vehicle
+from small_logs import make_log, sines, small_vehicle
 
 from auvnn.diagnosis import rank_one_step
 from auvnn.errors import ConfigError
@@ -40,7 +40,10 @@ def test_where_nothing_is_missing_nothing_gains_much():
 def test_an_effect_and_its_double_are_one_group():
     """A constant force in a vehicle that never turns is what net buoyancy is: neither may be called better."""
     light = MODEL.with_effects({"net_buoyancy": {"force": 6.0}})
-    still = make_log(light, duration=30.0, noise=0.3, max_step=0.05, size=0.3)
+    # The four upright thrusters alone, all alike.
+    command = np.zeros((301, 8))
+    command[:, 4:] = 0.2 * sines(np.arange(301) / 10, 1, 3)
+    still = make_log(light, duration=30.0, noise=0.3, max_step=0.05, command=command, stir=0.0)
     found = {r.effect: r for r in rank_one_step(MODEL, still, ("net_buoyancy", "constant_force", "thruster_lag"))}
     best = max(found.values(), key=lambda r: r.gain)
     assert best.effect == "net_buoyancy" or found["net_buoyancy"].tied

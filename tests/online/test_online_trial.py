@@ -44,8 +44,8 @@ def test_the_evidence_is_the_log_likelihood_ratio_summed_above_zero():
 
 
 def test_noise_alone_seldom_brings_what_it_taught_into_use():
-    """The model is right: what is learned is noise, and by Ville's inequality hardly ever seems to be better."""
-    moved = []
+    """The model is right: what is learned is noise, which seems to be better once in e^proof decisions or more rarely."""
+    moved, decisions = [], 0
     for seed in range(3):
         run = driven(vehicle(), duration=8.0, noise=(0.0, 0.5), seed=seed)
         adapter = Adapter(vehicle(), {"scheme": "rls", "gain": 0.3, "shape": 0.3}, guards=PROVEN, watch=False)
@@ -53,8 +53,9 @@ def test_noise_alone_seldom_brings_what_it_taught_into_use():
         fed(adapter, run)
         assert adapter.counts.adapted > 50 and float(adapter.weights.read().abs().max()) > 0.0
         moved.append(adapter.counts.proven)
+        decisions += 6 * adapter.counts.adapted
         assert same(adapter.snapshot(), before) == (adapter.counts.proven == 0)
-    assert sum(moved) <= 1, moved
+    assert sum(moved) <= decisions * np.exp(-PROVEN["proof"]), (moved, decisions)
 
 
 def test_a_change_of_the_vehicle_comes_into_use_within_a_second():
