@@ -139,3 +139,62 @@ def test_drag_that_drives_is_held_by_quadratic_drag_where_steps_are_short_enough
     run = simulate(plant_model, "multisine", runs=1, duration=10.0, **COARSE).log.runs[0]
     own = np.diag(plant_model.vehicle.quadratic_damping)
     assert 1.0 < np.abs(run.nu[:, :3]).max() < 2 * 3e3 / own[:3].min()
+
+
+LAG, DELAY = {"thruster_lag": {"time_constant": 0.3}}, {"actuation_delay": {"delay": 0.173}}
+
+
+@pytest.mark.parametrize("actuators", [LAG, DELAY, {**DELAY, **LAG}])
+def test_closed_loop_replayed_in_open_loop_is_the_same(actuators):
+    hidden = {**actuators, "ocean_current": {"v_north": 0.1}}
+    made = simulate(model_of("bluerov2_heavy"), "survey", "none", hidden, runs=2, duration=6.0)
+    t = torch.tensor(made.log.runs[0].t)
+    with torch.no_grad():
+        for run in made.log.runs:
+            eta0 = torch.tensor(np.concatenate([run.position[0], run.quaternion[0]]))
+            command = Inputs(torch.tensor(run.thrusters.copy()), voltage=None)
+            again = made.plant.rollout(eta0, torch.tensor(run.nu[0].copy()), command, t, max_step=0.01)
+            assert run.nu == pytest.approx(again.nu.numpy(), abs=1e-9)
+            assert run.quaternion == pytest.approx(again.eta[:, 3:].numpy(), abs=1e-9)
+
+
+def test_truth_follows_the_contract():
+    options = {"seed": 3, "runs": 1, "duration": 2.0, **COARSE}
+    made = simulate(model_of("rov95"), "paper", "paper", "net_buoyancy", **options)
+    truth = made.truth
+    assert truth["schema"] == "auvnn/truth/1" and truth["noise"] == "paper"
+    assert truth["seed"] == 3 and truth["model"] == "rov95"
+    assert list(truth["hidden"]) == ["net_buoyancy"] and abs(truth["hidden"]["net_buoyancy"]["force"]) > 1
+    assert truth["conditions"]["excitation"]["time"] == 15.0
+    assert made.plant.effect("net_buoyancy").values() == truth["hidden"]["net_buoyancy"]
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        ({"excitation": "multisin"}, "multisine"),
+        ({"excitation": {"name": "multisine", "efort": 1.0}}, "effort"),
+        ({"excitation": {"name": "multisine", "effort": "much"}}, "number"),
+        ({"excitation": {"name": "multisine", "effort": 3.0}}, "effort"),
+        ({"excitation": {"name": "survey", "hold": [5.0]}}, "list of 2"),
+        ({"excitation": {"effort": 1.0}}, "name"),
+        ({"noise": "realistc"}, "realistic"),
+        ({"noise": {"name": "paper", "amplitude": "peak"}}, "uniform"),
+        ({"noise": {"standard_deviation": {"uu": 0.1}}}, "channel"),
+        ({"noise": {"standard_deviation": {"u": -0.1}}}, "from 0 up"),
+        ({"hidden": {"ocean_curent": None}}, "ocean_current"),
+        ({"hidden": {"ocean_current": {"north": 0.2}}}, "v_north"),
+        ({"hidden": {"ocean_current": {"v_north": 20.0}}}, "out of bounds"),
+        ({"runs": 0}, "runs"),
+        ({"seed": -1}, "seed"),
+        ({"rate": 0.0}, "rate"),
+        ({"duration": 0.05}, "duration"),
+        ({"duration": float("nan")}, "duration"),
+        ({"coefficients": "draw"}, "drawn"),
+        ({"actuation": "rudder"}, "wrench"),
+    ],
+)
+def test_bad_options_are_refused_in_one_line(options, word):
+    with pytest.raises(ConfigError, match=word) as caught:
+        simulate(model_of("rov95"), **options)
+    assert "\n" not in str(caught.value)
