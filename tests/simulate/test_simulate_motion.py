@@ -124,6 +124,60 @@ def test_sensor_effects_change_what_is_logged_not_the_motion():
         assert got[:, :3] == pytest.approx(was[:, :3] + np.cross(was[:, 3:], arm), abs=1e-12)
 
 
+@pytest.mark.parametrize("excitation", ["multisine", "survey"])
+def test_same_seed_same_log_to_the_last_bit(excitation):
+    options = {"hidden": ["ocean_current", "cg_offset"], "runs": 2, "duration": 4.0, **COARSE}
+    model = model_of("rov95")
+    first, again = (simulate(model, excitation, "realistic", seed=7, **options) for _ in range(2))
+    other = simulate(model, excitation, "realistic", seed=8, **options)
+    for name in ("t", "quaternion", "nu", "position", "thrusters"):
+        for a, b, c in zip(first.log.runs, again.log.runs, other.log.runs, strict=True):
+            assert np.array_equal(getattr(a, name), getattr(b, name))
+            assert name == "t" or not np.array_equal(getattr(a, name), getattr(c, name))
+    assert first.truth == again.truth
+    assert first.truth["hidden"] != other.truth["hidden"]
+    assert first.log.sha256 == again.log.sha256
+
+
+def test_a_run_stays_what_it_is_when_more_are_asked_for():
+    model = model_of("rov95")
+    few = simulate(model, "multisine", "realistic", runs=1, duration=4.0, **COARSE).log.runs[0]
+    many = simulate(model, "multisine", "realistic", runs=3, duration=4.0, **COARSE).log.runs[0]
+    assert few.thrusters == pytest.approx(many.thrusters, abs=1e-9)
+    assert few.nu == pytest.approx(many.nu, abs=1e-9)
+
+
+def test_noise_and_hidden_effects_do_not_change_the_manoeuvre():
+    model = model_of("rov95")
+    options = {"runs": 1, "duration": 4.0, **COARSE}
+    plain = simulate(model, "multisine", **options).log.runs[0]
+    other = simulate(model, "multisine", "realistic", ["ocean_current"], **options).log.runs[0]
+    assert np.array_equal(plain.thrusters, other.thrusters)
+
+
+def test_actuation_by_wrench():
+    made = simulate(model_of("rov95"), "multisine", actuation="wrench", runs=1, duration=3.0, **COARSE)
+    run = made.log.runs[0]
+    assert made.plant.actuation == "wrench" and made.log.kind == "wrench"
+    assert run.thrusters is None and run.wrench.shape == (31, 6)
+    assert (np.abs(run.wrench).max(axis=0) > [5, 5, 5, 0.5, 0.5, 0.5]).all()
+
+
+def test_fins_are_logged_for_a_vehicle_that_has_them():
+    run = simulate(model_of("remus100"), "multisine", runs=1, duration=3.0, **COARSE).log.runs[0]
+    assert run.fins.shape == (31, 4) and run.thrusters.shape == (31, 1)
+    assert run.fins.std() > 0.01
+
+
+def test_voltage_only_where_it_is_known_and_slowly_falling():
+    assert simulate(model_of("rov95"), runs=1, duration=3.0, **COARSE).log.runs[0].voltage is None
+    options = {"runs": 3, "duration": 60.0, **COARSE}
+    for run in simulate(model_of("bluerov2"), **options).log.runs:
+        assert (np.diff(run.voltage) < 0).all()
+        assert 0.9 * 16 < run.voltage.min() <= run.voltage.max() < 1.06 * 16
+        assert 0.1 < run.voltage[0] - run.voltage[-1] < 0.3
+
+
 def test_divergence_is_an_error_that_says_when_and_which_term():
     model = model_of("rov90")
     plant_model = model_of("rov90", linear_damping=-3e3 * np.eye(6))
