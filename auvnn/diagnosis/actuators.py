@@ -176,12 +176,13 @@ def check_actuators(model: GreyBox, log: Log) -> ActuatorCheck:
     if len(told) == 0 or len(wanted) < 20 * len(names):
         return ActuatorCheck(names, True, [], 0.0, same, gains, untold or names)
     # What the log does not move independently stays as stated.
-    wanted = wanted - thrust[:, ~moved] @ stated[:, ~moved].T
-    problem = _Problem.of(data, thrust[:, told], wanted, stated[:, told])
+    wanted = np.asarray(wanted - thrust[:, ~moved] @ stated[:, ~moved].T, dtype=np.float64)
+    problem = _Problem.of(data, thrust[:, told], wanted, np.asarray(stated[:, told], dtype=np.float64))
+    place = {int(i): k for k, i in enumerate(told)}
     best, costs = problem.search()
     found = Assignment(
-        tuple(int(told[best.place[list(told).index(i)]]) if i in told else i for i in range(len(names))),
-        tuple(best.sign[list(told).index(i)] if i in told else 1 for i in range(len(names))),
+        tuple(int(told[best.place[place[i]]]) if i in place else i for i in range(len(names))),
+        tuple(best.sign[place[i]] if i in place else 1 for i in range(len(names))),
     )
     cost = np.array(list(costs.values()))
     least = float(cost.min())
@@ -266,7 +267,7 @@ class _Problem:
         left = (wanted - thrust @ solution)[keep]
         factor = regression.inflation(data, left, thrust[keep])
         gram = thrust[keep].T @ thrust[keep] / factor
-        estimate = solution.T
+        estimate = np.asarray(solution.T, dtype=np.float64)
         # A share of the stated columns' own effect counts as error: nothing about a model is exact.
         effect = np.einsum("di,ij,dj->d", stated, gram, stated) / max(len(gram), 1)
         variance = (left**2).mean(0) + MODEL_ERROR**2 * effect

@@ -36,14 +36,16 @@ class InputForces(Effect):
             windows: of the log.
         """
         rows = slice(windows.warmup, None)
+        given = windows.inputs.rows(windows.warmup)
         raw = _raw(
             windows.times[:, rows],
             windows.eta[..., :3],
             _euler(windows.eta[..., 3:]),
             windows.nu,
-            windows.inputs.command[:, rows],
-            *(None if x is None else x[:, rows] for x in (windows.inputs.fins, windows.inputs.voltage)),
-            None if windows.inputs.altitude is None else windows.inputs.altitude[:, rows],
+            given.command,
+            given.fins,
+            given.voltage,
+            given.altitude,
         )
         names = _names(model, windows)
         seen = torch.as_tensor(np.arange(raw.shape[1]) < windows.length[:, None])

@@ -116,7 +116,7 @@ def _peak(sums: Array, shifts: NDArray[np.intp]) -> tuple[Array, Array]:
     bend = left - 2.0 * middle + right
     fine = (best == inner) & (bend < 0.0)
     part = np.where(fine, 0.5 * (left - right) / np.where(fine, bend, 1.0), 0.0)
-    return shifts[best] + part, strength[rows, best]
+    return np.asarray(shifts[best] + part, dtype=np.float64), strength[rows, best]
 
 
 def _drift(when: Array, lag: Array, good: NDArray[np.bool_]) -> float:

@@ -108,7 +108,7 @@ def _level(run: Run, strong: Array | None) -> Array | None:
 
 def _held(run: Run, level: Array, usual: Array, noise: Array) -> list[Stretch]:
     limit = np.maximum(np.maximum(5.0 * noise, _STILL * usual), 1e-6)
-    still = (np.abs(run.nu) <= limit).all(axis=1)
+    still = np.asarray((np.abs(run.nu) <= limit).all(axis=1))
     out = []
     for part in _parts(run, still, _SHORTEST):
         driven = level[part]

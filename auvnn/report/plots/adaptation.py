@@ -56,9 +56,9 @@ def with_and_without(
             y = values[:, i]
             if np.isfinite(y).any():
                 drawn.append(y[np.isfinite(y)])
-                ink = {"color": look.color, "ls": look.dashes, "lw": look.width}
+                ink: dict[str, Any] = {"color": look.color, "ls": look.dashes, "lw": look.width}
                 for first, last in pairwise(edges):
-                    words = {"label": name} if first == 0 else {}
+                    words: dict[str, Any] = {"label": name} if first == 0 else {}
                     ax.plot(*decimate(t[first:last], y[first:last], LIMIT), **ink, **words)
         if drawn:
             found = np.concatenate(drawn)
