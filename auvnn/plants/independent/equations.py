@@ -90,25 +90,36 @@ class Equations:
         self.walls = [n for n in ("bottom_proximity", "surface_proximity") if n in effects]
         fixed = [lump for lump in self.hull.lumps if lump.share is None]
         self.growing = [lump for lump in self.hull.lumps if lump.share is not None]
+        # Mass, first moment and inertia are sums over the parts, and so is the matrix that they make.
+        self.parts = [(lump, lump.moments(), self._rigid_matrix(*lump.moments())) for lump in self.growing]
         self.fixed: list[Any] = [sum(part) for part in zip(*(lump.moments() for lump in fixed), strict=True)]
         mass, moment, inertia = self.fixed
+        self.start = self._rigid_matrix(mass, moment, inertia)
         changing = self.growing or self.walls
-        self.inverse = None if changing else np.linalg.inv(self._matrix(mass, moment, inertia, 1.0))
+        self.inverse = None if changing else np.linalg.inv(self.start + self.hull.added)
         self.drags = [bool(np.any(self.hull.linear)), bool(np.any(self.hull.quadratic))]
 
-    def _matrix(self, mass: float, first: Array, inertia: Array, grown: float | Array) -> Array:
-        """Return the matrix in front of (v_dot, w_dot), (6, 6) or (R, 6, 6)."""
+    @staticmethod
+    def _rigid_matrix(mass: float, first: Array, inertia: Array) -> Array:
+        """Return what stands in front of (v_dot, w_dot) for rigid parts, (6, 6)."""
         x = cross_matrix(first)
-        rigid = np.block([[mass * np.eye(3), -x], [x, inertia]])
-        return rigid + np.asarray(grown)[..., None, None] * self.hull.added
+        return np.block([[mass * np.eye(3), -x], [x, inertia]])
+
+    def _matrix(self, t: float, grown: Array) -> Array:
+        """Return it for body and water at a time, (6, 6) or (R, 6, 6)."""
+        rigid = self.start
+        for lump, _, matrix in self.parts:
+            assert lump.share is not None
+            rigid = rigid + lump.share(t)[0] * matrix
+        return rigid + (grown[:, :, None] if self.walls else 1.0) * self.hull.added
 
     def _rigid(self, t: float) -> list[Any]:
         """Return mass, first moment and inertia of all that is there at a time."""
         total = list(self.fixed)
-        for lump in self.growing:
+        for lump, moments, _ in self.parts:
             assert lump.share is not None
             share = lump.share(t)[0]
-            total = [a + share * b for a, b in zip(total, lump.moments(), strict=True)]
+            total = [a + share * b for a, b in zip(total, moments, strict=True)]
         return total
 
     def drag(self, flow: Array, turn: Array) -> Array:
@@ -245,10 +256,9 @@ class Equations:
             total += part
         if self.inverse is not None:
             return total @ self.inverse.T
-        mass, moment, inertia = self._rigid(t)
-        matrix = self._matrix(mass, moment, inertia, near.grown[:, 0] if near.walls else 1.0)
+        matrix = self._matrix(t, near.grown)
         inverse: Array = np.linalg.inv(matrix).astype(np.float64)
-        return times(inverse, total)
+        return times(inverse, total) if self.walls else total @ inverse.T
 
     def _more_drag(self, t: float, near: Around) -> Array | None:
         """Return by what share the drag has grown, (R, 1) or (6,)."""

@@ -106,18 +106,17 @@ def cross_flow(values: Values, at: Instant) -> Load:
     Each station sees the velocity of its own point, and drags against its part across the hull's axis; the
     moment is the arm times that force. What the same share does at the origin is taken off.
     """
-    x, weight = _STATIONS
-    drag = own_drag(at.vehicle) * np.array([0.0, 1.0, 1.0])
-    arm = np.zeros((len(x), 3))
-    arm[:, 0] = 0.5 * at.vehicle.length * x
-    arm = np.broadcast_to(arm, (len(at.v), *arm.shape))
-    local = at.flow[:, None] + cross(np.broadcast_to(at.turn[:, None], arm.shape), arm)
-    speed = np.hypot(local[..., 1], local[..., 2])[..., None]
-    strip = -drag * speed * local * weight[:, None]
+    x, weight = 0.5 * at.vehicle.length * _STATIONS[0], _STATIONS[1]
+    drag = own_drag(at.vehicle)[1:]
+    # With the arm (x, 0, 0), w x r is (0, r x, -q x); across the hull it adds to v and w.
+    y, z = at.flow[:, 1:2] + at.turn[:, 2:] * x, at.flow[:, 2:] - at.turn[:, 1:2] * x
+    speed = np.hypot(y, z) * weight
+    y, z = -drag[0] * speed * y, -drag[1] * speed * z
     # What the diagonal drag at the origin did.
-    centre = -drag * np.abs(at.flow) * at.flow
+    centre = -drag * np.abs(at.flow[:, 1:]) * at.flow[:, 1:]
     share = values["share"]
-    return share * (strip.sum(1) - centre), share * cross(arm, strip).sum(1)
+    force = _columns(0.0, y.sum(-1) - centre[:, 0], z.sum(-1) - centre[:, 1])
+    return share * force, share * _columns(0.0, -(z @ x), y @ x)
 
 
 _GAUSS = np.polynomial.legendre.leggauss(STATIONS)
