@@ -7,7 +7,6 @@ from auvnn.cli.job import Answering, Job, Verb
 
 def _run(job: Job) -> Answering:
     from auvnn.diagnosis import diagnose
-    from auvnn.diagnosis.doubts import doubts
 
     log = job.log()
     effects = None if job["effects"] is None else job.names("effects")
@@ -16,7 +15,6 @@ def _run(job: Job) -> Answering:
         model, log, effects,
         max_effects=job["max_effects"], window=job["window"], force=job["force"], progress=job.say.progress,
     )  # fmt: skip
-    diagnosis.warnings += doubts(model, log)
     diagnosis.write(job.folder)
     data = diagnosis.to_dict()
     job.warn(data["warnings"])

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 from auvnn.diagnosis.answer import Diagnosis
 from auvnn.diagnosis.cut import candidates_for, windows_for
+from auvnn.diagnosis.doubts import doubts
 from auvnn.diagnosis.learned_drag import reduced
 from auvnn.diagnosis.nuisance import lay_out
 from auvnn.diagnosis.search import Search
@@ -70,4 +71,5 @@ def diagnose(
     found.absorbed = absorption(model, log)
     if found.absorbed is not None:
         found.warnings += found.absorbed.words()
+    found.warnings += doubts(model, log)
     return found

@@ -356,8 +356,8 @@ def _silent(layout: Any, found: Explanation, names: Sequence[str], log: Log) -> 
         labels = ", ".join(dark[:8]) + more
         if not known.any():
             raise InputError(
-                f"{log.name} says nothing about {labels}: nothing in it depends on them; fit on a log "
-                f"that excites them, or leave {name} out"
+                f"{log.name} says nothing about {labels}: nothing in it depends on {'it' if len(dark) == 1 else 'them'}; "
+                f"fit on a log with another motion, or leave {name} out"
             )
         out.append(
             f"{log.name} says nothing about {labels}: they stay near where they were, without standard error"

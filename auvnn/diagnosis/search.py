@@ -184,8 +184,9 @@ class Search:
         if len(log.runs) < 2:
             found.append("the log holds one run: what is left out in turn are stretches of it")
         if self.silent:
+            them = "it" if len(self.silent) == 1 else "them"
             found.append(
-                f"{log.name} says nothing about {', '.join(self.silent)}: nothing in it depends on them"
+                f"{log.name} says nothing about {', '.join(self.silent)}: nothing in it depends on {them}"
             )
         if not stated(model):
             found.append("no coefficient of the model is uncertain: any error of theirs will be given a name")

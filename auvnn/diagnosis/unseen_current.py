@@ -55,6 +55,9 @@ def estimate(
     if len(here.gap) < 200:
         return None
     gap = regression.without(here.nuisance, here.gap)
+    # A model that explains the log to the last digit leaves nothing that could look like a current.
+    if not gap.any():
+        return None
     pushed = []
     for name in ("v_north", "v_east"):
         moved = model.with_effects({"ocean_current": {name: _SMALL}})
@@ -75,4 +78,5 @@ def estimate(
     std = np.sqrt(np.diag(np.linalg.inv(square)))
     chi = float(current @ square @ current)
     before, after = (float(np.einsum("ni,i,ni->", x, weight, x)) for x in (gap, left))
-    return (float(current[0]), float(current[1])), (float(std[0]), float(std[1])), chi, 1.0 - after / before
+    share = 1.0 - after / before
+    return (float(current[0]), float(current[1])), (float(std[0]), float(std[1])), chi, share

@@ -75,6 +75,8 @@ class Body:
         quadratic: quadratic damping, (..., 6, 6), or None.
         element_linear: linear coefficients of displaced elements, (..., e, 6), or None.
         element_quadratic: quadratic coefficients of displaced elements, (..., e, 6), or None.
+        weight_centre: where the weight acts, m, (..., 3), where that is not the centre of gravity: mass that weighs
+            nothing in water moves the one and not the other. None is the centre of gravity.
     """
 
     mass: Tensor
@@ -88,6 +90,18 @@ class Body:
     quadratic: Tensor | None
     element_linear: Tensor | None
     element_quadratic: Tensor | None
+    weight_centre: Tensor | None = None
+
+    @property
+    def hangs(self) -> Tensor:
+        """Where the weight acts, m, (..., 3)."""
+        return self.cg if self.weight_centre is None else self.weight_centre
+
+    def hung(self, weight: Tensor, at: Tensor) -> Body:
+        """Return the same body with a further weight, N, that acts at a point, m, (..., 3)."""
+        total = self.weight + weight
+        centre = self.hangs + (weight / total).unsqueeze(-1) * (at - self.hangs)
+        return replace(self, weight=total, weight_centre=centre)
 
     def but(self, **changes: Tensor) -> Body:
         """Return the same body with some of its properties changed."""

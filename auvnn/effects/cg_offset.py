@@ -28,4 +28,5 @@ class CgOffset(Effect):
 
     def body(self, body: Body, moment: Moment | None) -> Body:
         """Move the centre of gravity."""
-        return body.but(cg=body.cg + self.theta.to(body.cg))
+        shift = self.theta.to(body.cg)
+        return body.but(cg=body.cg + shift, weight_centre=body.hangs + shift)

@@ -39,7 +39,8 @@ class Flooding(Effect):
         """Add the water that has come in."""
         assert moment is not None
         water = self.theta[0].to(moment.nu) * moment.time.to(moment.nu)
-        return body.but(mass=body.mass + water, weight=body.weight + self.kept("gravity").to(water) * water)
+        heavier = body.but(mass=body.mass + water)
+        return heavier.hung(self.kept("gravity").to(water) * water, body.cg)
 
     def wrench(self, moment: Moment, body: Body) -> Tensor:
         """Return what it takes to carry the water along."""

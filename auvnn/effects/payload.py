@@ -71,8 +71,9 @@ class Payload(Effect):
         eye = torch.eye(3, dtype=arm.dtype, device=arm.device)
         square = (arm * arm).sum(-1)[..., None, None] * eye - arm.unsqueeze(-1) * arm.unsqueeze(-2)
         inertia = body.inertia + (body.mass.unsqueeze(-1) * part).unsqueeze(-1) * square
-        weight = body.weight + self.kept("gravity").to(load) * load
-        return body.but(mass=mass, weight=weight, cg=body.cg + part * arm, inertia=inertia)
+        moved = body.but(mass=mass, cg=body.cg + part * arm, inertia=inertia, weight_centre=body.hangs)
+        # Enclosed water has mass and no weight, so the two centres need not be one.
+        return moved.hung(self.kept("gravity").to(load) * load, self.theta[2:5].to(moment.nu))
 
     def wrench(self, moment: Moment, body: Body) -> Tensor:
         """Return the load's buoyancy, the jerk of the grasp, and the added drag."""

@@ -28,4 +28,4 @@ class TrappedWater(Effect):
 
     def body(self, body: Body, moment: Moment | None) -> Body:
         """Add to the mass and not to the weight."""
-        return body.but(mass=body.mass + self.theta[0].to(body.mass))
+        return body.but(mass=body.mass + self.theta[0].to(body.mass), weight_centre=body.hangs)

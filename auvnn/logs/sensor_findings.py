@@ -16,6 +16,8 @@ from auvnn.logs.vertical import Vertical
 if TYPE_CHECKING:
     from auvnn.logs.log import Log
 
+_LATE = 0.05  # s: less than that no log of this kind is stamped by
+
 
 def agreement(
     kinematics: dict[str, Agreement],
@@ -58,7 +60,7 @@ def _late(kinematics: dict[str, Agreement]) -> list[Finding]:
         for name, a in kinematics.items()
         if abs(a.correlation) > 0.7
     }
-    late = {n: lag for n, lag in known.items() if abs(lag.value) > 0.05}
+    late = {n: lag for n, lag in known.items() if _is_late(lag)}
     found = []
     if late:
         times = ", ".join(f"{n} {lag.value:+.2f} s {_interval(lag)}".rstrip() for n, lag in late.items())
@@ -68,7 +70,11 @@ def _late(kinematics: dict[str, Agreement]) -> list[Finding]:
             common = lags.together(sensor)
             if common.high - common.low < 0.5 * abs(common.value):
                 what += f"; of the velocity sensor {common.value:+.2f} s {_interval(common)}"
-        cure = "correct the stamps, or give the late columns a delay in the mapping, u: {delay: 0.2}"
+        worst = max(late, key=lambda n: abs(late[n].value))
+        cure = (
+            "correct the stamps, or give the late columns a delay in the mapping, "
+            f"{worst}: {{delay: {late[worst].value:.2g}}}"
+        )
         found.append(Finding("warning", "delay", what, cure))
     drifting = {n: lag for n, lag in known.items() if lag.drift}
     if drifting:
@@ -76,6 +82,14 @@ def _late(kinematics: dict[str, Agreement]) -> list[Finding]:
         what = f"the clock of some channels drifts against attitude and position: {rates}"
         found.append(Finding("warning", "clock", what, "stamp all channels by one clock"))
     return found
+
+
+def _is_late(lag: Lag) -> bool:
+    """Say whether a lag is worth a word: beyond a step or two, and beyond three standard errors where those are known.
+
+    Six channels are judged at once in every log, so that two standard errors would be passed by one good log in four.
+    """
+    return abs(lag.value) > _LATE and not abs(lag.value) < 3.0 * lag.std
 
 
 def _interval(lag: Lag) -> str:

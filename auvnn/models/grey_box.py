@@ -350,7 +350,7 @@ class GreyBox(nn.Module):
             terms["damping elements"] = -matvec(to_parts.mT, law * own)
         if self.damping is not None:
             terms["damping subnetworks"] = -self.damping(nu_r)
-        terms["restoring"] = -restoring_force(rotation, body.weight, body.buoyancy, body.cg, body.cb)
+        terms["restoring"] = -restoring_force(rotation, body.weight, body.buoyancy, body.hangs, body.cb)
         if self._known("fin_area") is not None:
             # Fins whose angles are not known are still there: they are taken as held at zero.
             angles = nu_r.new_zeros(len(self.vehicle.fins)) if inputs.fins is None else inputs.fins

@@ -10,7 +10,14 @@ from scipy import stats
 
 from auvnn.errors import ConfigError
 from auvnn.studies.benchmark import summarise
-from auvnn.studies.benchmark.counting import all_named, false_names, named_alone, named_or_tied, right_axis
+from auvnn.studies.benchmark.counting import (
+    all_named,
+    false_names,
+    given_names,
+    named_alone,
+    named_or_tied,
+    right_axis,
+)
 from auvnn.studies.benchmark.falls import names_to_add
 from auvnn.studies.benchmark.power import smallest_found
 from auvnn.studies.benchmark.rates import by_part, judged, rate, z_of
@@ -74,6 +81,14 @@ def test_members_of_a_later_group_are_no_false_names():
     assert false_names(row("a", *named("a", "b"))) == ["b"]
     assert false_names(row("s", *named("b"), kind="stranger")) == ["b"]
     assert false_names(row("a+b", *named("b", "c"), kind="several")) == ["c"]
+
+
+def test_what_was_withdrawn_is_no_name_that_was_given():
+    answer = [("named", ["b"]), ("named", ["a"]), ("withdrawn", ["b"]), ("adequate", [])]
+    right = row("a", *answer, missing=["a"])
+    assert false_names(right) == [] and given_names(right) == ["a"] and all_named(right)
+    wrong = row("b", *answer, missing=["a"])
+    assert false_names(wrong) == ["a"] and not all_named(wrong)
 
 
 def test_rates_have_wilsons_intervals():

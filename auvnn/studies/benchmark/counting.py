@@ -36,6 +36,18 @@ def steps_of(row: Row) -> list[dict[str, Any]]:
     return [{"verdict": row["verdict"], "effects": list(row["missing"])}]
 
 
+def _standing(row: Row) -> list[dict[str, Any]]:
+    """Return the steps without the effects that a later step withdrew."""
+    steps = steps_of(row)
+    out = []
+    for i, step in enumerate(steps):
+        if step["verdict"] == "withdrawn":
+            continue
+        gone = {n for later in steps[i + 1 :] if later["verdict"] == "withdrawn" for n in later["effects"]}
+        out.append({**step, "effects": [n for n in step["effects"] if n not in gone]})
+    return out
+
+
 def named_first(row: Row) -> bool:
     """Whether a hidden effect, and it alone, was named in the first step."""
     return row["verdict"] == "named" and bool(row["missing"]) and row["missing"][0] in effects_of(row)
@@ -60,8 +72,11 @@ def tied(row: Row, effect: str, others: list[str]) -> bool:
 
 
 def effect_named(row: Row, effect: str) -> bool:
-    """Whether a hidden effect was named in some step, or declared in a group that the log cannot tell apart."""
-    for step in steps_of(row):
+    """Whether a hidden effect was named in some step, or declared in a group that the log cannot tell apart.
+
+    What was withdrawn later does not count.
+    """
+    for step in _standing(row):
         if effect in step["effects"]:
             others = [n for n in step["effects"] if n != effect]
             return step["verdict"] == "named" or tied(row, effect, others)
@@ -86,10 +101,8 @@ def all_named(row: Row) -> bool:
 
 
 def given_names(row: Row) -> list[str]:
-    """Return the names that were given; members of a declared group are not given as names."""
-    if row.get("found") is not None:
-        return [n for step in row["found"] if step["verdict"] == "named" for n in step["effects"]]
-    return list(row["missing"]) if row["verdict"] == "named" else []
+    """Return the names that the answer gives; members of a declared group, and what it withdrew, are none."""
+    return [n for step in _standing(row) if step["verdict"] == "named" for n in step["effects"]]
 
 
 def false_names(row: Row) -> list[str]:
