@@ -24,6 +24,7 @@ from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox, load
 from auvnn.models.saving import from_vehicle, save
 from auvnn.physics.products import matvec
+from auvnn.simulate import simulate
 from auvnn.testing import plain_vehicle
 from auvnn.vehicle import load_vehicle
 
@@ -105,6 +106,11 @@ def test_row_60_a_current_that_only_the_model_can_show():
     assert abs(north - 0.25) < 0.08 and abs(east + 0.15) < 0.08
     assert not any("current" in w for w in doubts(truth, log)), "a model that has the current has no doubt"
     assert not any("current" in w for w in doubts(MODEL, make_log(MODEL, duration=60.0, noise=0.5, max_step=0.05)))
+
+
+def test_row_60_a_model_that_leaves_nothing_at_all_raises_no_doubt():
+    exact = simulate(load("rov95"), "multisine", "none", runs=1, duration=15.0).log
+    assert doubts(load("rov95"), exact) == []
 
 
 @pytest.mark.parametrize(
