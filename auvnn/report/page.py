@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import os
 import tempfile
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,6 +33,7 @@ class Plot:
         draw: draws it, or raises NoData with what is missing in words.
         caption: what to see in it; a function is called after drawing.
         folded: closed until it is opened.
+        lone: another one where the truth is known, so that a report of several answers must draw it anew.
     """
 
     name: str
@@ -39,6 +41,7 @@ class Plot:
     draw: Callable[[], Figure]
     caption: str | Callable[[], str]
     folded: bool = False
+    lone: bool = False
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,7 @@ class Drawn:
     figures: dict[str, Figure] = field(default_factory=dict)
     vectors: dict[str, str] = field(default_factory=dict)
     reasons: dict[str, str] = field(default_factory=dict)
+    captions: dict[str, str] = field(default_factory=dict)
 
 
 class Page:
@@ -119,7 +123,9 @@ class Page:
             if pixels is not None:
                 _write_bytes(folder / "figures" / f"{name}.png", pixels)
                 write_text(folder / "figures" / f"{name}.svg", drawn.vectors[name])
-        return write_text(folder / "report.html", render(self.part(view, plots, drawn)))
+        page = self.part(view, plots, drawn)
+        _keep(answer, self.kind, plots, drawn)
+        return write_text(folder / "report.html", render(page))
 
     def planned(self, view: View) -> list[Plot]:
         """Return the figures, or where they cannot be planned one that says why."""
@@ -137,7 +143,8 @@ class Page:
         for other, answer in safely("the parts of this report", lambda: self.parts(view), []):
             inner = answer if isinstance(answer, View) else View(answer)
             plans = other.planned(inner)
-            parts.append(other.part(inner, plans, draw(plans), prefix=f"{other.kind}-"))
+            drawn_before = _kept_of(inner.answer, other.kind)
+            parts.append(other.part(inner, plans, draw(plans, drawn_before), prefix=f"{other.kind}-"))
         return Part(
             kind=self.kind,
             title=safely("the title", lambda: self.title(view), self.kind),
@@ -158,10 +165,41 @@ def _missing(reason: str) -> Figure:
     raise NoData(reason)
 
 
-def draw(plots: list[Plot]) -> Drawn:
-    """Return the figures that could be drawn by name, and for the others why not."""
+# What was drawn of an answer, while the answer lives: a report of several answers shows it again.
+_kept: dict[tuple[int, str], Drawn] = {}
+
+
+def _keep(answer: Any, kind: str, plots: list[Plot], drawn: Drawn) -> None:
+    lone = {plot.name for plot in plots if plot.lone}
+    places = [{n: v for n, v in getattr(drawn, f).items() if n not in lone} for f in ("figures", "vectors")]
+    captions = {n: v for n, v in drawn.captions.items() if n not in lone}
+    key = (id(answer), kind)
+    try:
+        weakref.finalize(answer, _kept.pop, key, None)
+    except TypeError:
+        # Plain mappings cannot be watched; theirs are drawn again.
+        return
+    _kept[key] = Drawn(*places, captions=captions)
+
+
+def _kept_of(answer: Any, kind: str) -> Drawn:
+    return _kept.get((id(answer), kind), Drawn())
+
+
+def draw(plots: list[Plot], before: Drawn | None = None) -> Drawn:
+    """Return the figures that could be drawn by name, and for the others why not.
+
+    Args:
+        plots: what to draw.
+        before: what has been drawn of the same answer already.
+    """
     drawn = Drawn()
     for plot in plots:
+        if before is not None and plot.name in before.vectors and plot.name in before.captions:
+            drawn.figures[plot.name] = before.figures[plot.name]
+            drawn.vectors[plot.name] = before.vectors[plot.name]
+            drawn.captions[plot.name] = before.captions[plot.name]
+            continue
         try:
             drawn.figures[plot.name] = plot.draw()
         except NoData as reason:
@@ -189,9 +227,10 @@ def _picture(plot: Plot, drawn: Drawn, prefix: str, notes: list[str]) -> Picture
     figure = drawn.figures.get(plot.name)
     if figure is None:
         return Picture(name, plot.title, "", "", missing=drawn.reasons.get(plot.name, "it was not drawn"))
-    caption = plot.caption
+    caption = drawn.captions.get(plot.name, plot.caption)
     if callable(caption):
         caption = _safely(notes, f"the caption of '{plot.title}'", caption, "")
+    drawn.captions[plot.name] = caption
     try:
         markup = figure_markup(style.settle(figure), name, plot.title, drawn.vectors.get(plot.name))
         return Picture(name, plot.title, caption, markup, folded=plot.folded)

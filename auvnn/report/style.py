@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import io
+import re
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,8 +18,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import PlaceHolderLayoutEngine
+from matplotlib.ticker import ScalarFormatter
 
 P = ParamSpec("P")
+
+_UPRIGHT = re.compile(r"\$\\mathdefault\{(.*)\}\$")
 
 # Inches: one column and the full width of a two-column journal page.
 COLUMN = 3.5
@@ -119,8 +123,30 @@ def context() -> Iterator[None]:
         yield
 
 
+class Numbers(ScalarFormatter):
+    """Tick labels as plain text, and only a common factor as mathematics.
+
+    Typesetting every number of every axis as a formula takes a third of the time that a page of figures needs.
+    """
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """Return the label of a tick."""
+        label = super().__call__(x, pos)
+        plain = _UPRIGHT.fullmatch(label)
+        return label if plain is None else plain.group(1)
+
+
 class Drawing(Figure):
     """A Figure that a notebook can show without pyplot."""
+
+    def add_subplot(self, *args: Any, **options: Any) -> Axes:
+        """Add axes whose numbers are plain text."""
+        axes = super().add_subplot(*args, **options)
+        for axis in (axes.xaxis, axes.yaxis):
+            if type(axis.get_major_formatter()) is ScalarFormatter:
+                axis.set_major_formatter(Numbers())
+                axis.isDefault_majfmt = True
+        return axes
 
     def _repr_png_(self) -> bytes:
         return png(self, dpi=150)

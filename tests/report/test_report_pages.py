@@ -1,6 +1,7 @@
 """Every page: what it says, that it is inert and complete in itself, and that it survives what it is "
 "given."""
 
+import gc
 import importlib
 import json
 import re
@@ -24,6 +25,7 @@ from report_fakes import (
 )
 
 from auvnn.answers import DRAWERS
+from auvnn.report import page as page_module
 from auvnn.report import style
 from auvnn.report.html import SECURITY
 from auvnn.report.page import Page
@@ -281,7 +283,10 @@ def hostile(value, keys=False):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_names_from_a_log_stay_text(kind):
+def test_names_from_a_log_stay_text(kind, request):
+    if kind == "demo":
+        # Its figures are those of its parts, which are drawn with such names one by one.
+        request.getfixturevalue("unseen")
     answer = hostile(make(kind))
     html = drawer(kind).page(answer)
     html.encode("utf-8")
@@ -376,7 +381,7 @@ def test_unknown_numbers_are_dashes(kind):
     assert not re.search(r"\bnan\b|\bNone\b", page.text)
 
 
-@pytest.mark.parametrize("kind", ["diagnosis", "demo"])
+@pytest.mark.parametrize("kind", ["diagnosis", "training"])
 def test_a_page_and_its_figures_are_written_and_equal_twice(tmp_path, small_figures, kind):
     answer = make(kind, 60)
     for name in ("one", "two"):
@@ -390,8 +395,24 @@ def test_a_page_and_its_figures_are_written_and_equal_twice(tmp_path, small_figu
     assert kinds == {".html", ".png", ".svg"}
     figures = {p.stem for p in one if p.suffix == ".png"}
     assert figures == {p.stem for p in one if p.suffix == ".svg"} and len(figures) >= 2
-    if kind != "demo":
-        assert figures == set(drawer(kind).figures(answer))
+    assert figures == set(drawer(kind).figures(answer))
+
+
+def test_a_report_of_several_answers_shows_again_what_was_drawn_of_each(tmp_path, small_figures, monkeypatch):
+    answer = demo(60, quality=None, diagnosis=None)
+    drawer("comparison").write(answer.comparison, tmp_path / "compare")
+    drawn = []
+    monkeypatch.setattr(style, "svg", lambda figure, svg=style.svg: drawn.append(figure) or svg(figure))
+    page = PageText(drawer("demo").page(answer))
+    figures = [a["id"] for tag, a in page.tags if tag == "figure"]
+    again = {f"comparison-{name}" for name in drawer("comparison").figures(answer.comparison)}
+    assert again <= set(figures) and len(drawn) == len(figures) - len(again)
+    # With the answer goes what was drawn of it.
+    kept = (id(answer.comparison), "comparison")
+    assert kept in page_module._kept
+    del answer
+    gc.collect()
+    assert kept not in page_module._kept
 
 
 def test_the_most_telling_figure_comes_first():

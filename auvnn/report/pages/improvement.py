@@ -90,6 +90,7 @@ class ImprovementPage(Page):
                 "What was fitted",
                 lambda: parameters(view.mapping("parameters"), view.get("truth")),
                 common.INTERVALS,
+                lone=True,
             ),
             Plot(
                 "error_over_time",
