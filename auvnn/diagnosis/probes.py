@@ -143,6 +143,8 @@ class StandIns(Effect):
         return self._change("wrench", (moment, body), lambda new: [new])[0]
 
     def _body(self, body: Body, moment: Moment | None) -> Body:
+        # Where the weight acts must be said, for a change of it to be added.
+        body = replace(body, weight_centre=body.hangs)
         # What the effect hands on untouched has no slope, and need not be asked for it.
         new = self.one("body", body, moment)
         names = [f.name for f in fields(body) if getattr(new, f.name) is not getattr(body, f.name)]

@@ -161,7 +161,7 @@ def level(monkeypatch):
 
 def test_two_names_for_the_same_thing_are_given_as_a_group(level):
     model, log = level
-    found = diagnose(model, log, ["net_buoyancy", "heave_push", "thruster_lag"])
+    found = diagnose(model, log, ["net_buoyancy", "heave_push", "thruster_lag"], advice=False)
     assert found.verdict == "ambiguous" and set(found.missing) == {"net_buoyancy", "heave_push"}
     assert [(s["verdict"], set(s["effects"])) for s in found.steps] == [("ambiguous", {"net_buoyancy", "heave_push"})]
     twins = by_name(found)

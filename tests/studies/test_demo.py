@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from auvnn.logs import Log
 from auvnn.metrics.rollouts import scale_of, table
 from auvnn.models import load
-from auvnn.simulate import simulate
 from auvnn.studies import demo
 
 SPEEDS = ("v_north", "v_east", "v_down")
@@ -64,13 +64,12 @@ def test_the_error_falls_to_that_of_the_true_model(ran):
 
 
 def test_the_errors_are_those_of_a_run_that_was_not_fitted(ran):
-    # Made again from the seed, and scored without the demo.
-    how = {"runs": demo.RUNS, "duration": demo.DURATION}
-    made = simulate(load("rov95"), "multisine", "realistic", demo.HIDDEN, 0, **how)
-    test = made.log.select([made.log.runs[-1].number])
+    # From the files alone, and scored without the demo.
+    test = Log.read(ran.folder / "simulate" / "test.parquet")
+    truth = load("rov95").with_effects(demo.HIDDEN)
     scale = scale_of(test)
     errors = {name: table(model, test, scale, ("5",))[0]["5"]["total"]
-              for name, model in (("given", load("rov95")), ("true", made.plant),
+              for name, model in (("given", load("rov95")), ("true", truth),
                                   ("after", load(ran.folder / "add" / "model")))}  # fmt: skip
     metrics = ran.data["metrics"]
     assert errors["given"] == pytest.approx(metrics["error_as_given"], rel=1e-6)
