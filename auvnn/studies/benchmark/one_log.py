@@ -87,6 +87,7 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
         "verdict": found.verdict,
         "missing": found.missing,
         "p_value": found.global_p_value,
+        "unexplained": found.unexplained,
         "steps": [s["verdict"] for s in found.steps],
         "found": [{"verdict": s["verdict"], "effects": list(s["effects"])} for s in found.steps],
         "truth": hidden,
