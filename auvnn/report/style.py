@@ -191,7 +191,9 @@ def settle(figure: Figure) -> Figure:
     """Lay the figure out once and for all, so that each file made of it costs one drawing instead of two."""
     if not isinstance(figure.get_layout_engine(), PlaceHolderLayoutEngine):
         with context():
-            figure.draw_without_rendering()
+            engine = figure.get_layout_engine()
+            if engine is not None:
+                engine.execute(figure)
             figure.set_layout_engine("none")
     return figure
 
