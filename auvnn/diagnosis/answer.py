@@ -36,6 +36,8 @@ class Diagnosis(Answer):
     explanation: Explanation | None = None
     residual_tests: dict[str, Any] = field(default_factory=dict)
     absorbed: Absorption | None = None
+    acts_in: dict[str, float] = field(default_factory=dict)
+    nearest: list[str] = field(default_factory=list)
 
     @property
     def surfaces(self) -> list[dict[str, Any]]:
@@ -63,6 +65,8 @@ class Diagnosis(Answer):
             "candidates",
             "unexplained",
             "depends_on",
+            "acts_in",
+            "nearest",
             "next_experiment",
             "warnings",
             "global_p_value",

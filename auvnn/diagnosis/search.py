@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.advise import advise
 from auvnn.diagnosis.answer import Diagnosis
+from auvnn.diagnosis.any_force import Unnamed, any_force, white
 from auvnn.diagnosis.choose import ALPHA, Chooser
 from auvnn.diagnosis.cut import HORIZON, WARMUP
 from auvnn.diagnosis.explain import Explanation, explain
@@ -30,6 +31,8 @@ Array = NDArray[np.float64]
 # "Something is missing, but nothing that has a name" is a claim of its own: where no effect pays on runs left
 # out, it takes stronger grounds than the test that opened the search.
 ALPHA_UNKNOWN = 0.001
+# Names that leave more than this share of what looks like a force have stood in for something without a name.
+PARTIAL = 0.2
 
 
 class Search:
@@ -52,6 +55,9 @@ class Search:
         self.floor = TRUST * motion(windows) + 1e-9
         self.silent: list[str] = []
         self.extent = extent_of(windows)
+        # The force that is left, where one is; and names that explain a part of it only.
+        self.left: Unnamed | None = None
+        self.nearest: list[str] = []
 
     def statistics(self, found: Explanation, remaining: list[str]) -> tuple[Statistics, Layout, Probed]:
         """Linearise towards every parameter at a fit, those of the remaining effects at several shapes."""
@@ -112,7 +118,39 @@ class Search:
                 withdrawn += gone
                 steps.append({"verdict": "withdrawn", "effects": gone, "p_value": p_value})
             chosen = list(current.effects)
+        steps = self._settled(steps, first, self.rivals[0] if self.rivals else current)
+        if self.left is not None:
+            global_p = min(global_p, self.left.p_value)
+        if self.nearest:
+            current = first
         return self._answer(model, log, first, current, steps, table, similar, global_p)
+
+    def _settled(
+        self, steps: list[dict[str, Any]], first: Explanation, last: Explanation
+    ) -> list[dict[str, Any]]:
+        """Return the steps as they stand once what nobody has named has been asked for.
+
+        Nothing is adequate, and no name the whole cause, while a force is left that is beyond doubt. Where the names
+        that were given leave much of it, they were the nearest that the catalogue has, and are not given as names.
+
+        Args:
+            steps: the search's.
+            first: the fit without any effect.
+            last: the fit with what was found.
+        """
+        self.say("asking whether a force without a name is left")
+        left = any_force(last, self.windows)
+        if left.p_value >= ALPHA_UNKNOWN:
+            return steps
+        given = [e for s in steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"]]
+        if given and left.left_of(any_force(first, self.windows, white(last))) > PARTIAL:
+            self.left, self.nearest, self.rivals = any_force(first, self.windows), given, []
+            return [{"verdict": "unknown", "effects": [], "p_value": steps[0]["p_value"]}]
+        self.left = left
+        if steps[-1]["verdict"] == "ambiguous":
+            return [*steps, {"verdict": "unknown", "effects": [], "p_value": left.p_value}]
+        p_value = min(steps[-1]["p_value"], left.p_value)
+        return [*steps[:-1], {**steps[-1], "verdict": "unknown", "p_value": p_value}]
 
     def _rest(self, current: Explanation) -> str:
         """Return the verdict where no effect is asked for any more."""
@@ -161,6 +199,8 @@ class Search:
             similar,
             last,
             self._tests(first, last),
+            acts_in={} if self.left is None else self.left.shares,
+            nearest=list(self.nearest),
         )
 
     def _tests(self, first: Explanation, last: Explanation) -> dict[str, Any]:

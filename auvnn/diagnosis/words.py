@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from auvnn.diagnosis.answer import Diagnosis
 
 
+MOTIONS = {"X": "surge", "Y": "sway", "Z": "heave", "K": "roll", "M": "pitch", "N": "yaw"}
+
+
 def number(value: float | None, std: float | None, unit: str) -> str:
     """Return a value with its standard error and unit, to as many digits as the error deserves."""
     shown = "" if unit == "1" else f" {unit}"
@@ -59,6 +62,16 @@ def tell(diagnosis: Diagnosis) -> list[str]:
             )
         elif lines:
             lines.append("With that the model is adequate: what is left looks like noise.")
+    if diagnosis.nearest:
+        one = len(diagnosis.nearest) == 1
+        lines.append(
+            f"{' and '.join(diagnosis.nearest)} {'comes' if one else 'come'} nearest, and "
+            f"{'leaves' if one else 'leave'} too much of it to be the cause."
+        )
+    if diagnosis.acts_in:
+        first, *others = (f"{MOTIONS[axis]} ({axis})" for axis in diagnosis.acts_in)
+        also = f", and shows in {' and '.join(others)} too" if others else ""
+        lines.append(f"It acts in {first}{also}.")
     if diagnosis.depends_on:
         strong = []
         for axis, shares in diagnosis.depends_on.items():

@@ -64,6 +64,7 @@ class DiagnosisPage(Page):
         if verdict in ("unknown", "adequate"):
             out += _best_of_the_rest(candidates)
         if verdict == "unknown":
+            out += _force_words(view)
             out += _dependence_words(view.mapping("depends_on"))
         after = view.mapping("next_experiment")
         if after.get("words"):
@@ -237,6 +238,22 @@ def _best_of_the_rest(candidates: list[Mapping[str, Any]]) -> list[str]:
         f"{plural(len(tried), 'effect')} of the catalogue {'was' if len(tried) == 1 else 'were'} tried; the "
         f"best, {best.get('effect')}, would explain {share} of the residual above the noise (p = {p})."
     ]
+
+
+def _force_words(view: View) -> list[str]:
+    """Say where the force without a name acts, and which names come nearest."""
+    out = []
+    nearest, axes = view.texts("nearest"), list(view.mapping("acts_in"))
+    if nearest:
+        one = len(nearest) == 1
+        out.append(
+            f"{listing(nearest)} {'comes' if one else 'come'} nearest, and {'leaves' if one else 'leave'} too much of "
+            "it to be the cause."
+        )
+    if axes:
+        also = f", and shows in {listing(axes[1:])} too" if axes[1:] else ""
+        out.append(f"What is left acts as a force in {axes[0]}{also}.")
+    return out
 
 
 def _dependence_words(depends: Mapping[str, Any]) -> list[str]:

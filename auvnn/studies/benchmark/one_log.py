@@ -88,6 +88,7 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
         "missing": found.missing,
         "p_value": found.global_p_value,
         "unexplained": found.unexplained,
+        "nearest": found.nearest,
         "steps": [s["verdict"] for s in found.steps],
         "found": [{"verdict": s["verdict"], "effects": list(s["effects"])} for s in found.steps],
         "truth": hidden,
@@ -103,7 +104,10 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
         row["p_values"] = {c["effect"]: c["p_value"] for c in found.candidates if c["p_value"] is not None}
     else:
         row.update(
-            axis=said_axis(found.depends_on), axes_true=axis_of(case.hidden), depends_on=found.depends_on
+            axis=next(iter(found.acts_in), None) or said_axis(found.depends_on),
+            axes_true=axis_of(case.hidden),
+            depends_on=found.depends_on,
+            acts_in=found.acts_in,
         )
     of_the_catalogue = case.kind in ("effect", "several")
     if of_the_catalogue:
