@@ -26,8 +26,10 @@ from auvnn.training.prediction_error import answers, reduce
 
 Array = NDArray[np.float64]
 HARMONICS = 3
-# Standard deviations of chance above which a further degree of freedom is told.
-CLEAR = 3.0
+# Variances of the coefficients that are tried, in plausible sizes squared, and log odds from which a further degree of
+# freedom is told.
+VARIANCES = np.logspace(-10.0, 2.0, 49)
+LEAST_ODDS = float(np.log(100.0))
 
 
 class AnyForce(Effect):
@@ -74,11 +76,13 @@ class Unnamed:
         z: (6,) how far the errors go with a force in each degree of freedom, in standard deviations of chance.
         p_values: (6,) of each.
         energy: (6,) the same above chance, in units that are the same before and after an effect is added.
+        acts_in: degrees of freedom with the logarithm of the odds that a force acts there, beside those before it.
     """
 
     z: Array
     p_values: Array
     energy: Array
+    acts_in: dict[str, float]
 
     @property
     def p_value(self) -> float:
@@ -86,19 +90,10 @@ class Unnamed:
         return float(min(1.0, 6.0 * self.p_values.min()))
 
     @property
-    def axis(self) -> str:
-        """The degree of freedom in which it shows most."""
-        return AXES[int(self.z.argmax())]
-
-    @property
     def shares(self) -> dict[str, float]:
-        """How much each degree of freedom has of what is beyond chance, the largest first; they sum to one.
-
-        A force in one degree of freedom shows in those that it moves as well.
-        """
-        above = np.where(self.z > CLEAR, self.z, 0.0)
-        above[self.z.argmax()] = max(float(self.z.max()), 1e-12)
-        return {AXES[i]: float(above[i] / above.sum()) for i in np.argsort(-above) if above[i] > 0.0}
+        """How much each degree of freedom has of the evidence for a force, the largest first; they sum to one."""
+        whole = sum(self.acts_in.values())
+        return {axis: odds / whole for axis, odds in self.acts_in.items()}
 
     def left_of(self, before: Unnamed) -> float:
         """Return how much of what was above chance before still is, 0 to 1."""
@@ -134,20 +129,78 @@ def any_force(explanation: Explanation, windows: Windows, sigma: Array | None = 
     step[inside] = np.linalg.lstsq(square[np.ix_(inside, inside)], pull[inside], rcond=1e-12)[0]
     slope = sums.slope[:, known:] - sums.hessian[:, known:, :known] @ step
     count = 2 * HARMONICS + 1
-    z, p_values, energy = np.zeros(6), np.ones(6), np.zeros(6)
+    found = []
     for axis in range(6):
         own = np.arange(count) + axis * count
-        hessian = sums.hessian[:, known + own[:, None], known + own]
-        expected = float(np.trace(hessian, axis1=1, axis2=2).sum())
-        variance = 2.0 * float((hessian**2).sum())
-        if not variance > 0.0:
-            continue
-        found = float((slope[:, own] ** 2).sum())
-        z[axis] = (found - expected) / np.sqrt(variance)
-        scale, degrees = variance / (2.0 * expected), 2.0 * expected**2 / variance
-        p_values[axis] = float(chi2.sf(found / scale, degrees))
-        energy[axis] = (found - expected) / scale
-    return Unnamed(z, p_values, energy)
+        found.append(weighed(slope[:, own], sums.hessian[:, known + own[:, None], known + own]))
+    z, p_values, energy = (np.array(x) for x in zip(*found, strict=True))
+    scale = np.array([p.scale for p in probe.parameters_of])
+    return Unnamed(
+        z, p_values, energy, acting(slope * scale, sums.hessian[:, known:, known:] * np.outer(scale, scale))
+    )
+
+
+def acting(slope: Array, hessian: Array) -> dict[str, float]:
+    """Return in which degrees of freedom a force acts, by evidence: the one that explains most, then the next beside it.
+
+    A force in one degree of freedom shows in those that it moves as well; beside the first these have nothing left to
+    explain. The coefficients are independent normal ones of a variance that fits best, tried on a grid; the evidence is
+    the marginal likelihood's, which counts how much could have been explained by chance.
+
+    Args:
+        slope: (W, 6 K), J^T e of each window, in units of the coefficients' plausible sizes.
+        hessian: (W, 6 K, 6 K), J^T J.
+    """
+    count = slope.shape[1] // 6
+    blocks = {axis: np.arange(count) + i * count for i, axis in enumerate(AXES)}
+    found: dict[str, float] = {}
+    while blocks:
+        best = {axis: _evidence(slope[:, own], hessian[:, own[:, None], own]) for axis, own in blocks.items()}
+        axis = max(best, key=lambda name: best[name][0])
+        odds, variance = best[axis]
+        if odds < LEAST_ODDS and found:
+            break
+        found[axis] = max(odds, 1e-12)
+        own = blocks.pop(axis)
+        # What the force found explains is taken away from all, with what it could have explained.
+        block = hessian[:, own[:, None], own] + np.eye(count) / variance
+        across = hessian[:, :, own]
+        solved = np.linalg.solve(block, np.concatenate([slope[:, own, None], across.transpose(0, 2, 1)], axis=2))
+        slope = slope - (across @ solved[:, :, :1])[..., 0]
+        hessian = hessian - across @ solved[:, :, 1:]
+        if odds < LEAST_ODDS:
+            break
+    return found
+
+
+def _evidence(slope: Array, hessian: Array) -> tuple[float, float]:
+    """Return the largest log marginal likelihood over that without a force, and the variance that has it."""
+    values, vectors = np.linalg.eigh(hessian)
+    values = np.maximum(values, 0.0)
+    along = np.einsum("wij,wi->wj", vectors, slope)[..., None] ** 2
+    spread = VARIANCES * values[..., None]
+    gain = 0.5 * (along * VARIANCES / (1.0 + spread) - np.log1p(spread)).sum((0, 1))
+    return float(gain.max()), float(VARIANCES[gain.argmax()])
+
+
+def weighed(slope: Array, hessian: Array) -> tuple[float, float, float]:
+    """Weigh slopes whose covariances by chance are known: distance from chance, p-value, and what is above chance.
+
+    sum_w |g_w|^2 has by chance the mean sum tr H_w and the variance 2 sum tr H_w^2, and nearly the distribution of a
+    scaled chi-square with these.
+
+    Args:
+        slope: (W, K), J^T e of each window in standard deviations of the noise.
+        hessian: (W, K, K), J^T J of each window.
+    """
+    expected = float(np.trace(hessian, axis1=1, axis2=2).sum())
+    variance = 2.0 * float((hessian**2).sum())
+    if not variance > 0.0:
+        return 0.0, 1.0, 0.0
+    above = float((slope**2).sum()) - expected
+    scale, degrees = variance / (2.0 * expected), 2.0 * expected**2 / variance
+    p_value = float(chi2.sf((above + expected) / scale, degrees))
+    return above / np.sqrt(variance), p_value, above / scale
 
 
 def white(explanation: Explanation) -> Array:

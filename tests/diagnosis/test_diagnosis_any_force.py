@@ -1,0 +1,100 @@
+"""A force without a name: the test against chance, against a force that is there, and what a diagnosis makes of it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from scipy import stats
+from small_logs import make_log, small_vehicle
+from strange_effects import ClockForce
+
+from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.any_force import Unnamed, any_force, weighed, white
+from auvnn.diagnosis.cut import windows_for
+from auvnn.diagnosis.explain import explain
+from auvnn.diagnosis.nuisance import lay_out
+from auvnn.diagnosis.words import tell
+from auvnn.models import GreyBox
+
+GROUPS = ("added_mass", "linear_damping", "quadratic_damping", "inertia")
+
+
+@pytest.fixture(scope="module")
+def model():
+    return GreyBox(small_vehicle())
+
+
+def pushed(model, force=8.0):
+    """A model whose surge is pushed to the beat of a clock, which no effect of the catalogue does."""
+    return model.rebuilt([ClockForce.build(model.vehicle, "thrusters", {"force": force})])
+
+
+def asked(model, log):
+    windows, layout = windows_for(model, log), lay_out(model, [])
+    fit = explain(layout, windows, list(layout.names), ())
+    return any_force(fit, windows), fit, windows
+
+
+def test_p_values_of_pure_chance_are_even():
+    """Slopes drawn from the normal distribution that their information says, windows unlike one another."""
+    rng = np.random.default_rng(3)
+    roots = rng.normal(size=(40, 7, 7)) * rng.uniform(0.2, 3.0, size=(40, 1, 1)) * np.linspace(2.0, 0.1, 7)
+    hessian = roots @ roots.transpose(0, 2, 1)
+    found = []
+    for _ in range(600):
+        slope = np.einsum("wij,wj->wi", roots, rng.normal(size=(40, 7)))
+        found.append(weighed(slope, hessian))
+    z, p_values, _ = (np.array(x) for x in zip(*found, strict=True))
+    assert abs(z.mean()) < 0.15 and z.std() == pytest.approx(1.0, abs=0.1)
+    assert stats.kstest(p_values, "uniform").pvalue > 0.01
+
+
+def test_noise_alone_is_no_force_and_a_force_is_found_where_it_acts(model):
+    left, fit, windows = asked(model, make_log(model, runs=2, duration=15.0, noise=1.0))
+    assert left.p_value > 0.01 and np.abs(left.z).max() < 3.5
+    there, _, _ = asked(model, make_log(pushed(model), runs=2, duration=15.0, noise=1.0))
+    assert there.p_value < 1e-6 and next(iter(there.shares)) == "X"
+    assert sum(there.shares.values()) == pytest.approx(1.0)
+    assert there.shares["X"] > 0.9 and len(left.acts_in) == 1
+    # The white part of the errors is the sensors' noise, whatever the slow part is.
+    assert np.isfinite(white(fit)).sum() >= 6 and len(windows) > 6
+
+
+def test_the_score_is_the_gain_that_a_small_force_has():
+    """Of one window and one function the energy is that of a single chi-square."""
+    z, p_value, energy = weighed(np.array([[3.0]]), np.array([[[1.0]]]))
+    assert p_value == pytest.approx(stats.chi2.sf(9.0, 1)) and energy == pytest.approx(8.0)
+    assert z == pytest.approx(8.0 / np.sqrt(2.0))
+    assert weighed(np.zeros((2, 1)), np.zeros((2, 1, 1))) == (0.0, 1.0, 0.0)
+
+
+def test_nothing_is_adequate_while_a_force_is_left(model):
+    found = diagnose(model, make_log(pushed(model), runs=2, duration=15.0, noise=1.0), ["net_buoyancy", "thruster_lag"])
+    assert (found.verdict, found.missing, found.nearest) == ("unknown", [], [])
+    assert next(iter(found.acts_in)) == "X" and any("It acts in surge (X)" in line for line in tell(found))
+    assert found.global_p_value < 1e-3
+    data = found.to_dict()
+    assert data["acts_in"] == found.acts_in and data["nearest"] == []
+    json.dumps(data, allow_nan=False)
+
+
+def test_a_name_that_explains_a_part_is_the_nearest_and_not_the_cause(model):
+    """A steady push besides: a constant force explains that, and is not what comes and goes."""
+    truth = pushed(model, 12.0).with_effects({"constant_force": {"X": 3.0}})
+    log = make_log(truth, runs=2, duration=15.0, noise=1.0)
+    found = diagnose(model, log, ["constant_force"])
+    assert (found.verdict, found.missing, found.nearest) == ("unknown", [], ["constant_force"])
+    assert found.steps == [{"verdict": "unknown", "effects": [], "p_value": found.steps[0]["p_value"]}]
+    assert any("constant_force comes nearest, and leaves too much of it" in line for line in tell(found))
+    assert not any(line.startswith("Missing") for line in tell(found))
+
+
+def test_what_was_left_before_and_after():
+    before = Unnamed(np.full(6, 9.0), np.full(6, 1e-9), np.array([80.0, 20.0, -5.0, 0, 0, 0]), {"X": 6.0, "Y": 2.0})
+    after = Unnamed(np.zeros(6), np.ones(6), np.array([10.0, -3.0, 0, 0, 0, 0]), {"X": 1.0})
+    assert after.left_of(before) == pytest.approx(0.1) and before.left_of(after) == 1.0
+    nothing = Unnamed(np.zeros(6), np.ones(6), np.zeros(6), {"X": 1e-12})
+    assert before.shares == {"X": 0.75, "Y": 0.25}
+    assert nothing.left_of(nothing) == 1.0 and sum(nothing.shares.values()) == pytest.approx(1.0)
