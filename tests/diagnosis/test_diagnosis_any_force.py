@@ -82,7 +82,7 @@ def test_nothing_is_adequate_while_a_force_is_left(model):
 
 def test_a_name_that_explains_a_part_is_the_nearest_and_not_the_cause(model):
     """A steady push besides: a constant force explains that, and is not what comes and goes."""
-    truth = pushed(model, 12.0).with_effects({"constant_force": {"X": 3.0}})
+    truth = pushed(model, 12.0).with_effects({"constant_force": {"X": 8.0}})
     log = make_log(truth, runs=2, duration=15.0, noise=1.0)
     found = diagnose(model, log, ["constant_force"])
     assert (found.verdict, found.missing, found.nearest) == ("unknown", [], ["constant_force"])
