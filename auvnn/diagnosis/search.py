@@ -28,6 +28,8 @@ from auvnn.models import GreyBox
 from auvnn.training.prediction_error import TRUST, Statistics, answers, motion, reduce, set_parameters
 
 Array = NDArray[np.float64]
+# Once something is in the model the question is asked again, and each time chance gets another turn.
+ALPHA_NEXT = 0.01
 # "Something is missing, but nothing that has a name" is a claim of its own: where no effect pays on runs left
 # out, it takes stronger grounds than the test that opened the search.
 ALPHA_UNKNOWN = 0.001
@@ -95,7 +97,7 @@ class Search:
                 similar = (remaining, similarity(sums, asked.layout, base, [k for _, k in asked_at.values()]))
                 table = tabulate(self.layout, scores, current, similar, needs)
                 self.silent = [n for n in remaining if not scores[n].degrees]
-            if p_value >= ALPHA or not remaining or len(chosen) >= most:
+            if p_value >= (ALPHA_NEXT if chosen else ALPHA) or not remaining or len(chosen) >= most:
                 steps.append({"verdict": self._rest(current), "effects": [], "p_value": p_value})
                 break
             choice = self.chooser.choose(scores, at, base, chosen, current)
