@@ -1,4 +1,4 @@
-"""What all tests share: one thread (the tensors are small), and shape checking on demand."""
+"""What all tests share: one thread (the tensors are small), shape checking on demand, and coarse pictures."""
 
 import os
 
@@ -12,3 +12,8 @@ if os.environ.get("AUVNN_CHECK_SHAPES") == "1":
 import torch
 
 torch.set_num_threads(1)
+
+from auvnn.report import page  # noqa: E402
+
+# Hundreds of figures are written to files that no test looks at closely: those that do draw their own.
+page.FILE_DPI = 40

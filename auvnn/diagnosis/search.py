@@ -15,7 +15,7 @@ from auvnn.diagnosis.any_force import Unnamed, any_force, white
 from auvnn.diagnosis.choose import ALPHA, Chooser
 from auvnn.diagnosis.cut import HORIZON, WARMUP
 from auvnn.diagnosis.explain import Explanation, explain
-from auvnn.diagnosis.left_over import excess, slow
+from auvnn.diagnosis.left_over import slow
 from auvnn.diagnosis.nuisance import Layout, stated
 from auvnn.diagnosis.probes import Probed, extent_of, probed
 from auvnn.diagnosis.residual_tests import residual_tests
@@ -60,6 +60,7 @@ class Search:
         # The force that is left, where one is; and names that explain a part of it only.
         self.left: Unnamed | None = None
         self.nearest: list[str] = []
+        self.unexplained = 1.0
 
     def statistics(self, found: Explanation, remaining: list[str]) -> tuple[Statistics, Layout, Probed]:
         """Linearise towards every parameter at a fit, those of the remaining effects at several shapes."""
@@ -142,10 +143,13 @@ class Search:
         """
         self.say("asking whether a force without a name is left")
         left = any_force(last, self.windows)
+        given = [e for s in steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"]]
+        if given:
+            self.unexplained = left.left_of(any_force(first, self.windows, white(last)))
         if left.p_value >= ALPHA_UNKNOWN:
             return steps
-        given = [e for s in steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"]]
-        if given and left.left_of(any_force(first, self.windows, white(last))) > PARTIAL:
+        if given and self.unexplained > PARTIAL:
+            self.unexplained = 1.0
             self.left, self.nearest, self.rivals = any_force(first, self.windows), given, []
             return [{"verdict": "unknown", "effects": [], "p_value": steps[0]["p_value"]}]
         self.left = left
@@ -176,8 +180,6 @@ class Search:
             key=lambda c: (missing.index(c["effect"]) if c["effect"] in missing else 99, -c.pop("_order")),
         )
         verdict = steps[0]["verdict"]
-        before, after = excess(first, last), excess(last, last)
-        unexplained = float(np.clip(after / before, 0.0, 1.0)) if before > 0 else 0.0
         depends = {}
         if verdict == "unknown" or steps[-1]["verdict"] == "unknown":
             self.say("tracing what is left to the measured inputs")
@@ -189,7 +191,7 @@ class Search:
             missing,
             steps,
             order,
-            0.0 if verdict == "adequate" else unexplained,
+            0.0 if verdict == "adequate" else round(self.unexplained, 6),
             depends,
             self._next(model),
             self._warnings(model, log),

@@ -21,6 +21,8 @@ from auvnn.report.view import View
 
 T = TypeVar("T")
 MOST_SENTENCES = 6
+# Of the PNG files beside a page, which go into papers.
+FILE_DPI = 300
 
 
 @dataclass(frozen=True)
@@ -215,7 +217,7 @@ def _rendered(drawn: Drawn, name: str) -> bytes | None:
     figure = drawn.figures[name]
     try:
         drawn.vectors[name] = style.svg(style.settle(figure))
-        return style.png(figure, dpi=300)
+        return style.png(figure, dpi=FILE_DPI)
     except Exception as problem:
         del drawn.figures[name]
         drawn.reasons[name] = f"it could not be rendered ({type(problem).__name__}: {problem})"

@@ -67,14 +67,6 @@ ELEMENTS = {
 }
 
 
-@pytest.fixture(scope="module")
-def small_figures():
-    """Draw coarsely: these tests read pages, they do not look at them."""
-    before, style.png = style.png, lambda figure, dpi=200: before(figure, 40)
-    yield
-    style.png = before
-
-
 @pytest.fixture
 def unseen(monkeypatch):
     """Make figures, but do not render them."""
@@ -382,7 +374,7 @@ def test_unknown_numbers_are_dashes(kind):
 
 
 @pytest.mark.parametrize("kind", ["diagnosis", "training"])
-def test_a_page_and_its_figures_are_written_and_equal_twice(tmp_path, small_figures, kind):
+def test_a_page_and_its_figures_are_written_and_equal_twice(tmp_path, kind):
     answer = make(kind, 60)
     for name in ("one", "two"):
         assert drawer(kind).write(answer, tmp_path / name) == tmp_path / name / "report.html"
@@ -398,17 +390,17 @@ def test_a_page_and_its_figures_are_written_and_equal_twice(tmp_path, small_figu
     assert figures == set(drawer(kind).figures(answer))
 
 
-def test_a_report_of_several_answers_shows_again_what_was_drawn_of_each(tmp_path, small_figures, monkeypatch):
-    answer = demo(60, quality=None, diagnosis=None)
-    drawer("comparison").write(answer.comparison, tmp_path / "compare")
+def test_a_report_of_several_answers_shows_again_what_was_drawn_of_each(tmp_path, monkeypatch):
+    answer = demo(60, quality=None, comparison=None, improvement=None)
+    drawer("diagnosis").write(answer.diagnosis, tmp_path / "diagnose")
     drawn = []
     monkeypatch.setattr(style, "svg", lambda figure, svg=style.svg: drawn.append(figure) or svg(figure))
     page = PageText(drawer("demo").page(answer))
     figures = [a["id"] for tag, a in page.tags if tag == "figure"]
-    again = {f"comparison-{name}" for name in drawer("comparison").figures(answer.comparison)}
+    again = {f"diagnosis-{name}" for name in drawer("diagnosis").figures(answer.diagnosis)}
     assert again <= set(figures) and len(drawn) == len(figures) - len(again)
     # With the answer goes what was drawn of it.
-    kept = (id(answer.comparison), "comparison")
+    kept = (id(answer.diagnosis), "diagnosis")
     assert kept in page_module._kept
     del answer
     gc.collect()
@@ -452,7 +444,7 @@ def test_the_json_beside_the_page_is_the_answers_own(tmp_path):
     assert Real().plot().axes[0].get_xlabel() == "step"
 
 
-def test_a_figure_that_cannot_be_rendered_leaves_a_note(tmp_path, monkeypatch, small_figures):
+def test_a_figure_that_cannot_be_rendered_leaves_a_note(tmp_path, monkeypatch):
     real = style.svg
 
     def fails(figure):
