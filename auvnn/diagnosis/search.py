@@ -34,7 +34,7 @@ ALPHA_NEXT = 0.01
 # out, it takes stronger grounds than the test that opened the search.
 ALPHA_UNKNOWN = 0.001
 # Names that leave more than this share of what looks like a force have stood in for something without a name.
-PARTIAL = 0.2
+PARTIAL = 0.1
 
 
 class Search:
