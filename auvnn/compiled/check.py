@@ -16,7 +16,7 @@ RATE, GRADIENT = 1e-12, 1e-10
 
 
 def disagreement(
-    kernel: Kernel, module: nn.Module, numbers: Numbers, samples: Mapping[str, Tensor], fixed: Tensor
+    kernel: Kernel, module: nn.Module, numbers: Numbers, samples: Mapping[str, Tensor], fixed: Tensor, batch: int
 ) -> str:
     """Return in words how code and torch differ at random states and slightly other parameters; empty if they agree.
 
@@ -28,6 +28,7 @@ def disagreement(
         numbers: its parameters and buffers.
         samples: states "y" and inputs by name, (N, ...).
         fixed: places of the numbers that are part of the code.
+        batch: for how many trajectories the code is that is to be checked.
     """
     generator = torch.Generator().manual_seed(3)
     found = ""
@@ -37,14 +38,14 @@ def disagreement(
         noise = torch.randn(row.shape, generator=generator, dtype=torch.float64)
         noise[fixed] = 0.0
         moved = row * (1.0 + change * noise) + 0.1 * change * noise * (row == 0.0)
-        found, useful = _compare(kernel, module, numbers, samples, moved)
+        found, useful = _compare(kernel, module, numbers, samples, moved, batch)
         if found or useful:
             return found
     return "the right-hand side is not finite at random states: there is nothing to check compiled code by"
 
 
 def _compare(
-    kernel: Kernel, module: nn.Module, numbers: Numbers, samples: Mapping[str, Tensor], row: Tensor
+    kernel: Kernel, module: nn.Module, numbers: Numbers, samples: Mapping[str, Tensor], row: Tensor, batch: int
 ) -> tuple[str, bool]:
     layout = kernel.layout
     values, place = {}, 0
@@ -60,7 +61,7 @@ def _compare(
     scale = expected.detach()
     if not bool(torch.isfinite(scale).any()):
         return "", False
-    words = _difference("the right-hand side", kernel.rate(y, u, row), expected.detach(), RATE)
+    words = _difference("the right-hand side", kernel.rate(y, u, row, batch), expected.detach(), RATE)
     if words or not kernel.gradient:
         return words, True
     back = torch.linspace(-1.0, 1.0, expected.numel(), dtype=torch.float64).reshape(expected.shape)
@@ -68,7 +69,7 @@ def _compare(
     over = [y, *(x for n, x in inputs.items() if x is not None and n != layout.inputs[-1][0]), *wanted]
     slopes = torch.autograd.grad(expected, over, back, allow_unused=True) if expected.requires_grad else [None] * len(over)
     slopes = [torch.zeros_like(x) if g is None else g for x, g in zip(over, slopes, strict=True)]
-    gy, gu, gp = kernel.rate_back(y.detach(), u, row, back)
+    gy, gu, gp = kernel.rate_back(y.detach(), u, row, back, batch)
     inner = len(over) - len(wanted)
     by_input = torch.cat([g.reshape(len(y), -1) for g in slopes[1:inner]], dim=-1)
     by_number, at = [], 0

@@ -77,19 +77,21 @@ class Kernel:
             self.seconds += spent
         return self._loaded[lanes]
 
-    def rate(self, y: Tensor, u: Tensor, numbers: Tensor) -> Tensor:
-        """Return the derivative at states (N, n) and inputs (N, m)."""
+    def rate(self, y: Tensor, u: Tensor, numbers: Tensor, batch: int | None = None) -> Tensor:
+        """Return the derivative at states (N, n) and inputs (N, m), by the code for so many trajectories."""
         y, u, numbers = (x.detach().contiguous() for x in (y, u, numbers))
         out = torch.empty_like(y)
-        self.load(len(y)).auvnn_rate(ctypes.c_long(len(y)), *(ctypes.c_void_p(_at(x)) for x in (y, u, numbers, out)))
+        self.load(batch or len(y)).auvnn_rate(ctypes.c_long(len(y)), *(ctypes.c_void_p(_at(x)) for x in (y, u, numbers, out)))
         return out
 
-    def rate_back(self, y: Tensor, u: Tensor, numbers: Tensor, back: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    def rate_back(
+        self, y: Tensor, u: Tensor, numbers: Tensor, back: Tensor, batch: int | None = None
+    ) -> tuple[Tensor, Tensor, Tensor]:
         """Return products of cotangents (N, n) with the Jacobians: in y (N, n), u (N, m), and summed in numbers."""
         y, u, numbers, back = (x.detach().contiguous() for x in (y, u, numbers, back))
         gy, gu, found = torch.empty_like(y), torch.empty_like(u), numbers.new_zeros(len(self.places))
         given = (y, u, numbers, back, gy, gu, found)
-        failed = self.load(len(y)).auvnn_rate_back(
+        failed = self.load(batch or len(y)).auvnn_rate_back(
             ctypes.c_long(len(y)), *(ctypes.c_void_p(_at(x)) for x in given)
         )
         _require(failed)

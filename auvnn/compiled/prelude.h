@@ -21,6 +21,7 @@ typedef int B;
 #define FALSE 0
 #define EACH(expression) ({ V r_; { const int l = 0; (void)l; r_ = (expression); } r_; })
 #define L(x) (x)
+#define LANE(v, l) (v)
 static inline V pick(B c, V a, V b) { return c ? a : b; }
 static inline V v_abs(V a) { return fabs(a); }
 #define AND(a, b) ((a) && (b))
@@ -34,6 +35,7 @@ typedef long long B __attribute__((vector_size(8 * LANES)));
 #define FALSE ((B){0} != (B){0})
 #define EACH(expression) ({ V r_; for (int l = 0; l < LANES; l++) r_[l] = (expression); r_; })
 #define L(x) ((x)[l])
+#define LANE(v, l) ((v)[l])
 static inline V pick(B c, V a, V b) { return (V)(((B)a & c) | ((B)b & ~c)); }
 static inline V v_abs(V a) { return (V)((B)a & ((B){0} + 0x7fffffffffffffffLL)); }
 #define AND(a, b) ((a) & (b))

@@ -20,12 +20,6 @@ static V *room(long count) {
     return place;
 }
 
-#if LANES == 1
-#define LANE(v, l) (v)
-#else
-#define LANE(v, l) ((v)[l])
-#endif
-
 /* One number of each lane's trajectory; the last trajectory stands in for those that are not there. */
 static inline V gather(const double *from, long stride, long first, long batch) {
 #if LANES == 1
@@ -33,8 +27,10 @@ static inline V gather(const double *from, long stride, long first, long batch) 
     return from[first * stride];
 #else
     V v;
-    if (!stride) {
-        for (int l = 0; l < LANES; l++) v[l] = from[0];
+    if (!stride) return (V){0} + from[0];
+    if (first + LANES <= batch) {
+        from += first * stride;
+        for (int l = 0; l < LANES; l++) v[l] = from[l * stride];
         return v;
     }
     for (int l = 0; l < LANES; l++) {
@@ -49,9 +45,12 @@ static inline int lanes_of(long first, long batch) {
     return batch - first < LANES ? (int)(batch - first) : LANES;
 }
 
-/* The inputs of an interval: the rows that are held. */
+/* The inputs of an interval: of the rows that are held, the numbers that count. */
 static void hold(const Problem *q, long first, long k, V *u) {
-    for (int i = 0; i < NROW; i++) u[NDRIVE + i] = gather(q->row + k * NROW + i, q->row_batch, first, q->batch);
+    for (int n = 0; n < ROWS_USED; n++) {
+        const int i = ROW_USED[n];
+        u[NDRIVE + i] = gather(q->row + k * NROW + i, q->row_batch, first, q->batch);
+    }
 }
 
 static void drive(const Problem *q, long first, long k, long part, V *mean, V *slope) {
@@ -102,7 +101,7 @@ int auvnn_run(const Problem *q, double *out) {
     prologue(q->p, b);
     for (long first = 0; first < q->batch; first += LANES) {
         int lanes = lanes_of(first, q->batch);
-        V y[NY], u[NU], mean[NDRIVE], slope[NDRIVE], places[STAGES * NY], raw[NY];
+        V y[NY], u[NU] = {0}, mean[NDRIVE], slope[NDRIVE], places[STAGES * NY], raw[NY];
         for (int i = 0; i < NY; i++) y[i] = gather(q->y0 + i, NY, first, q->batch);
         for (long k = 0; k < q->rows; k++) {
             for (int l = 0; l < lanes; l++)
@@ -175,7 +174,7 @@ int auvnn_back(const Problem *q, const Adjoint *g) {
     int sloped = q->slope != NULL;
     for (long first = 0; first < q->batch; first += LANES) {
         int lanes = lanes_of(first, q->batch);
-        V u[NU], mean[NDRIVE], slope[NDRIVE], places[STAGES * NY], raw[NY], next[NY], adjoint[NY];
+        V u[NU] = {0}, mean[NDRIVE], slope[NDRIVE], places[STAGES * NY], raw[NY], next[NY], adjoint[NY];
         for (int i = 0; i < NY; i++) adjoint[i] = (V){0};
         for (long k = q->rows - 1; k >= 0; k--) {
             for (int l = 0; l < lanes; l++)
@@ -202,7 +201,7 @@ int auvnn_back(const Problem *q, const Adjoint *g) {
                 project_back(raw, adjoint, over);
                 for (int i = 0; i < NY; i++) { adjoint[i] = over[i]; later[i] = (V){0}; }
                 for (int i = 0; i < NDRIVE; i++) { gmean[i] = (V){0}; gslope[i] = (V){0}; }
-                for (int i = 0; i < NROW; i++) grow[i] = (V){0};
+                for (int n = 0; n < ROWS_USED; n++) grow[ROW_USED[n]] = (V){0};
                 for (int s = STAGES - 1; s >= 0; s--) {
                     for (int i = 0; i < NY; i++) back[i] = (h * WEIGHT[s]) * over[i] + later[i];
                     at_stage(s, mean, slope, sloped, start, h, u);
@@ -215,7 +214,7 @@ int auvnn_back(const Problem *q, const Adjoint *g) {
                         gmean[i] += inputs[i];
                         gslope[i] += (STAGE[s] - 0.5) * inputs[i];
                     }
-                    for (int i = 0; i < NROW; i++) grow[i] += inputs[NDRIVE + i];
+                    for (int n = 0; n < ROWS_USED; n++) grow[ROW_USED[n]] += inputs[NDRIVE + ROW_USED[n]];
                 }
                 long at = from * q->drive_row + part * q->drive_part;
                 for (int i = 0; i < NDRIVE; i++) {
@@ -223,8 +222,10 @@ int auvnn_back(const Problem *q, const Adjoint *g) {
                     if (g->slope) scatter(g->slope + at + i, q->drive_batch, first, lanes, gslope[i]);
                 }
                 if (g->row)
-                    for (int i = 0; i < NROW; i++)
+                    for (int n = 0; n < ROWS_USED; n++) {
+                        const int i = ROW_USED[n];
                         scatter(g->row + from * NROW + i, q->row_batch, first, lanes, grow[i]);
+                    }
             }
         }
         for (int l = 0; l < lanes; l++)

@@ -215,9 +215,17 @@ def write(
     wanted = [*used.rate, *used.state_gradient, *used.input_gradient, *(n for _, n in used.parameter_gradient)]
     _, edge = constant_part(s, wanted)
     places = {node: k for k, node in enumerate(edge)}
+    held = range(drive, layout.width - 1)
+    rows = sorted(
+        s.operands[n][1] - drive
+        for n in s.needed(wanted)
+        if s.operation[n] == "input" and s.operands[n][0] == "u" and s.operands[n][1] in held
+    )
     text = [
         _table("NY", layout.state, "NU", layout.width, "NDRIVE", drive, "NROW", layout.width - drive - 1)
-        + _table("NB", len(edge), "NW", len(used.parameter_gradient), "STAGES", len(tableau[0])),
+        + _table("NB", len(edge), "NW", len(used.parameter_gradient), "STAGES", len(tableau[0]))
+        + _table("ROWS_USED", len(rows)),
+        f"static const int ROW_USED[] = {{{', '.join(map(str, rows or [0]))}}};",
         f"static const double STAGE[] = {{{', '.join(number(c) for c in tableau[0])}}};",
         f"static const double WEIGHT[] = {{{', '.join(number(w) for w in tableau[1])}}};",
         REAL_HELP,

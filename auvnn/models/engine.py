@@ -38,7 +38,9 @@ PER_RATE, GRADIENT_FACTOR = 6e-5, 8.0
 FREE_BATCH = 100
 """Trajectories that cost torch about as much as one."""
 WORTH_TRACING = 0.1
-"""Seconds of torch below which not even tracing (0.05 s) is thought about."""
+"""Seconds of torch, all runs of a model together, below which not even tracing (0.05 s) is thought about."""
+QUICK = 0.005
+"""Seconds of torch below which one run is not worth looking the code up (0.001 s)."""
 COMPILING = {False: 1.0, True: 4.0}
 """Seconds that compiling takes, without and with a gradient, until it has been measured."""
 
@@ -178,7 +180,7 @@ def _compiled(
         cost = PER_RATE * (rows - 1) * substeps * len(tableau[0]) * max(1.0, count / FREE_BATCH)
         cost *= GRADIENT_FACTOR if gradient else 1.0
         spent = _SPENT[model] = _SPENT.get(model, 0.0) + cost
-        if spent < WORTH_TRACING:
+        if cost < QUICK or spent < WORTH_TRACING:
             return None
     made = _made(model, inputs, gradient, tableau)
     if made.kernel is None:
@@ -322,7 +324,7 @@ def _ready(made: _Made, model: GreyBox, inputs: Inputs, batch: int) -> None:
         return
     side = _RightHandSide(model)
     numbers = Numbers.of(side)
-    different = disagreement(kernel, side, numbers, _samples(kernel.layout, 5 if batch > 1 else 3, seed=2), made.fixed)
+    different = disagreement(kernel, side, numbers, _samples(kernel.layout, 5, seed=2), made.fixed, batch)
     if different:
         made.kernel, made.reason = None, different
         raise CannotCompile(different)
