@@ -1,8 +1,8 @@
 """Right-hand sides written in torch, as machine code: traced, written as C, compiled, and checked.
 
 The physics is stated once, in torch. Here that statement is watched while it runs (`recorder`), operation by
-operation (`rules`), which gives a graph of scalar operations (`scalars`) for the derivative and, since autograd's
-own operations are watched as well, for its vector-Jacobian product (`program`). Both are written as C (`source`),
+operation (`rules`, `operations`), which gives a graph of scalar operations (`scalars`) for the derivative and,
+since autograd's own operations are watched as well, for its vector-Jacobian product (`program`). Both are written as C (`source`),
 with a Runge-Kutta scheme and its discrete adjoint around them (`runge_kutta.c`), compiled by the system's compiler
 (`toolchain`) and called as a function of tensors with a gradient (`kernel`).
 

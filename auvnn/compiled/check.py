@@ -16,7 +16,12 @@ RATE, GRADIENT = 1e-12, 1e-10
 
 
 def disagreement(
-    kernel: Kernel, module: nn.Module, numbers: Numbers, samples: Mapping[str, Tensor], fixed: Tensor, batch: int
+    kernel: Kernel,
+    module: nn.Module,
+    numbers: Numbers,
+    samples: Mapping[str, Tensor],
+    fixed: Tensor,
+    batch: int,
 ) -> str:
     """Return in words how code and torch differ at random states and slightly other parameters; empty if they agree.
 
@@ -45,7 +50,12 @@ def disagreement(
 
 
 def _compare(
-    kernel: Kernel, module: nn.Module, numbers: Numbers, samples: Mapping[str, Tensor], row: Tensor, batch: int
+    kernel: Kernel,
+    module: nn.Module,
+    numbers: Numbers,
+    samples: Mapping[str, Tensor],
+    row: Tensor,
+    batch: int,
 ) -> tuple[str, bool]:
     layout = kernel.layout
     values, place = {}, 0
@@ -54,7 +64,9 @@ def _compare(
         values[name] = part.requires_grad_(kernel.gradient and name in numbers.wanted)
         place += tensor.numel()
     y = samples["y"].clone().requires_grad_(kernel.gradient)
-    inputs = {n: samples[n].clone().requires_grad_(kernel.gradient) if s != 0 else None for n, s in layout.inputs}
+    inputs = {
+        n: samples[n].clone().requires_grad_(kernel.gradient) if s != 0 else None for n, s in layout.inputs
+    }
     u = torch.cat([x.detach().reshape(len(y), -1) for x in inputs.values() if x is not None], dim=-1)
     with torch.set_grad_enabled(kernel.gradient):
         expected = functional_call(module, values, (y, *inputs.values()))
@@ -67,7 +79,11 @@ def _compare(
     back = torch.linspace(-1.0, 1.0, expected.numel(), dtype=torch.float64).reshape(expected.shape)
     wanted = [values[n] for n in numbers.wanted]
     over = [y, *(x for n, x in inputs.items() if x is not None and n != layout.inputs[-1][0]), *wanted]
-    slopes = torch.autograd.grad(expected, over, back, allow_unused=True) if expected.requires_grad else [None] * len(over)
+    slopes = (
+        torch.autograd.grad(expected, over, back, allow_unused=True)
+        if expected.requires_grad
+        else [None] * len(over)
+    )
     slopes = [torch.zeros_like(x) if g is None else g for x, g in zip(over, slopes, strict=True)]
     gy, gu, gp = kernel.rate_back(y.detach(), u, row, back, batch)
     inner = len(over) - len(wanted)

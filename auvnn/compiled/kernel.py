@@ -81,7 +81,9 @@ class Kernel:
         """Return the derivative at states (N, n) and inputs (N, m), by the code for so many trajectories."""
         y, u, numbers = (x.detach().contiguous() for x in (y, u, numbers))
         out = torch.empty_like(y)
-        self.load(batch or len(y)).auvnn_rate(ctypes.c_long(len(y)), *(ctypes.c_void_p(_at(x)) for x in (y, u, numbers, out)))
+        self.load(batch or len(y)).auvnn_rate(
+            ctypes.c_long(len(y)), *(ctypes.c_void_p(_at(x)) for x in (y, u, numbers, out))
+        )
         return out
 
     def rate_back(
@@ -161,11 +163,13 @@ class _Run(torch.autograd.Function):
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, *grads: Tensor) -> tuple:
         out, *tensors = ctx.saved_tensors
-        y0, mean, slope, row, _, numbers = tensors
+        y0, numbers = tensors[0], tensors[5]
         kernel: Kernel = ctx.kernel
         back = grads[0].contiguous()
         needed = ctx.needs_input_grad[2:]
-        found = [torch.zeros_like(x) if x is not None and n else None for x, n in zip(tensors, needed, strict=True)]
+        found = [
+            torch.zeros_like(x) if x is not None and n else None for x, n in zip(tensors, needed, strict=True)
+        ]
         gy0, by_number = torch.zeros_like(y0), numbers.new_zeros(len(kernel.places))
         problem = _problem(*tensors, ctx.parts)
         adjoint = _Adjoint(

@@ -78,7 +78,9 @@ class Numbers:
             flat = tensor.detach().reshape(-1)
             plain = (flat == 0.0) | (flat.abs() == 1.0)
             # A parameter changes: its code would be compiled anew whenever it comes to zero.
-            parts.append(plain if not isinstance(tensor, nn.Parameter) and name not in self.wanted else plain & False)
+            parts.append(
+                plain if not isinstance(tensor, nn.Parameter) and name not in self.wanted else plain & False
+            )
         return torch.cat(parts) if parts else torch.zeros(0, dtype=torch.bool)
 
 
@@ -101,7 +103,9 @@ class Program:
     parameter_gradient: tuple[tuple[int, int], ...] = ()
 
 
-def trace(module: nn.Module, layout: Layout, numbers: Numbers, sample: Mapping[str, Tensor], gradient: bool) -> Program:
+def trace(
+    module: nn.Module, layout: Layout, numbers: Numbers, sample: Mapping[str, Tensor], gradient: bool
+) -> Program:
     """Trace `module(y, *inputs)` at one state.
 
     Args:
@@ -122,7 +126,8 @@ def trace(module: nn.Module, layout: Layout, numbers: Numbers, sample: Mapping[s
         leaf.requires_grad_(gradient and name in numbers.wanted)
         flat = leaf.detach().reshape(-1).tolist()
         nodes = [
-            scalars.constant(v) if fixed[place + k] else scalars.input("p", place + k) for k, v in enumerate(flat)
+            scalars.constant(v) if fixed[place + k] else scalars.input("p", place + k)
+            for k, v in enumerate(flat)
         ]
         values[name] = recorder.track(leaf, nodes)
         place += len(flat)
@@ -145,7 +150,11 @@ def trace(module: nn.Module, layout: Layout, numbers: Numbers, sample: Mapping[s
         if not gradient:
             return Program(scalars, _nodes(recorder, rate))
         over = [y, *followed.values(), *wanted]
-        slopes = torch.autograd.grad(rate, over, back, allow_unused=True) if rate.requires_grad else [None] * len(over)
+        slopes = (
+            torch.autograd.grad(rate, over, back, allow_unused=True)
+            if rate.requires_grad
+            else [None] * len(over)
+        )
         found = [
             (scalars.zero,) * x.numel() if g is None else _nodes(recorder, g)
             for x, g in zip(over, slopes, strict=True)
@@ -185,7 +194,10 @@ def trace_plain(function: Callable[[Tensor], Tensor], size: int) -> tuple[Progra
     for gradient in (False, True):
         module = _Plain(function)
         layout = Layout(size, (("time", None),))
-        sample = {"y": torch.linspace(0.5, 1.0, size, dtype=torch.float64), "time": torch.zeros((), dtype=torch.float64)}
+        sample = {
+            "y": torch.linspace(0.5, 1.0, size, dtype=torch.float64),
+            "time": torch.zeros((), dtype=torch.float64),
+        }
         found.append(trace(module, layout, Numbers.of(module), sample, gradient))
     return found[0], found[1]
 
@@ -206,8 +218,12 @@ def recorded(recorder: Recorder, run: Callable[[], Program], gradient: bool) -> 
             return run()
     except CannotCompile:
         raise
-    except Exception as error:  # What a user's code does under tracing cannot be foreseen; plain torch is at hand.
-        raise CannotCompile(f"tracing failed: {type(error).__name__}: {str(error).splitlines()[0][:200]}") from error
+    except (
+        Exception
+    ) as error:  # What a user's code does under tracing cannot be foreseen; plain torch is at hand.
+        raise CannotCompile(
+            f"tracing failed: {type(error).__name__}: {str(error).splitlines()[0][:200]}"
+        ) from error
 
 
 def _nodes(recorder: Recorder, tensor: Tensor) -> tuple[int, ...]:

@@ -61,8 +61,10 @@ class Writer:
     def _shared(self, node: int) -> bool:
         """Return whether a node is one number for all lanes."""
         s = self.scalars
-        return s.is_constant(node) or node in self.hoisted or (
-            s.operation[node] == "input" and s.operands[node][0] == "p"
+        return (
+            s.is_constant(node)
+            or node in self.hoisted
+            or (s.operation[node] == "input" and s.operands[node][0] == "p")
         )
 
     def body(self, wanted: Iterable[int]) -> list[str]:
@@ -94,7 +96,9 @@ class Writer:
                     f"{kind} i{node}[{size}] __attribute__((aligned(64))), "
                     f"o{node}[{size}] __attribute__((aligned(64)));"
                 )
-                lines += [f"i{node}[{k}] = {self._name(s.operands[m][0], True)};" for k, m in enumerate(members)]
+                lines += [
+                    f"i{node}[{k}] = {self._name(s.operands[m][0], True)};" for k, m in enumerate(members)
+                ]
                 lines += [f"i{node}[{k}] = i{node}[0];" for k in range(len(members), size)]
                 lines.append(
                     f"many_{operation}((const double *)i{node}, (double *)o{node}, {len(members)} * {lanes});"
@@ -119,7 +123,9 @@ class Writer:
             kind = "int" if self.real else "B"
         if operation in INFIX:
             first = self._name(operands[0], vector or operation in ("lt", "le", "eq", "ne"))
-            text = f"{first} {INFIX[operation]} {self._name(operands[1], operation in ('lt', 'le', 'eq', 'ne'))}"
+            text = (
+                f"{first} {INFIX[operation]} {self._name(operands[1], operation in ('lt', 'le', 'eq', 'ne'))}"
+            )
         elif operation == "neg":
             text = f"-{self._name(operands[0], True)}"
         elif operation == "abs":
@@ -143,7 +149,11 @@ class Writer:
         if self.real:
             fill = [f"a{node}[{k}] = {self._name(n)};" for k, n in enumerate(elements)]
             count = size * size
-            return [f"double a{node}[{count}], m{node}[{count}];", *fill, f"invert(a{node}, m{node}, {size});"]
+            return [
+                f"double a{node}[{count}], m{node}[{count}];",
+                *fill,
+                f"invert(a{node}, m{node}, {size});",
+            ]
         count = size * size
         return [
             f"V a{node}[{count}], m{node}[{count}];",
@@ -212,7 +222,12 @@ def write(
     used = joint or plain
     s = used.scalars
     # One graph serves both: the joint one holds the derivative as well.
-    wanted = [*used.rate, *used.state_gradient, *used.input_gradient, *(n for _, n in used.parameter_gradient)]
+    wanted = [
+        *used.rate,
+        *used.state_gradient,
+        *used.input_gradient,
+        *(n for _, n in used.parameter_gradient),
+    ]
     _, edge = constant_part(s, wanted)
     places = {node: k for k, node in enumerate(edge)}
     held = range(drive, layout.width - 1)

@@ -46,7 +46,9 @@ def cache_folder() -> Path:
 @functools.lru_cache
 def _machine(command: str) -> str:
     """Return what the machine code depends on besides the source: compiler, its version, processor."""
-    version = subprocess.run([command, "--version"], capture_output=True, text=True, timeout=30, check=False).stdout
+    version = subprocess.run(
+        [command, "--version"], capture_output=True, text=True, timeout=30, check=False
+    ).stdout
     try:
         info = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
         flags = next((line for line in info.splitlines() if line.startswith(("flags", "Features"))), "")
@@ -87,7 +89,9 @@ def build(source: str, lanes: int) -> tuple[ctypes.CDLL, float]:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         status = folder.stat()
         if hasattr(os, "getuid") and (status.st_uid != os.getuid() or status.st_mode & 0o022):
-            raise CannotCompile(f"{folder} can be written by others, who could put code there: make it private")
+            raise CannotCompile(
+                f"{folder} can be written by others, who could put code there: make it private"
+            )
     except OSError as error:
         raise CannotCompile(f"the cache folder {folder} cannot be made: {error.strerror}") from None
     target, spent = folder / f"{name}.so", 0.0

@@ -102,7 +102,9 @@ def default_engine() -> str:
     return named
 
 
-def why_not(model: GreyBox, inputs: Inputs | None = None, *, gradient: bool = True, solver: str = "rk4") -> str:
+def why_not(
+    model: GreyBox, inputs: Inputs | None = None, *, gradient: bool = True, solver: str = "rk4"
+) -> str:
     """Return why a model cannot run compiled, in words; empty where it can.
 
     Compiles and checks what is not there yet.

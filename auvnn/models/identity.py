@@ -10,10 +10,14 @@ from torch import Tensor, nn
 
 # What torch itself keeps in a module. Parameters and buffers are inputs of compiled code, but for their shapes.
 OWN = frozenset(
-    "_parameters _buffers _modules _non_persistent_buffers_set _backward_pre_hooks _backward_hooks _is_full_backward_hook "
-    "_forward_hooks _forward_hooks_with_kwargs _forward_hooks_always_called _forward_pre_hooks "
-    "_forward_pre_hooks_with_kwargs _state_dict_hooks _state_dict_pre_hooks _load_state_dict_pre_hooks "
-    "_load_state_dict_post_hooks".split()
+    (
+        "_parameters _buffers _modules "
+        "_non_persistent_buffers_set _backward_pre_hooks _backward_hooks "
+        "_is_full_backward_hook _forward_hooks _forward_hooks_with_kwargs "
+        "_forward_hooks_always_called _forward_pre_hooks _forward_pre_hooks_with_kwargs "
+        "_state_dict_hooks _state_dict_pre_hooks _load_state_dict_pre_hooks "
+        "_load_state_dict_post_hooks "
+    ).split()  # noqa: SIM905
 )
 DEEPEST = 6
 
@@ -36,7 +40,15 @@ class Identity:
             own = tuple((k, self._of(v, 0)) for k, v in module.__dict__.items() if k not in OWN)
             parts.append((name, type(module), own))
         for name, tensor in (*model.named_parameters(), *model.named_buffers()):
-            parts.append((name, tuple(tensor.shape), tensor.dtype, tensor.requires_grad, isinstance(tensor, nn.Parameter)))
+            parts.append(
+                (
+                    name,
+                    tuple(tensor.shape),
+                    tensor.dtype,
+                    tensor.requires_grad,
+                    isinstance(tensor, nn.Parameter),
+                )
+            )
         self.key = tuple(parts)
 
     def _of(self, value: Any, depth: int) -> Any:
@@ -47,16 +59,29 @@ class Identity:
         if isinstance(value, Tensor):
             return ("tensor", id(value), value._version)
         if isinstance(value, np.ndarray) and value.dtype != object:
-            return ("array", value.shape, value.dtype.str, value.tobytes() if value.size <= 4096 else id(value))
+            return (
+                "array",
+                value.shape,
+                value.dtype.str,
+                value.tobytes() if value.size <= 4096 else id(value),
+            )
         if depth < DEEPEST:
             if isinstance(value, (list, tuple)):
                 return (type(value), tuple(self._of(v, depth + 1) for v in value))
             if isinstance(value, dict):
-                return (dict, tuple((self._of(k, depth + 1), self._of(v, depth + 1)) for k, v in value.items()))
+                return (
+                    dict,
+                    tuple((self._of(k, depth + 1), self._of(v, depth + 1)) for k, v in value.items()),
+                )
             if isinstance(value, (set, frozenset)):
                 return (type(value), frozenset(self._of(v, depth + 1) for v in value))
             frozen = dataclasses.is_dataclass(value) and value.__dataclass_params__.frozen  # type: ignore[attr-defined]
-            if not frozen and not isinstance(value, nn.Module) and hasattr(value, "__dict__") and not callable(value):
+            if (
+                not frozen
+                and not isinstance(value, nn.Module)
+                and hasattr(value, "__dict__")
+                and not callable(value)
+            ):
                 return (id(value), self._of(vars(value), depth + 1))
         return id(value)
 

@@ -130,8 +130,8 @@ def rollout(
         The trajectory at the T times. One that diverges keeps its last sound state and is reported.
 
     Raises:
-        ConfigError: unknown solver, engine or option, a model that cannot be compiled where that is asked for, shapes that do not fit, times that decrease or are not finite, or more
-            steps than the budget.
+        ConfigError: unknown solver, engine or option, a model that cannot be compiled where that is asked for,
+            shapes that do not fit, times that decrease or are not finite, or more steps than the budget.
     """
     inputs = commands if isinstance(commands, Inputs) else Inputs(commands)
     batch = _leading_shape(model, eta0, nu0, inputs, times, warmup)
@@ -178,7 +178,8 @@ def rollout(
         finer = followed(step, rate)
         if step / finer <= MOST_CUT:
             # Too long a step makes a stiff model explode that is sound by itself: only a finer one can tell.
-            again = rollout(model, eta0, nu0, whole[0], whole[1], solver=solver, max_step=finer, warmup=warmup, engine=engine)
+            alike = {"solver": solver, "warmup": warmup, "engine": engine}
+            again = rollout(model, eta0, nu0, whole[0], whole[1], max_step=finer, **alike)
             if not again.diverged:
                 return replace(again, notes=(stiff_words(rate, step), *again.notes))
     return replace(result, notes=tuple(notes)) if notes else result

@@ -62,7 +62,9 @@ def random_run(model, batch, rows, seed=1):
     y[..., 7:] *= 0.4
     y = unit_attitude(y)
     size, fins = model.actuators.size, len(model.vehicle.fins)
-    command = draw(*batch, rows, size) * (torch.tensor([40.0] * 3 + [4.0] * 3) if model.actuation == "wrench" else 0.3)
+    command = draw(*batch, rows, size) * (
+        torch.tensor([40.0] * 3 + [4.0] * 3) if model.actuation == "wrench" else 0.3
+    )
     inputs = Inputs(
         command,
         0.2 * draw(*batch, rows, fins) if fins else None,
@@ -86,7 +88,11 @@ def test_values_and_gradients_agree(compiler, case):
     """In everything that autograd can be asked for: states, commands, fins, voltage, altitude, all parameters."""
     model = random_model(case)
     eta, nu, inputs, times = random_run(model, (5,), 9)
-    leaves = [eta, nu, *(x for x in (inputs.command, inputs.fins, inputs.voltage, inputs.altitude) if x is not None)]
+    leaves = [
+        eta,
+        nu,
+        *(x for x in (inputs.command, inputs.fins, inputs.voltage, inputs.altitude) if x is not None),
+    ]
     for leaf in leaves:
         leaf.requires_grad_()
     found = []
@@ -96,10 +102,17 @@ def test_values_and_gradients_agree(compiler, case):
         whole = torch.cat([run.eta, run.nu], dim=-1)
         over = [*leaves, *model.parameters()]
         slopes = torch.autograd.grad(whole, over, up, allow_unused=True)
-        found.append((whole.detach(), [torch.zeros_like(x) if g is None else g for x, g in zip(over, slopes, strict=True)]))
+        found.append(
+            (
+                whole.detach(),
+                [torch.zeros_like(x) if g is None else g for x, g in zip(over, slopes, strict=True)],
+            )
+        )
     (value, slopes), (mine, own) = found
     assert relative(mine, value) < 1e-12
-    names = ["eta", "nu", "command", "fins", "voltage", "altitude"][: len(leaves)] + [n for n, _ in model.named_parameters()]
+    names = ["eta", "nu", "command", "fins", "voltage", "altitude"][: len(leaves)] + [
+        n for n, _ in model.named_parameters()
+    ]
     moved = 0
     for name, a, b in zip(names, own, slopes, strict=False):
         assert bool((b == 0).all()) == bool((a == 0).all()), name
@@ -161,6 +174,10 @@ def test_a_diverging_run_is_reported_as_by_torch(compiler):
     with torch.no_grad():
         eta, nu, inputs, times = random_run(model, (3,), 8)
         nu[1] = 1e6
-        one, other = (model.rollout(eta, nu, Inputs(inputs.command), times, engine=e) for e in ("torch", "compiled"))
-    assert [(d.index, d.time, d.term) for d in one.divergences] == [(d.index, d.time, d.term) for d in other.divergences]
+        one, other = (
+            model.rollout(eta, nu, Inputs(inputs.command), times, engine=e) for e in ("torch", "compiled")
+        )
+    assert [(d.index, d.time, d.term) for d in one.divergences] == [
+        (d.index, d.time, d.term) for d in other.divergences
+    ]
     assert one.diverged

@@ -97,7 +97,9 @@ def test_user_effects_that_are_not_covered_say_so(compiler, effect, reason):
 
 def test_a_gradient_that_a_user_defined_is_kept(compiler):
     model = rov(OwnGradient())
-    slopes = [torch.autograd.grad(run(model, e)[-1].sum(), model.effects[0].theta)[0] for e in ("torch", "compiled")]
+    slopes = [
+        torch.autograd.grad(run(model, e)[-1].sum(), model.effects[0].theta)[0] for e in ("torch", "compiled")
+    ]
     assert float((slopes[0] - slopes[1]).abs()) < 1e-10 * float(slopes[0].abs())
 
 
