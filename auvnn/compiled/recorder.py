@@ -33,14 +33,20 @@ class Recorder(TorchDispatchMode):
         super().__init__()
         self.scalars = scalars
         self._nodes: dict[int, Tensor] = {}
+        self._given: set[int] = set()
         # Storages are told apart by address: none may be freed while we look.
         self._alive: list[Tensor] = []
 
     def track(self, tensor: Tensor, nodes: Sequence[int]) -> Tensor:
         """Declare a contiguous tensor's elements to be the given nodes."""
         self._alive.append(tensor)
+        self._given.add(tensor.untyped_storage()._cdata)
         self._nodes[tensor.untyped_storage()._cdata] = torch.tensor(list(nodes), dtype=torch.int64)
         return tensor
+
+    def is_given(self, tensor: Tensor) -> bool:
+        """Return whether a tensor is a view of a declared one: of the state, an input or a parameter."""
+        return tensor.untyped_storage()._cdata in self._given
 
     def nodes(self, tensor: Tensor) -> Tensor:
         """Return the nodes of a tensor's elements, int64 of the same shape; constants for an unknown tensor."""

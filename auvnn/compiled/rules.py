@@ -12,25 +12,25 @@ from auvnn.compiled.recorder import CannotCompile, Recorder, tensors
 
 # Move elements without computing: done by torch itself on the nodes' numbers; what they fill in is zero, node 0.
 MOVES = frozenset(
-    (
+    (  # noqa: SIM905
         "cat stack clone contiguous index_select gather flip roll "
         "repeat tril triu select_backward slice_backward diagonal_backward unfold_backward lift_fresh_copy "
         "lift_fresh select_scatter slice_scatter diagonal_scatter diag_embed take_along_dim expand_copy view_copy "
         "permute_copy unsqueeze_copy index constant_pad_nd "
-    ).split()  # noqa: SIM905
+    ).split()
 )
 
 # Their result does not depend on the values of what they are given.
 BLIND = frozenset(
-    (
+    (  # noqa: SIM905
         "zeros_like ones_like full_like empty_like new_zeros new_ones new_full new_empty new_empty_strided "
         "zeros ones full empty empty_strided arange eye scalar_tensor linspace "
-    ).split()  # noqa: SIM905
+    ).split()
 )
 
 # Take numbers out of tensors, or make shapes depend on them.
 READS = frozenset(
-    ("_local_scalar_dense is_nonzero equal nonzero item masked_select unique _unique2 ").split()  # noqa: SIM905
+    ["_local_scalar_dense", "is_nonzero", "equal", "nonzero", "item", "masked_select", "unique", "_unique2"]
 )
 
 
@@ -82,6 +82,8 @@ def apply(r: Recorder, func: Any, args: tuple, kwargs: dict) -> Any:
         raise CannotCompile(f"torch's operation {func}")
     # Before it runs: an operation in place changes what a constant was.
     target = args[0] if mutable else None
+    if target is not None and not _views(func) and r.is_given(target):
+        raise CannotCompile("a state, an input, a parameter or a buffer is changed in place")
     if target is not None and not _views(func) and (followed or r.followed(target)):
         r.adopt(target)
     plain = name[:-1] if mutable and name.endswith("_") else name

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import functools
 import hashlib
@@ -17,6 +18,8 @@ from pathlib import Path
 from auvnn.compiled.recorder import CannotCompile
 
 FLAGS = ("-O2", "-std=gnu11", "-march=native", "-fPIC", "-shared", "-fno-math-errno", "-fno-trapping-math")
+MOST = 256
+"""Kernels that are kept; the ones that were not used for longest make room."""
 TIMEOUT = 180.0
 """Seconds after which a compiler is given up."""
 
@@ -99,11 +102,23 @@ def build(source: str, lanes: int) -> tuple[ctypes.CDLL, float]:
         begin = time.perf_counter()
         _compile(command, source, lanes, target)
         spent = time.perf_counter() - begin
+        _make_room(folder)
     try:
-        return ctypes.CDLL(str(target)), spent
+        loaded = ctypes.CDLL(str(target))
+        with contextlib.suppress(OSError):
+            os.utime(target)  # when it was used last
+        return loaded, spent
     except OSError as error:
         target.unlink(missing_ok=True)
         raise CannotCompile(f"compiled code cannot be loaded: {error}") from None
+
+
+def _make_room(folder: Path) -> None:
+    """Remove what was not used for longest; another process may be at the same."""
+    with contextlib.suppress(OSError):
+        kept = sorted(folder.glob("*.so"), key=lambda f: f.stat().st_mtime)
+        for old in kept[:-MOST]:
+            old.unlink(missing_ok=True)
 
 
 def _compile(command: str, source: str, lanes: int, target: Path) -> None:

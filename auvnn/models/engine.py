@@ -192,8 +192,8 @@ def _compiled(
     _ready(made, model, inputs, count)
     numbers = Numbers.of(_RightHandSide(model)).row()
     y0 = torch.cat([x.reshape(count, x.shape[-1]) for x in state], dim=-1)
-    slopes = None if drive.slopes is None else _flat(drive.slopes.expand(*drive.slopes.shape), 3, batch)
-    means = _flat(drive.means if slopes is None else drive.means.expand(drive.slopes.shape), 3, batch)  # type: ignore[union-attr]
+    slopes = None if drive.slopes is None else _flat(drive.slopes, 3, batch)
+    means = _flat(drive.means if drive.slopes is None else drive.means.expand(drive.slopes.shape), 3, batch)
     run = made.kernel.run(y0, means, slopes, _held(inputs, batch), _flat(times, 1, batch), numbers, substeps)
     run = run.reshape(*batch, rows, SIZE)
     return run[..., :7], run[..., 7:]

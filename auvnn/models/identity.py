@@ -10,14 +10,14 @@ from torch import Tensor, nn
 
 # What torch itself keeps in a module. Parameters and buffers are inputs of compiled code, but for their shapes.
 OWN = frozenset(
-    (
+    (  # noqa: SIM905
         "_parameters _buffers _modules "
         "_non_persistent_buffers_set _backward_pre_hooks _backward_hooks "
         "_is_full_backward_hook _forward_hooks _forward_hooks_with_kwargs "
         "_forward_hooks_always_called _forward_pre_hooks _forward_pre_hooks_with_kwargs "
         "_state_dict_hooks _state_dict_pre_hooks _load_state_dict_pre_hooks "
         "_load_state_dict_post_hooks "
-    ).split()  # noqa: SIM905
+    ).split()
 )
 DEEPEST = 6
 
@@ -26,7 +26,8 @@ class Identity:
     """A key that changes whenever something changes that compiled code has taken as constant.
 
     Plain numbers, texts, lists and small arrays count by value, tensors by identity and version, everything else by
-    identity; what counts by identity is held, so that no other object gets its address.
+    identity; what counts by identity is held, so that no other object gets its address. Not seen is what changes in
+    a module's globals, or inside an object that is frozen or callable.
 
     Args:
         model: module whose own attributes and parts count.

@@ -210,3 +210,19 @@ def test_auto_compiles_only_where_it_pays(compiler, monkeypatch, tmp_path):
         other = rov()
         run(other, "auto", rows=600)
         assert len(built) == 1  # known code, loaded already
+
+
+class Counts(Strange):
+    """Changes a buffer whenever it is asked: code would not."""
+
+    def __init__(self):
+        super().__init__()
+        self.register_buffer("calls", torch.zeros((), dtype=DOUBLE))
+
+    def pattern(self, moment):
+        self.calls += 1.0
+        return moment.nu * self.calls
+
+
+def test_what_changes_itself_is_left_to_torch(compiler):
+    assert "changed in place" in engines.why_not(rov(Counts()), gradient=False)
