@@ -85,6 +85,8 @@ def main(out: str, *options: str) -> None:
     if unknown:
         sys.exit(f"only={unknown[0]}: choose from {', '.join(PARTS)}")
     repeats, seeds = int(given.get("repeats", 20)), int(given.get("seeds", 10))
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
     answer: dict[str, Any] = {"machine": machine()}
     rolling = {"free", "windows", "many", "compile"} & set(only)
     if rolling or "training" in only:
@@ -110,8 +112,6 @@ def main(out: str, *options: str) -> None:
     if "imports" in only:
         answer["imports"] = imports(max(3, repeats // 4))
         print("### imports\n", *(f"{row}" for row in answer["imports"]), "", sep="\n", flush=True)
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
     (folder / "benchmarks.json").write_text(json.dumps(answer, indent=1) + "\n", encoding="utf-8")
     print(f"written: {folder / 'benchmarks.json'}")
 
