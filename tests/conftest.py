@@ -9,6 +9,9 @@ if os.environ.get("AUVNN_CHECK_SHAPES") == "1":
 
     install_import_hook("auvnn.physics", "beartype.beartype")
 
+# What is compiled, and when, is for tests/fast to ask; elsewhere nothing is left in anybody's cache.
+os.environ.setdefault("AUVNN_ENGINE", "torch")
+
 import torch
 
 torch.set_num_threads(1)

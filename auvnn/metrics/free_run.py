@@ -15,7 +15,7 @@ MAX_STEP = 0.05
 
 
 def predict(
-    model: GreyBox, windows: Windows, initial: Tensor, max_step: float = MAX_STEP
+    model: GreyBox, windows: Windows, initial: Tensor, max_step: float = MAX_STEP, engine: str = "torch"
 ) -> tuple[Tensor, Tensor]:
     """Run every window free from its initial state.
 
@@ -24,6 +24,8 @@ def predict(
         windows: B windows of L samples.
         initial: (B, 13): position, quaternion, velocity.
         max_step: longest step of the solver, s.
+        engine: see `rollout`. Plain torch by default: a training that goes on after it was killed must end with the
+            same bits, whatever has been compiled meanwhile.
 
     Returns:
         eta (B, L, 7) and nu (B, L, 6), of the vehicle itself and not of what sensors report.
@@ -37,6 +39,7 @@ def predict(
         max_step=max_step,
         warmup=windows.warmup,
         check=False,
+        engine=engine,
     )
     return run.eta, run.nu
 

@@ -18,17 +18,36 @@ from auvnn.vehicle import Vehicle
 
 @dataclass(frozen=True)
 class Drive:
-    """The thrust over T intervals, each cut into equal steps, N (or the wrench), (..., n) per entry.
+    """The thrust over T rows' intervals, each cut into equal steps, N (or the wrench).
 
     Attributes:
-        mean: average thrust, [interval][step].
-        slope: rise of the equivalent straight line over the step, or None where the thrust is constant.
-        start: thrust just after the interval began, [interval]: what an accelerometer sees there.
+        means: average thrust over each step, (..., T, steps, n), or (..., T, 1, n) where all steps have the same.
+        slopes: rise of the equivalent straight line over each step, or None where the thrust is constant.
+        starts: thrust just after the interval began, (..., T, n): what an accelerometer sees there.
+        steps: per interval.
     """
 
-    mean: list[list[Tensor]]
-    slope: list[list[Tensor]] | None
-    start: list[Tensor]
+    means: Tensor
+    slopes: Tensor | None
+    starts: Tensor
+    steps: int
+
+    @property
+    def mean(self) -> list[list[Tensor]]:
+        """Average thrust, [interval][step], (..., n): views, so that a loop need not index."""
+        if self.means.shape[-2] == 1:
+            return [[row] * self.steps for row in self.means.squeeze(-2).unbind(-2)]
+        return [list(row.unbind(-2)) for row in self.means.unbind(-3)]
+
+    @property
+    def slope(self) -> list[list[Tensor]] | None:
+        """Slopes, [interval][step], or None."""
+        return None if self.slopes is None else [list(row.unbind(-2)) for row in self.slopes.unbind(-3)]
+
+    @property
+    def start(self) -> list[Tensor]:
+        """Thrust as each interval begins, [interval]."""
+        return list(self.starts.unbind(-2))
 
 
 def _double(values: Any) -> Tensor:
@@ -131,8 +150,8 @@ class Actuators(nn.Module):
         demand = self.demand(command, times, effects)
         lag, late = _only(effects, "respond"), _only(effects, "delay")
         if lag is None:
-            rows = list(demand[..., warmup:, :].unbind(-2))
-            plain = Drive([[row] * substeps for row in rows], None, rows)
+            rows = demand[..., warmup:, :]
+            plain = Drive(rows.unsqueeze(-2), None, rows, substeps)
             states = demand
         else:
             states, answer = _states(demand, times, lag, substeps)
@@ -179,13 +198,9 @@ def _lagged(demand: Tensor, states: Tensor, answer: Response, substeps: int, war
     means, slopes = [], []
     for part in range(substeps):
         now = gap * end**part
-        means.append((demand + now * mean).unbind(-2))
-        slopes.append((now * slope).unbind(-2))
-    return Drive(
-        [list(x) for x in zip(*means, strict=True)],
-        [list(x) for x in zip(*slopes, strict=True)],
-        list((demand + gap * start).unbind(-2)),
-    )
+        means.append(demand + now * mean)
+        slopes.append(now * slope)
+    return Drive(torch.stack(means, dim=-2), torch.stack(slopes, dim=-2), demand + gap * start, substeps)
 
 
 def _delayed(plain: Drive, signal: ThrustSignal, delay: Tensor, substeps: int, warmup: int) -> Drive:
@@ -203,14 +218,9 @@ def _delayed(plain: Drive, signal: ThrustSignal, delay: Tensor, substeps: int, w
     mean, slope = signal.over(begin - late, length, longest)
     # The same sums without delay take away their own rounding, so that a delay of zero changes nothing at all.
     mean_now, slope_now = signal.over(begin, length, longest)
-    means = torch.stack([torch.stack(row, dim=-2) for row in plain.mean], dim=-3)
-    means = means + (mean - mean_now).unflatten(-2, (rows, substeps))
+    means = plain.means + (mean - mean_now).unflatten(-2, (rows, substeps))
     slopes = (slope - slope_now).unflatten(-2, (rows, substeps))
-    if plain.slope is not None:
-        slopes = slopes + torch.stack([torch.stack(row, dim=-2) for row in plain.slope], dim=-3)
-    start = torch.where(late > 0, signal.at(times - late), torch.stack(plain.start, dim=-2))
-    return Drive(
-        [list(row.unbind(-2)) for row in means.unbind(-3)],
-        [list(row.unbind(-2)) for row in slopes.unbind(-3)],
-        list(start.unbind(-2)),
-    )
+    if plain.slopes is not None:
+        slopes = slopes + plain.slopes
+    start = torch.where(late > 0, signal.at(times - late), plain.starts)
+    return Drive(means, slopes, start, substeps)

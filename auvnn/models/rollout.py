@@ -11,14 +11,16 @@ from torch import Tensor
 
 from auvnn.effects import Effect
 from auvnn.errors import ConfigError
+from auvnn.models.actuators import Drive
+from auvnn.models.engine import compiled_run
 from auvnn.models.excursions import extrapolated
 from auvnn.models.inputs import Inputs
 from auvnn.models.limits import LIMIT
+from auvnn.models.rate import state_rate, unit_attitude
 from auvnn.models.stiffness import MAX_STEPS, MOST_CUT, UNSTABLE, fastest_rate, followed
 from auvnn.models.stiffness import words as stiff_words
-from auvnn.physics.attitude import quat_derivative, quat_to_matrix
+from auvnn.physics.attitude import quat_to_matrix
 from auvnn.physics.kinematics import eta6_to_eta7
-from auvnn.physics.products import matvec
 
 if TYPE_CHECKING:
     from auvnn.models.grey_box import GreyBox
@@ -104,6 +106,7 @@ def rollout(
     max_step: float = 0.05,
     warmup: int = 0,
     check: bool = True,
+    engine: str = "auto",
     **solver_options: Any,
 ) -> Trajectory:
     """Integrate the model from a state, each command held until the next row's time.
@@ -119,14 +122,17 @@ def rollout(
         warmup: rows of history before the stretch, from which the actuators' state is worked out.
         check: look for divergence, try shorter steps where that is the step's fault, and note where it leaves the
             velocities that its damping was trained on; off inside function transforms.
+        engine: how the own solvers run: "torch"; "compiled", as machine code made from the torch functions, which
+            agrees to rounding and can be differentiated once; or "auto", compiled where that is possible and pays
+            (see `auvnn.models.engine`).
         **solver_options: handed to torchdiffeq (rtol, atol).
 
     Returns:
         The trajectory at the T times. One that diverges keeps its last sound state and is reported.
 
     Raises:
-        ConfigError: unknown solver or option, shapes that do not fit, times that decrease or are not finite, or more
-            steps than the budget.
+        ConfigError: unknown solver, engine or option, a model that cannot be compiled where that is asked for,
+            shapes that do not fit, times that decrease or are not finite, or more steps than the budget.
     """
     inputs = commands if isinstance(commands, Inputs) else Inputs(commands)
     batch = _leading_shape(model, eta0, nu0, inputs, times, warmup)
@@ -155,12 +161,14 @@ def rollout(
     elif solver in TABLEAUS:
         if solver_options:
             raise ConfigError(f"solver {solver} has no option {sorted(solver_options)[0]!r}")
-        eta, nu = _fixed(model, state, inputs, times, drive, substeps, TABLEAUS[solver])
+        steps = (model, state, inputs, times, drive, substeps, TABLEAUS[solver])
+        run = compiled_run(*steps, engine)
+        eta, nu = _fixed(*steps) if run is None else run
     else:
         raise ConfigError(
             f"no solver called '{solver}'. There are: {', '.join(TABLEAUS)}, torchdiffeq:METHOD"
         )
-    thrust = torch.stack([row.expand(*batch, row.shape[-1]) for row in drive.start], dim=-2)
+    thrust = drive.starts.expand(*batch, *drive.starts.shape[-2:])
     result = Trajectory(times, eta, nu, thrust)
     if not check:
         return result
@@ -171,7 +179,8 @@ def rollout(
         finer = followed(step, rate)
         if step / finer <= MOST_CUT:
             # Too long a step makes a stiff model explode that is sound by itself: only a finer one can tell.
-            again = rollout(model, eta0, nu0, whole[0], whole[1], solver=solver, max_step=finer, warmup=warmup)
+            alike = {"solver": solver, "warmup": warmup, "engine": engine}
+            again = rollout(model, eta0, nu0, whole[0], whole[1], max_step=finer, **alike)
             if not again.diverged:
                 return replace(again, notes=(stiff_words(rate, step), *again.notes))
     return replace(result, notes=tuple(notes)) if notes else result
@@ -253,8 +262,9 @@ TABLEAUS = {
 
 
 def _fixed(
-    model: GreyBox, state: tuple, inputs: Inputs, times: Tensor, drive: Any, substeps: int, tableau: tuple
+    model: GreyBox, state: tuple, inputs: Inputs, times: Tensor, drive: Drive, substeps: int, tableau: tuple
 ) -> tuple[Tensor, Tensor]:
+    """Step by step in plain torch: what every other way of running is measured against."""
     # One tensor for the whole state: what costs here is the number of operations, not their size.
     y = torch.cat(state, dim=-1)
     prepared = None if model.time_varying else model.prepare()
@@ -262,39 +272,22 @@ def _fixed(
     # Differences first: single precision would spoil the steps of a long log.
     steps = ((times[..., 1:] - times[..., :-1]) / substeps).to(y).unsqueeze(-1).unbind(-2)
     starts = times.to(y).unbind(-1)
-    rows = inputs.each()
-
-    def rate(y: Tensor, thrust: Tensor, row: Inputs, time: Tensor) -> Tensor:
-        position, quaternion, nu = y.split((3, 4, 6), dim=-1)
-        rotation = quat_to_matrix(quaternion)
-        return torch.cat(
-            [
-                matvec(rotation, nu[..., :3]),
-                quat_derivative(quaternion, nu[..., 3:]),
-                model.nu_dot(position, rotation, nu, thrust, row, time, prepared),
-            ],
-            dim=-1,
-        )
-
+    rows, means, slopes = inputs.each(), drive.mean, drive.slope
     out = [y]
     for k, h in enumerate(steps):
         flat = h.squeeze(-1)
         for part in range(substeps):
             begin = starts[k] + part * flat if part else starts[k]
-            mean = drive.mean[k][part]
-            slope = None if drive.slope is None else drive.slope[k][part]
+            mean, slope = means[k][part], None if slopes is None else slopes[k][part]
             total, last = None, None
             for c, weight in zip(stages, weights, strict=True):
                 at = y if last is None else y + (c * h) * last
                 thrust = mean if slope is None else mean + (c - 0.5) * slope
-                last = rate(at, thrust, rows[k], begin + c * flat if c else begin)
+                last = state_rate(model, at, thrust, rows[k], begin + c * flat if c else begin, prepared)
                 if weight:
                     total = weight * last if total is None else total + weight * last
             assert total is not None
-            y = y + h * total
-            quaternion = y[..., 3:7]
-            unit = quaternion / torch.linalg.vector_norm(quaternion, dim=-1, keepdim=True)
-            y = torch.cat([y[..., :3], unit, y[..., 7:]], dim=-1)
+            y = unit_attitude(y + h * total)
         out.append(y)
     run = torch.stack(out, dim=-2)
     return run[..., :7], run[..., 7:]

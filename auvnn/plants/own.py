@@ -94,7 +94,9 @@ def open_loop(plant: GreyBox, plan: Start, voltage: Tensor | None, t: Tensor, ma
     assert plan.command is not None
     fins = None if plan.fins is None else torch.tensor(plan.fins)
     inputs = Inputs(torch.tensor(plan.command), fins, voltage)
-    run = plant.rollout(torch.tensor(plan.eta0), _first_velocity(plant, plan), inputs, t, max_step=max_step)
+    # A log is the same to the last bit for the same seed, whatever has been compiled before.
+    nu0 = _first_velocity(plant, plan)
+    run = plant.rollout(torch.tensor(plan.eta0), nu0, inputs, t, max_step=max_step, engine="torch")
     if run.divergences:
         first = run.divergences[0]
         raise diverged(plant.vehicle.name, first.index, first.time, first.term)

@@ -1,0 +1,145 @@
+"""The system's C compiler: found, run, and its results kept under the user's cache folder."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import functools
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from auvnn.compiled.recorder import CannotCompile
+
+FLAGS = ("-O2", "-std=gnu11", "-march=native", "-fPIC", "-shared", "-fno-math-errno", "-fno-trapping-math")
+MOST = 256
+"""Kernels that are kept; the ones that were not used for longest make room."""
+TIMEOUT = 180.0
+"""Seconds after which a compiler is given up."""
+
+
+def compiler() -> str | None:
+    """Return the C compiler: the environment's AUVNN_CC or CC, else cc, gcc or clang; None if there is none.
+
+    AUVNN_CC=none says to do without.
+    """
+    named = os.environ.get("AUVNN_CC") or os.environ.get("CC")
+    for name in [named] if named else ["cc", "gcc", "clang"]:
+        found = shutil.which(name)
+        if found:
+            return found
+    return None
+
+
+def cache_folder() -> Path:
+    """Return the folder that compiled code is kept in: AUVNN_CACHE, else auvnn/kernels under the user's cache."""
+    own = os.environ.get("AUVNN_CACHE")
+    if own:
+        return Path(own)
+    base = Path.home() / "Library/Caches" if sys.platform == "darwin" else Path.home() / ".cache"
+    return Path(os.environ.get("XDG_CACHE_HOME") or base) / "auvnn" / "kernels"
+
+
+@functools.lru_cache
+def _machine(command: str) -> str:
+    """Return what the machine code depends on besides the source: compiler, its version, processor."""
+    version = subprocess.run(
+        [command, "--version"], capture_output=True, text=True, timeout=30, check=False
+    ).stdout
+    try:
+        info = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+        flags = next((line for line in info.splitlines() if line.startswith(("flags", "Features"))), "")
+    except OSError:
+        flags = platform.processor()
+    return f"{command}\n{version}\n{platform.machine()}\n{flags}"
+
+
+def key(source: str, lanes: int) -> str:
+    """Return the name under which the code of a source is kept.
+
+    Raises:
+        CannotCompile: there is no compiler.
+    """
+    command = compiler()
+    if command is None:
+        raise CannotCompile("no C compiler (cc, gcc or clang) was found")
+    text = "\n".join([source, str(lanes), *FLAGS, _machine(command)])
+    return hashlib.sha256(text.encode()).hexdigest()[:40]
+
+
+def is_kept(source: str, lanes: int) -> bool:
+    """Return whether the code of a source is there already."""
+    return (cache_folder() / f"{key(source, lanes)}.so").is_file()
+
+
+def build(source: str, lanes: int) -> tuple[ctypes.CDLL, float]:
+    """Return the loaded code of a source, and the seconds that compiling took (zero where it was kept).
+
+    Raises:
+        CannotCompile: no compiler, or it fails, or its result cannot be loaded.
+    """
+    name = key(source, lanes)
+    command = compiler()
+    assert command is not None
+    folder = cache_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        status = folder.stat()
+        if hasattr(os, "getuid") and (status.st_uid != os.getuid() or status.st_mode & 0o022):
+            raise CannotCompile(
+                f"{folder} can be written by others, who could put code there: make it private"
+            )
+    except OSError as error:
+        raise CannotCompile(f"the cache folder {folder} cannot be made: {error.strerror}") from None
+    target, spent = folder / f"{name}.so", 0.0
+    if not target.is_file():
+        begin = time.perf_counter()
+        _compile(command, source, lanes, target)
+        spent = time.perf_counter() - begin
+        _make_room(folder)
+    try:
+        loaded = ctypes.CDLL(str(target))
+        with contextlib.suppress(OSError):
+            os.utime(target)  # when it was used last
+        return loaded, spent
+    except OSError as error:
+        target.unlink(missing_ok=True)
+        raise CannotCompile(f"compiled code cannot be loaded: {error}") from None
+
+
+def _make_room(folder: Path) -> None:
+    """Remove what was not used for longest; another process may be at the same."""
+    with contextlib.suppress(OSError):
+        kept = sorted(folder.glob("*.so"), key=lambda f: f.stat().st_mtime)
+        for old in kept[:-MOST]:
+            old.unlink(missing_ok=True)
+
+
+def _compile(command: str, source: str, lanes: int, target: Path) -> None:
+    """Compile beside the target and move the result into place: another process sees all of it or nothing."""
+    try:
+        with tempfile.TemporaryDirectory(dir=target.parent, prefix="making-") as folder:
+            text, made = Path(folder, "kernel.c"), Path(folder, "kernel.so")
+            text.write_text(source, encoding="utf-8")
+            done = subprocess.run(
+                [command, *FLAGS, f"-DLANES={lanes}", "-o", str(made), str(text), "-lm"],
+                capture_output=True,
+                text=True,
+                timeout=TIMEOUT,
+                check=False,
+            )
+            if done.returncode:
+                first = next((line for line in done.stderr.splitlines() if "error" in line), "no message")
+                raise CannotCompile(f"{command} failed: {first.strip()[-200:]}")
+            os.chmod(made, 0o700)
+            os.replace(made, target)
+    except subprocess.TimeoutExpired:
+        raise CannotCompile(f"{command} took longer than {TIMEOUT:g} s") from None
+    except OSError as error:
+        raise CannotCompile(f"the compiled code cannot be written: {error.strerror}") from None
