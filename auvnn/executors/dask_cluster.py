@@ -1,0 +1,78 @@
+"""Dask: a scheduler that runs already (`address=`), or workers started on this machine."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from auvnn.errors import ConfigError, MissingExtra, one_line
+from auvnn.executors.base import TRIES, Executor, Lost
+
+# Tasks handed in before their turn, for each worker: bounds what waits in the cluster's memory.
+AHEAD = 4
+
+
+class DaskCluster(Executor):
+    """Tasks of a Dask scheduler, which gives a dead worker's tasks to another.
+
+    What all tasks share goes with each of them: data scattered once would be lost with the worker that holds it.
+
+    Reference: https://distributed.dask.org/en/stable/resilience.html
+    """
+
+    name = "dask"
+    remote = True
+
+    def start(self) -> None:
+        """Join the scheduler, or start `workers` processes.
+
+        Raises:
+            MissingExtra: Dask's scheduler is not installed.
+            ConfigError: no scheduler answers at the address.
+        """
+        try:
+            import dask
+            from distributed import Client, LocalCluster
+        except ImportError:
+            raise MissingExtra("distributed", "cluster", "executor=dask") from None
+        dask.config.set({"distributed.scheduler.allowed-failures": TRIES - 1})
+        self._cluster = None
+        try:
+            if self.address is None:
+                self._cluster = LocalCluster(
+                    n_workers=self.workers, threads_per_worker=1, processes=True, dashboard_address=None
+                )
+            self.client = Client(self._cluster or self.address)
+        except (OSError, ValueError) as problem:
+            raise ConfigError(
+                f"address={self.address}: no Dask scheduler to join ({one_line(problem, 200)})"
+            ) from None
+
+    def stop(self) -> None:
+        """Leave the scheduler; one that was started here ends."""
+        self.client.close()
+        if self._cluster is not None:
+            self._cluster.close()
+
+    def run(self, function: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any]) -> Iterator[Any]:
+        """Yield the answers in the order of the tasks.
+
+        Raises:
+            Lost: a task brought down three workers.
+        """
+        handed: deque[Any] = deque()
+        for number, task in enumerate(tasks):
+            handed.append((number, self.client.submit(function, shared, task, pure=False)))
+            if len(handed) >= AHEAD * self.workers:
+                yield self._answer(*handed.popleft())
+        while handed:
+            yield self._answer(*handed.popleft())
+
+    def _answer(self, number: int, future: Any) -> Any:
+        from distributed.scheduler import KilledWorker
+
+        try:
+            return future.result()
+        except KilledWorker as problem:
+            raise Lost(number, TRIES, str(problem)) from None
