@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -32,18 +33,18 @@ class DaskCluster(Executor):
             ConfigError: no scheduler answers at the address.
         """
         try:
-            import dask
-            from distributed import Client, LocalCluster
+            dask = importlib.import_module("dask")
+            distributed = importlib.import_module("distributed")
         except ImportError:
             raise MissingExtra("distributed", "cluster", "executor=dask") from None
         dask.config.set({"distributed.scheduler.allowed-failures": TRIES - 1})
         self._cluster = None
         try:
             if self.address is None:
-                self._cluster = LocalCluster(
+                self._cluster = distributed.LocalCluster(
                     n_workers=self.workers, threads_per_worker=1, processes=True, dashboard_address=None
                 )
-            self.client = Client(self._cluster or self.address)
+            self.client = distributed.Client(self._cluster or self.address)
         except (OSError, ValueError) as problem:
             raise ConfigError(
                 f"address={self.address}: no Dask scheduler to join ({one_line(problem, 200)})"
@@ -70,9 +71,8 @@ class DaskCluster(Executor):
             yield self._answer(*handed.popleft())
 
     def _answer(self, number: int, future: Any) -> Any:
-        from distributed.scheduler import KilledWorker
-
+        killed = importlib.import_module("distributed.scheduler").KilledWorker
         try:
             return future.result()
-        except KilledWorker as problem:
+        except killed as problem:
             raise Lost(number, TRIES, str(problem)) from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -31,7 +32,7 @@ class RayCluster(Executor):
             ConfigError: no cluster answers at the address.
         """
         try:
-            import ray
+            ray = importlib.import_module("ray")
         except ImportError:
             raise MissingExtra("ray", "cluster", "executor=ray") from None
         self._ray, self._ours = ray, not ray.is_initialized()
