@@ -36,6 +36,7 @@ class Diagnosis(Answer):
     explanation: Explanation | None = None
     residual_tests: dict[str, Any] = field(default_factory=dict)
     absorbed: Absorption | None = None
+    whole_log: dict[str, Any] | None = None
 
     @property
     def surfaces(self) -> list[dict[str, Any]]:
@@ -68,6 +69,7 @@ class Diagnosis(Answer):
             "global_p_value",
             "residual_tests",
             "story",
+            "whole_log",
         )
         absorbed = None if self.absorbed is None else self.absorbed.to_dict()
         return plain(

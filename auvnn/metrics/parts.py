@@ -120,7 +120,7 @@ class Plan:
             for part in self.parts
             for k in range(0, max(len(part) - together // 2, 1), together)
         ]
-        count = max(most // together, 1)
+        count = max(int(most * len(pieces) / sum(map(len, pieces))), 1)
         if count >= len(pieces):
             return tuple(pieces)
         return tuple(pieces[int((i + 0.5) * len(pieces) / count)] for i in range(count))

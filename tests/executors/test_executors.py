@@ -8,8 +8,6 @@ import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
 from chores import always_deadly, noisy, once_deadly, power, refusing
 
 from auvnn.errors import ConfigError, InputError, MissingExtra
