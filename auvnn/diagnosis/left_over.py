@@ -20,8 +20,8 @@ def slow(explanation: Explanation, floor: Array) -> bool:
         floor: (18,) no channel is trusted beyond.
     """
     sums = explanation.fitted.statistics
-    totals = (x.sum(0) for x in (sums.channel, sums.count, sums.rough, sums.pairs))
-    return lasting(*totals, len(sums.cost), floor)
+    channel, count, rough, pairs = (x.sum(0) for x in (sums.channel, sums.count, sums.rough, sums.pairs))
+    return lasting(channel, count, rough, pairs, len(sums.cost), floor)
 
 
 def lasting(channel: Array, count: Array, rough: Array, pairs: Array, windows: int, floor: Array) -> bool:

@@ -29,6 +29,7 @@ from auvnn.answers import plain
 from auvnn.diagnosis.answer import Diagnosis
 from auvnn.diagnosis.cut import HORIZON, WARMUP
 from auvnn.diagnosis.diagnose import searched
+from auvnn.diagnosis.doubts import doubts
 from auvnn.diagnosis.nuisance import Layout, lay_out
 from auvnn.diagnosis.passes import Passes, Point
 from auvnn.diagnosis.search import Search, together
@@ -131,7 +132,7 @@ def diagnose_files(
             passes, layout_with(under_way, last.effects), last, under_way.extent, cut, under_way.floor
         )
     found.whole_log = _told(plan, len(paths), sum(map(len, parts)), told, looked, layout, fitted, found)
-    found.warnings += [told["words"], *plan.notes[:5]]
+    found.warnings += [*doubts(model, sample), told["words"], *plan.notes[:5]]
     if len(plan.notes) > 5:
         found.warnings.append(f"and {len(plan.notes) - 5} more stretches of rows left out")
     return found

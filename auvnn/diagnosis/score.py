@@ -107,7 +107,7 @@ def projection(
     f, theta = f[movable], theta[movable]
     held = Priors(held.mean[movable], held.precision[movable])
     inner = total[np.ix_(f, f)] + np.diag(held.precision)
-    carry = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
+    carry: Array = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
     gradient = slope[c] - carry @ slope[f] + carry @ (held.precision * (theta - held.mean))
     information = total[np.ix_(c, c)] - carry @ total[np.ix_(f, c)]
     return Projection(c, f, carry, gradient, 0.5 * (information + information.T))
@@ -130,7 +130,7 @@ def following(
     others = [n for n in base if n != effect]
     f, c = layout.of(others), layout.columns[effect]
     inner = total[np.ix_(f, f)] + np.diag(priors(layout, others, free).precision)
-    carry = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
+    carry: Array = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
     return c, f, carry
 
 

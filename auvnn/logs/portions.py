@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -83,7 +83,9 @@ def log_files(places: Iterable[str | Path]) -> list[Path]:
         if place.is_dir():
             inside = sorted(p for p in place.iterdir() if p.is_file() and p.suffix.lower() in known)
             if not inside:
-                raise InputError(f"{place}: no log file in this folder; they end in {', '.join(known)}")
+                raise InputError(
+                    f"{place}: is a folder without a log file in it; they end in {', '.join(known)}"
+                )
             found += inside
         elif not place.exists() and any(sign in str(place) for sign in "*?["):
             root = Path(place.anchor) if place.is_absolute() else Path()
@@ -95,3 +97,22 @@ def log_files(places: Iterable[str | Path]) -> list[Path]:
         else:
             found.append(place)
     return list(dict.fromkeys(found))
+
+
+# Rows beyond which a log is better taken in parts, and bytes of a text file that are about one row.
+LARGE, ROW_BYTES = 200_000, 300
+
+
+def is_large(paths: Sequence[Path]) -> bool:
+    """Say whether log files hold more than `LARGE` rows together, by their tables of contents or their sizes.
+
+    Raises:
+        InputError: a file cannot be read.
+    """
+    rows = 0
+    for path in paths:
+        reader, _ = choose(path)
+        rows += reader.rows(path) if reader.name == "parquet" else path.stat().st_size // ROW_BYTES
+        if rows > LARGE:
+            return True
+    return False

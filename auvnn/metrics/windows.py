@@ -118,7 +118,8 @@ def starts(
     """
     t = run.t[part]
     usable = run.valid[part]
-    found, begin = [], t[0] if begin is None else begin
+    found: list[tuple[int, int]] = []
+    begin = float(t[0]) if begin is None else begin
     tolerance = 1e-6 * run.dt + 1e-3 * run.dt
     while begin <= t[-1] - run.dt:
         at = int(np.searchsorted(t, begin - tolerance))
@@ -134,8 +135,8 @@ def starts(
             found.append((part.start + at, part.start + end))
         if not complete:
             break
-        begin = max(begin + stride, t[at] + run.dt)
-    return found, float(begin)
+        begin = float(max(begin + stride, t[at] + run.dt))
+    return found, begin
 
 
 # A run, its commands, first and last sample of a window, and the first sample of its unbroken stretch.

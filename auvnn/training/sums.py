@@ -74,11 +74,15 @@ class Sums:
     def of(cls, statistics: Statistics) -> Self:
         """Return the sums of windows that have been reduced."""
         s = statistics
+        channel, count, rough, pairs = (x.sum(0) for x in (s.channel, s.count, s.rough, s.pairs))
         return cls(
             s.hessian.sum(0),
             s.slope.sum(0),
             float(s.cost.sum()),
-            *(x.sum(0) for x in (s.channel, s.count, s.rough, s.pairs)),
+            channel,
+            count,
+            rough,
+            pairs,
             len(s.cost),
         )
 
