@@ -107,10 +107,10 @@ def projection(
     f, theta = f[movable], theta[movable]
     held = Priors(held.mean[movable], held.precision[movable])
     inner = total[np.ix_(f, f)] + np.diag(held.precision)
-    carry: Array = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
+    carry = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
     gradient = slope[c] - carry @ slope[f] + carry @ (held.precision * (theta - held.mean))
     information = total[np.ix_(c, c)] - carry @ total[np.ix_(f, c)]
-    return Projection(c, f, carry, gradient, 0.5 * (information + information.T))
+    return Projection(c, f, np.asarray(carry, dtype=np.float64), gradient, 0.5 * (information + information.T))
 
 
 def _explained(
@@ -130,8 +130,8 @@ def following(
     others = [n for n in base if n != effect]
     f, c = layout.of(others), layout.columns[effect]
     inner = total[np.ix_(f, f)] + np.diag(priors(layout, others, free).precision)
-    carry: Array = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
-    return c, f, carry
+    carry = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
+    return c, f, np.asarray(carry, dtype=np.float64)
 
 
 def inflation(by_window: Array, information: Array, run: NDArray[np.int64], spent: int = 1) -> float:

@@ -18,10 +18,13 @@ class Lost(AuvnnError):
 
     def __init__(self, task: int, tries: int, why: str = "") -> None:
         """Say which one, and what it may have been."""
-        reason = f" ({one_line(why, 200)})" if why else ""
-        super().__init__(
-            f"part {task + 1}: {tries} workers died over it{reason}: not enough memory? Take fewer workers"
-        )
+        super().__init__(task, tries, why)
+        self.task, self.tries, self.why = task, tries, why
+
+    def __str__(self) -> str:
+        """Return the line for a person."""
+        reason = f" ({one_line(self.why, 200)})" if self.why else ""
+        return f"part {self.task + 1}: {self.tries} workers died over it{reason}: not enough memory? Take fewer workers"
 
 
 class Executor(ABC):
@@ -61,13 +64,21 @@ class Executor(ABC):
         """Let the workers go."""
 
     @abstractmethod
-    def run(self, function: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any]) -> Iterator[Any]:
+    def run(
+        self, function: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any], *, losses: bool = False
+    ) -> Iterator[Any]:
         """Yield `function(shared, task)` for each task, in the order of the tasks.
 
         Few answers are held at a time, however many tasks there are.
 
+        Args:
+            function: what to call.
+            shared: first argument of every call.
+            tasks: second argument, one for each call.
+            losses: give back `Lost` in the place of the answer to a task that brought down `TRIES` workers.
+
         Raises:
-            Lost: a task brought down `TRIES` workers.
+            Lost: there is such a task, and `losses` is false.
         """
 
 

@@ -56,23 +56,27 @@ class DaskCluster(Executor):
         if self._cluster is not None:
             self._cluster.close()
 
-    def run(self, function: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any]) -> Iterator[Any]:
+    def run(
+        self, function: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any], *, losses: bool = False
+    ) -> Iterator[Any]:
         """Yield the answers in the order of the tasks.
 
         Raises:
-            Lost: a task brought down three workers.
+            Lost: a task brought down three workers, and `losses` is false.
         """
         handed: deque[Any] = deque()
         for number, task in enumerate(tasks):
             handed.append((number, self.client.submit(function, shared, task, pure=False)))
             if len(handed) >= AHEAD * self.workers:
-                yield self._answer(*handed.popleft())
+                yield self._answer(*handed.popleft(), losses)
         while handed:
-            yield self._answer(*handed.popleft())
+            yield self._answer(*handed.popleft(), losses)
 
-    def _answer(self, number: int, future: Any) -> Any:
+    def _answer(self, number: int, future: Any, losses: bool) -> Any:
         killed = importlib.import_module("distributed.scheduler").KilledWorker
         try:
             return future.result()
         except killed as problem:
+            if losses:
+                return Lost(number, TRIES, str(problem))
             raise Lost(number, TRIES, str(problem)) from None

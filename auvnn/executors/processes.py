@@ -77,16 +77,18 @@ class Processes(Executor):
             worker.close()
         self._workers = []
 
-    def run(self, function: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any]) -> Iterator[Any]:
+    def run(
+        self, function: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any], *, losses: bool = False
+    ) -> Iterator[Any]:
         """Yield the answers in the order of the tasks.
 
         Raises:
-            Lost: a task brought down three workers.
+            Lost: a task brought down three workers, and `losses` is false.
         """
-        return in_order(self._finished(function, shared, tasks))
+        return in_order(self._finished(function, shared, tasks, losses))
 
     def _finished(
-        self, function: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any]
+        self, function: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any], losses: bool
     ) -> Iterator[tuple[int, Any]]:
         self._jobs += 1
         common = pack(("job", function, shared))
@@ -112,10 +114,12 @@ class Processes(Executor):
                     if answer is None:
                         self._bury(worker)
                         tries[number] += 1
-                        if tries[number] >= TRIES:
+                        if tries[number] < TRIES:
+                            queue.appendleft(number)
+                            continue
+                        if not losses:
                             raise Lost(number, TRIES)
-                        queue.appendleft(number)
-                        continue
+                        answer = ("value", Lost(number, TRIES))
                     worker.task = None
                     kind, value = answer
                     if kind == "error":

@@ -52,11 +52,13 @@ class RayCluster(Executor):
         if self._ours:
             self._ray.shutdown()
 
-    def run(self, function: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any]) -> Iterator[Any]:
+    def run(
+        self, function: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any], *, losses: bool = False
+    ) -> Iterator[Any]:
         """Yield the answers in the order of the tasks.
 
         Raises:
-            Lost: a task brought down three workers.
+            Lost: a task brought down three workers, and `losses` is false.
         """
         ray = self._ray
         call = ray.remote(num_cpus=1, max_retries=TRIES - 1)(function)
@@ -65,15 +67,17 @@ class RayCluster(Executor):
         for number, task in enumerate(tasks):
             handed.append((number, call.remote(common, task)))
             if len(handed) >= AHEAD * self.workers:
-                yield self._answer(*handed.popleft())
+                yield self._answer(*handed.popleft(), losses)
         while handed:
-            yield self._answer(*handed.popleft())
+            yield self._answer(*handed.popleft(), losses)
 
-    def _answer(self, number: int, reference: Any) -> Any:
+    def _answer(self, number: int, reference: Any, losses: bool) -> Any:
         errors = self._ray.exceptions
         try:
             return self._ray.get(reference)
         except (errors.WorkerCrashedError, errors.OutOfMemoryError, errors.NodeDiedError) as problem:
+            if losses:
+                return Lost(number, TRIES, str(problem))
             raise Lost(number, TRIES, str(problem)) from None
         except errors.RayTaskError as problem:
             raise problem.cause from None

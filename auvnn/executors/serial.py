@@ -13,7 +13,9 @@ class Serial(Executor):
 
     name = "serial"
 
-    def run(self, function: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any]) -> Iterator[Any]:
+    def run(
+        self, function: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any], *, losses: bool = False
+    ) -> Iterator[Any]:
         """Yield the answers in the order of the tasks."""
         for task in tasks:
             yield function(shared, task)

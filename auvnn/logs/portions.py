@@ -116,3 +116,25 @@ def is_large(paths: Sequence[Path]) -> bool:
         if rows > LARGE:
             return True
     return False
+
+
+# s since 1970 beyond which a stamp is a date.
+_UNIX = 1e8
+
+
+def start_of(path: Path, mapping: Mapping) -> float | None:
+    """Return when a log begins, s since 1970, or None where its stamps count from another beginning.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    reader, _ = choose(path)
+    source = mapping.columns["t"].source if "t" in mapping.columns else "t"
+    stamp = None if source is None else reader.first_stamp(path, source)
+    if stamp is not None:
+        return stamp
+    table = mapping.apply(reader.read_rows(path, 0, 1), str(path))
+    if "t" not in table.columns or table.rows == 0:
+        return None
+    first = float(mapping.seconds(table.columns["t"], "t" in table.seconds)[0])
+    return first if first > _UNIX else None

@@ -41,6 +41,12 @@ def test_a_task_that_kills_every_worker_is_given_up():
         list(pool.run(always_deadly, None, [0, 1, 2]))
 
 
+def test_a_loss_can_be_told_in_its_place():
+    with executor_for("processes", 2) as pool:
+        first, lost, last = pool.run(always_deadly, None, [0, 1, 2], losses=True)
+    assert (first, last) == (0, 2) and isinstance(lost, Lost) and lost.task == 1
+
+
 def test_an_error_of_the_function_is_raised_here_and_the_pool_lives_on():
     with executor_for("processes", 2) as pool:
         with pytest.raises(InputError, match="task 2 has no samples"):

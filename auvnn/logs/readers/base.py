@@ -105,6 +105,14 @@ class Reader(ABC):
         text = {name: column[part] for name, column in whole.text.items()}
         return Table(columns, len(range(*part.indices(whole.rows))), text, set(whole.seconds), [])
 
+    def first_stamp(self, path: Path, column: str) -> float | None:
+        """Return the date in a column's first row, s since 1970; None where the column holds no dates.
+
+        Raises:
+            InputError: as `read`.
+        """
+        return None
+
 
 def _whole(reader: Reader, path: Path) -> Table:
     """Return a file's whole table; the last one is kept for as long as the file does not change."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
+from datetime import UTC
 from pathlib import Path
 
 import polars as pl
@@ -90,7 +91,9 @@ class ParquetReader(Reader):
                 # Seconds are counted from the first row of a table: it is put in front, and taken away again.
                 head = lazy.select(flat).slice(0, 1).collect()
                 if any(head[n].null_count() for n in dates):
-                    raise InputError(f"{where}: column '{dates[0]}' has no time in its first row: leave that row out")
+                    raise InputError(
+                        f"{where}: column '{dates[0]}' has no time in its first row: leave that row out"
+                    )
                 frame = pl.concat([head, frame])
             frame.columns = names
             if "" in names:
@@ -101,6 +104,20 @@ class ParquetReader(Reader):
             table.text = {name: column[1:] for name, column in table.text.items()}
             table.rows -= 1
         return table
+
+    def first_stamp(self, path: Path, column: str) -> float | None:
+        """Return the date in a column's first row, s since 1970; None where the column holds no dates.
+
+        Raises:
+            InputError: it is damaged.
+        """
+        with _damage_told(str(path)):
+            lazy = pl.scan_parquet(path)
+            kind = lazy.collect_schema().get(column)
+            if kind is None or kind not in (pl.Date, pl.Datetime):
+                return None
+            first = lazy.select(pl.col(column).cast(pl.Datetime("us"))).head(1).collect()[column][0]
+        return None if first is None else first.replace(tzinfo=UTC).timestamp()
 
 
 @contextlib.contextmanager
