@@ -107,7 +107,7 @@ def test_dives_are_in_order_of_the_dates_in_their_names(found):
 
 def test_a_dive_that_cannot_be_fitted_fails_alone(found):
     (lost,) = found.failed
-    assert "dive_2026-05-20" in lost["file"] and "Parquet" in lost["words"]
+    assert "dive_2026-05-20" in lost["file"] and "cut short" in lost["words"]
     assert any("could not be fitted" in w for w in found.warnings)
 
 
