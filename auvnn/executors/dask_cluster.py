@@ -12,6 +12,8 @@ from auvnn.executors.base import TRIES, Executor, Lost
 
 # Tasks handed in before their turn, for each worker: bounds what waits in the cluster's memory.
 AHEAD = 4
+# s after which it is asked whether any worker is left, and s to wait for one.
+_LOOK, _PATIENCE = 20.0, 120.0
 
 
 class DaskCluster(Executor):
@@ -74,9 +76,18 @@ class DaskCluster(Executor):
 
     def _answer(self, number: int, future: Any, losses: bool) -> Any:
         killed = importlib.import_module("distributed.scheduler").KilledWorker
-        try:
-            return future.result()
-        except killed as problem:
+        alone = 0.0
+        while True:
+            try:
+                return future.result(timeout=_LOOK)
+            except killed as problem:
+                why = str(problem)
+            except TimeoutError:
+                # A worker that cannot be started again leaves its tasks waiting for ever.
+                alone = 0.0 if self.client.scheduler_info()["workers"] else alone + _LOOK
+                if alone < _PATIENCE:
+                    continue
+                why = f"no worker has come back for {alone:.0f} s"
             if losses:
-                return Lost(number, TRIES, str(problem))
-            raise Lost(number, TRIES, str(problem)) from None
+                return Lost(number, TRIES, why)
+            raise Lost(number, TRIES, why)

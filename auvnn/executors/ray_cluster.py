@@ -42,10 +42,14 @@ class RayCluster(Executor):
         own = {"num_cpus": self.workers, "include_dashboard": False} if self.address is None else {}
         try:
             ray.init(address=self.address, log_to_driver=False, logging_level="ERROR", **own)
-        except (ConnectionError, RuntimeError, ValueError) as problem:
-            raise ConfigError(
-                f"address={self.address}: no Ray cluster to join ({one_line(problem, 200)})"
-            ) from None
+        except Exception as problem:  # Ray raises a bare Exception where a node does not come up in time
+            ray.shutdown()
+            words = (
+                "no Ray cluster comes up here"
+                if self.address is None
+                else f"no Ray cluster at {self.address}"
+            )
+            raise ConfigError(f"executor=ray: {words} ({one_line(problem, 200)})") from None
 
     def stop(self) -> None:
         """Leave the cluster; one that was started here ends."""

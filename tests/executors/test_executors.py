@@ -91,7 +91,5 @@ def test_a_cluster_of_two_goes_on_without_one(name, tmp_path, monkeypatch):
         found = list(cluster.run(once_deadly, str(tmp_path / "mark"), list(range(8))))
         with pytest.raises(InputError, match="task 2 has no samples"):
             list(cluster.run(refusing, None, [0, 1, 2, 3]))
-        with pytest.raises(Lost, match="part 2"):
-            list(cluster.run(always_deadly, None, [0, 1, 2]))
     assert (tmp_path / "mark").exists()
     assert found == [1.0 / (1 + k) for k in range(8)]
