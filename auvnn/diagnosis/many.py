@@ -14,7 +14,7 @@ no more data than a few hundred windows hold, however long the log. So:
    leaves is white.
 
 Every figure says how many windows are behind it. Time is linear in the samples: reading alone for the first step, some
-twenty runs through each window for the last two. Memory is that of a portion and of the sample, whatever the log.
+a dozen runs through each window for the last two. Memory is that of a portion and of the sample, whatever the log.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from auvnn.models import GreyBox
 from auvnn.training.prediction_error import set_parameters
 
 # Windows for the search, and for the look and the fit; effects of the catalogue that are looked at beside those found.
-SEARCH, WINDOWS, LEADING = 240, 2000, 8
+SEARCH, WINDOWS, LEADING = 240, 1000, 8
 # Rows by which a file's kind is told.
 _FIRST = 5000
 

@@ -24,7 +24,7 @@ from auvnn.training.prediction_error import (
     parameters_of,
     set_parameters,
 )
-from auvnn.training.sums import ROUNDS, Combination, Sums
+from auvnn.training.sums import Combination, Sums
 
 Array = NDArray[np.float64]
 # Steps of the fit on everything; it begins where the fit on the sample has ended, and ends when a step would change the
@@ -143,7 +143,7 @@ def refit(
     """Fit an explanation to all windows by Gauss and Newton, each step a pass over the parts.
 
     Args:
-        passes: over the parts.
+        passes: over the parts, whose initial states a look has settled.
         layout: stated values.
         found: the explanation, as fitted to a sample: where to begin, its priors, and its weights.
         extent: how far the log reaches.
@@ -154,15 +154,13 @@ def refit(
     model = layout.model.rebuilt(layout.model.copied_effects())
     theta = found.fitted.theta.copy()
     low, high = limits(model, names, priors)
-    point = Point(replace(layout, model=model), (), extent, names, found.fitted.sigma, cut, ROUNDS)
+    point = Point(replace(layout, model=model), (), extent, names, found.fitted.sigma, cut, 1)
     done, steps = False, 0
     while True:
         set_parameters(model, names, theta)
         sums = passes.sums(
             point, f"fitting {', '.join(found.effects) or 'the coefficients'}, step {steps}", moved=True
         )
-        # The sample's initial states and weights are behind us: one step of each window's state is enough from here.
-        point = replace(point, rounds=1)
         if done or steps == STEPS or not len(theta):
             break
         normal = sums.hessian + np.diag(priors.precision)

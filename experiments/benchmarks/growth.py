@@ -7,7 +7,7 @@ noise), and measures in a process of its own for each size
 
     read      one pass through the file that finds all windows of free running,
     sums      that, and one pass over all windows: initial states settled, sums towards the uncertain coefficients,
-    diagnose  `diagnose_files` with its defaults (search on 240 windows, tests and fit on 2000) and six candidates.
+    diagnose  `diagnose_files` with its defaults (search on 240 windows, tests and fit on 1000) and six candidates.
 
 Processor time (user and system) is what grows; wall-clock time is printed beside it. Peak memory is the process's own
 (`ru_maxrss`), Python, torch and the vehicle included. The slope is that of log(time) over log(samples) between the
