@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from auvnn.answers import Answer, plain
-from auvnn.diagnosis.cut import HORIZON, WARMUP, candidates_for, windows_for
+from auvnn.diagnosis.cut import HORIZON, WARMUP, candidates_for, check_window, windows_for
 from auvnn.diagnosis.explain import Explanation, explain, standard_errors
 from auvnn.diagnosis.learned_drag import reduced
 from auvnn.diagnosis.left_over import slow
@@ -139,6 +139,7 @@ def fleet(
     from auvnn.models import load
 
     say = progress or (lambda words: None)
+    check_window(window)
     names = [effects] if isinstance(effects, str) else list(effects)
     if not names:
         raise ConfigError("effects=[]: name at least one effect to follow over the dives")

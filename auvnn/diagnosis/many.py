@@ -27,7 +27,7 @@ import numpy as np
 
 from auvnn.answers import plain
 from auvnn.diagnosis.answer import Diagnosis
-from auvnn.diagnosis.cut import HORIZON, WARMUP
+from auvnn.diagnosis.cut import HORIZON, WARMUP, check_window
 from auvnn.diagnosis.diagnose import searched
 from auvnn.diagnosis.doubts import doubts
 from auvnn.diagnosis.nuisance import Layout, lay_out
@@ -103,6 +103,7 @@ def diagnose_files(
         InputError: the files have too little that can be used, or contradict themselves.
     """
     say = progress or (lambda words: None)
+    check_window(window)
     for name, value in (("search", search), ("windows", windows), ("leading", leading)):
         if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
             raise ConfigError(f"{name}={value} must be a whole number, at least 1")

@@ -214,3 +214,5 @@ def test_a_file_that_cannot_be_read_is_told_and_left_out(paths, tmp_path):
 def test_numbers_that_cannot_be_are_refused(paths, option):
     with pytest.raises(ConfigError, match=f"{option}=0"):
         diagnose_files(GreyBox(vehicle()), paths, **{option: 0})
+    with pytest.raises(ConfigError, match="window=soon"):
+        diagnose_files(GreyBox(vehicle()), paths, window="soon")  # pyright: ignore[reportArgumentType]
