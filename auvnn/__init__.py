@@ -18,6 +18,8 @@ __all__ = [
     "check",
     "compare",
     "diagnose",
+    "diagnose_files",
+    "fleet",
     "load",
     "remove",
     "simulate",
@@ -27,7 +29,7 @@ __all__ = [
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from auvnn.diagnosis import add, compare, diagnose
+    from auvnn.diagnosis import add, compare, diagnose, diagnose_files, fleet
     from auvnn.logs import Log
     from auvnn.logs.quality import Quality
     from auvnn.models import GreyBox, load, remove
@@ -45,6 +47,8 @@ _WHERE = {
     "add": "auvnn.diagnosis",
     "compare": "auvnn.diagnosis",
     "diagnose": "auvnn.diagnosis",
+    "diagnose_files": "auvnn.diagnosis",
+    "fleet": "auvnn.diagnosis",
     "load": "auvnn.models",
     "remove": "auvnn.models",
     "simulate": "auvnn.simulate",

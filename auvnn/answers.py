@@ -23,6 +23,7 @@ DRAWERS = Catalogue(
         "diagnosis": "auvnn.report.pages.diagnosis:PAGE",
         "improvement": "auvnn.report.pages.improvement:PAGE",
         "adaptation": "auvnn.report.pages.adaptation:PAGE",
+        "fleet": "auvnn.report.pages.fleet:PAGE",
         "training": "auvnn.report.pages.training:PAGE",
         "demo": "auvnn.report.pages.demo:PAGE",
         "benchmark": "auvnn.report.pages.benchmark:PAGE",

@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +26,10 @@ from auvnn.cli.faults import OK, outcome
 from auvnn.cli.folder import created, locked, refuse_taken, written
 from auvnn.cli.job import Job, Verb, files
 from auvnn.cli.speech import Speaker, complain
+from auvnn.cli.sweep import jobs_of, note, run_jobs, statuses
 from auvnn.cli.words import Words
 from auvnn.config import config_dir
-from auvnn.errors import ConfigError, one_line
+from auvnn.errors import AuvnnError, ConfigError, one_line
 
 
 def run_verb(name: str, verb: Verb, arguments: list[str]) -> int:
@@ -46,21 +48,52 @@ def run_verb(name: str, verb: Verb, arguments: list[str]) -> int:
     out = _dated(name) if config.out is None else Path(str(config.out)).expanduser()
     overrides.append(f"out={quoted(out)}")
     refuse_taken(out, overwrite=config.overwrite is True)
-    statuses: list[int] = []
+    jobs = jobs_of(overrides) if words.multirun else [overrides]
     with contextlib.ExitStack() as stack:
         if config.dry_run:
             # Hydra makes its folders whatever we do; these go away again.
             nowhere = quoted(stack.enter_context(tempfile.TemporaryDirectory()))
-            overrides += [f"hydra.run.dir={nowhere}", f"hydra.sweep.dir={nowhere}"]
+            places = [f"hydra.run.dir={nowhere}", f"hydra.sweep.dir={nowhere}"]
         else:
+            places = []
             stack.enter_context(created(out))
             if words.multirun:
                 stack.enter_context(locked(out))
-        _hydra(name, [*words.flags, *overrides], lambda job: statuses.append(_job(name, verb, composer, job)))
-    failed = [number for number, status in enumerate(statuses) if status != OK]
+        if words.jobs:
+            flags = [f for f in words.flags if f not in ("-m", "--multirun")]
+            ended = run_jobs(name, flags, overrides, out, words.jobs)
+        elif words.multirun:
+            # A launcher may run jobs in other processes, on other machines: how they ended comes back by files.
+            tally = Path(stack.enter_context(tempfile.TemporaryDirectory()) if config.dry_run else out).absolute()
+            arguments = [*words.flags, *overrides, *places]
+            with statuses(tally, len(jobs)) as ended:
+                _launched(name, arguments, partial(_counted, name, verb, composer, tally))
+        else:
+            ended = []
+            _hydra(
+                name,
+                [*words.flags, *overrides, *places],
+                lambda job: ended.append(_job(name, verb, composer, job)),
+            )
+    failed = [number for number, status in enumerate(ended) if status != OK]
     if words.multirun and failed:
-        complain(f"auvnn {name}: {len(failed)} of {len(statuses)} jobs failed: {', '.join(map(str, failed))}")
-    return min((statuses[n] for n in failed), default=OK)
+        complain(f"auvnn {name}: {len(failed)} of {len(ended)} jobs failed: {', '.join(map(str, failed))}")
+    return min((ended[n] for n in failed), default=OK)
+
+
+def _counted(name: str, verb: Verb, composer: Composer, tally: Path, config: DictConfig) -> None:
+    """Run one job of many, wherever a launcher put it, and leave its status."""
+    note(tally, HydraConfig.get().job.num, _job(name, verb, composer, config))
+
+
+def _launched(name: str, arguments: list[str], task: Callable[[DictConfig], Any]) -> None:
+    """Run many jobs by Hydra's launcher; one that gives up leaves what it has done."""
+    try:
+        _hydra(name, arguments, task)
+    except AuvnnError:
+        raise
+    except Exception as error:
+        complain(f"auvnn {name}: the launcher gave up: {type(error).__name__}: {one_line(error, 300)}")
 
 
 def _job(name: str, verb: Verb, composer: Composer, config: DictConfig) -> int:

@@ -66,12 +66,12 @@ class Job:
         """Return an option."""
         return self.options[key]
 
-    def model(self, log: Log | None = None) -> GreyBox:
-        """Load the model of `model=`, driven by what the log has: thruster commands or a wrench."""
+    def model(self, log: Log | None = None, kind: str | None = None) -> GreyBox:
+        """Load the model of `model=`, driven by what the log has, thruster commands or a wrench, or by `kind`."""
         from auvnn.models import load
 
         source = str(self["model"])
-        model = load(os.path.expanduser(source), actuation=log.kind if log is not None else None)
+        model = load(os.path.expanduser(source), actuation=log.kind if log is not None else kind)
         effects = ", ".join(model.effect_names) or "none"
         learned = "none" if model.damping is None else "six subnetworks"
         name = source if source == model.vehicle.name else f"{source}: {model.vehicle.name}"
@@ -85,22 +85,26 @@ class Job:
         from auvnn.logs import Log
 
         paths = files(self.options, key)
-        mapping = self.options.get("mapping")
         for path in paths:
             if path.stat().st_size > _LARGE:
                 self.say.progress(f"reading {path}, {path.stat().st_size / 1e6:.0f} MB")
         log = Log.read(
             paths if len(paths) > 1 else paths[0],
-            mapping and Path(mapping).expanduser(),
+            self.mapping(),
             max_duration=self.options.get("max_duration"),
         )
         runs = "1 run" if len(log.runs) == 1 else f"{len(log.runs)} runs"
-        names = ", ".join(map(str, paths))
+        names = ", ".join(map(str, paths[:5])) + (f" and {len(paths) - 5} more" if len(paths) > 5 else "")
         extent = f"{runs}, {log.samples} samples over {log.duration:.4g} s, driven by {log.kind}"
         self.say(f"{key:<9} {names}: {extent}")
         for repair in log.repairs if repairs else ():
             self.say(f"{repair.level:<9} {repair}", style="yellow")
         return log
+
+    def mapping(self) -> Path | None:
+        """Return the path of `mapping=`, if one is named."""
+        given = self.options.get("mapping")
+        return given and Path(given).expanduser()
 
     def held_out(self) -> Log | None:
         """Read the log of `test=`, if one is named."""
@@ -134,6 +138,8 @@ class Job:
 def files(options: dict[str, Any], key: str) -> list[Path]:
     """Return the paths that an option names, relative to where the user stands.
 
+    In the place of logs there may be a folder of them, or a pattern.
+
     Raises:
         ConfigError: it names no path.
         InputError: there is no such file.
@@ -143,6 +149,10 @@ def files(options: dict[str, Any], key: str) -> list[Path]:
     if not values or not all(isinstance(v, (str, int, float)) and str(v) for v in values):
         raise ConfigError(f"{key}={value}: a path is needed, or a list of paths")
     paths = [Path(str(v)).expanduser() for v in values]
+    if key in ("log", "test") and any(p.is_dir() or set(str(p)) & set("*?[") for p in paths):
+        from auvnn.logs.portions import log_files
+
+        paths = log_files(paths)
     for path in paths:
         if not path.exists():
             near = _near(path)

@@ -25,6 +25,7 @@ VERBS = Catalogue(
         "add": "auvnn.cli.add:VERB",
         "remove": "auvnn.cli.remove:VERB",
         "adapt": "auvnn.cli.adapt:VERB",
+        "fleet": "auvnn.cli.fleet:VERB",
         "demo": "auvnn.cli.demo:VERB",
         "study": "auvnn.cli.study:VERB",
         "benchmark": "auvnn.cli.benchmark:VERB",

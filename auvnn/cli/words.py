@@ -9,6 +9,7 @@ from auvnn.errors import ConfigError
 
 _SHOW = ("--help", "-h", "--hydra-help", "--cfg", "-c")
 _PLAIN = ("--help", "-h", "--hydra-help", "--resolve", "--multirun", "-m", "--run", "-r")
+_JOBS = ("--jobs", "-j")
 _VALUED = ("--cfg", "-c", "--package", "-p", "--config-dir", "-cd")
 
 
@@ -22,6 +23,7 @@ class Words:
         shows: whether something is only to be shown.
         multirun: whether to run once for each value.
         config_dir: further folder of configs.
+        jobs: processes at a time, each for a job of its own; 0: as Hydra's launcher does it.
     """
 
     flags: list[str]
@@ -29,6 +31,7 @@ class Words:
     shows: bool = False
     multirun: bool = False
     config_dir: str | None = None
+    jobs: int = 0
 
     @classmethod
     def split(cls, arguments: list[str]) -> Words:
@@ -43,12 +46,16 @@ class Words:
         flags: list[str] = []
         overrides: list[str] = []
         values: dict[str, str] = {}
+        jobs = 0
         words = iter(arguments)
         for word in words:
             if not word.startswith("-"):
                 overrides.append(word)
                 continue
             flag, glued, value = word.partition("=")
+            if flag in _JOBS:
+                jobs = _number(flag, value if glued else next(words, ""))
+                continue
             if flag in _VALUED:
                 value = value if glued else next(words, "")
                 if not value:
@@ -59,17 +66,27 @@ class Words:
                 flags.append(word)
             else:
                 raise ConfigError(_unknown(word))
+        multirun = "--multirun" in flags or "-m" in flags
+        if jobs and not multirun:
+            raise ConfigError("-j runs many jobs at a time: it needs --multirun and a list, such as seed=0,1,2")
         return cls(
             flags,
             overrides,
             shows=any(flag in _SHOW for flag in flags),
-            multirun="--multirun" in flags or "-m" in flags,
+            multirun=multirun,
             config_dir=values.get("--config-dir", values.get("-cd")),
+            jobs=jobs,
         )
 
 
+def _number(flag: str, value: str) -> int:
+    if not value.isdecimal() or int(value) < 1:
+        raise ConfigError(f"{flag} needs a number of processes, such as {flag} 2")
+    return int(value)
+
+
 def _unknown(word: str) -> str:
-    flags = sorted({*_PLAIN, *_VALUED})
+    flags = sorted({*_PLAIN, *_VALUED, *_JOBS})
     near = difflib.get_close_matches(word, flags, n=1, cutoff=0.75)
     if near:
         return f"there is no flag {word}. Did you mean {near[0]}?"

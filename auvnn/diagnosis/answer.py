@@ -38,6 +38,7 @@ class Diagnosis(Answer):
     absorbed: Absorption | None = None
     acts_in: dict[str, float] = field(default_factory=dict)
     nearest: list[str] = field(default_factory=list)
+    whole_log: dict[str, Any] | None = None
 
     @property
     def surfaces(self) -> list[dict[str, Any]]:
@@ -72,6 +73,7 @@ class Diagnosis(Answer):
             "global_p_value",
             "residual_tests",
             "story",
+            "whole_log",
         )
         absorbed = None if self.absorbed is None else self.absorbed.to_dict()
         return plain(

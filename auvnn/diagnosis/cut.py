@@ -53,9 +53,8 @@ def windows_for(model: GreyBox, log: Log, window: float | None = None) -> Window
         ConfigError: a length that is no positive number.
         InputError: no run is as long.
     """
+    check_window(window)
     if window is not None:
-        if isinstance(window, bool) or not isinstance(window, (int, float)) or not 0 < window < np.inf:
-            raise ConfigError(f"window={window} must be a number of seconds above zero")
         longest = max(run.duration for run in log.runs)
         if window > longest:
             raise InputError(
@@ -64,3 +63,15 @@ def windows_for(model: GreyBox, log: Log, window: float | None = None) -> Window
             )
     horizon = float(np.clip(log.duration / 12, 1.0, HORIZON)) if window is None else float(window)
     return cut_windows(log, horizon, warmup=WARMUP, kind=model.actuation, partial=True)
+
+
+def check_window(window: float | None) -> None:
+    """Refuse a length of windows that is no positive number.
+
+    Raises:
+        ConfigError: it is not.
+    """
+    if window is None:
+        return
+    if isinstance(window, bool) or not isinstance(window, (int, float)) or not 0 < window < np.inf:
+        raise ConfigError(f"window={window} must be a number of seconds above zero")

@@ -52,6 +52,30 @@ def diagnose(
         ConfigError: an unknown effect.
         InputError: the log has too little that can be used, or contradicts itself.
     """
+    return searched(
+        model,
+        log,
+        effects,
+        max_effects=max_effects,
+        window=window,
+        advice=advice,
+        force=force,
+        progress=progress,
+    )[0]
+
+
+def searched(
+    model: GreyBox,
+    log: Log,
+    effects: str | Sequence[str] | None = None,
+    *,
+    max_effects: int = 4,
+    window: float | None = None,
+    advice: bool = True,
+    force: bool = False,
+    progress: Callable[[str], None] | None = None,
+) -> tuple[Diagnosis, Search]:
+    """Return what `diagnose` does, and the search that led to it."""
     say = progress or (lambda words: None)
     if max_effects < 1:
         raise ConfigError(f"max_effects={max_effects} must be at least 1")
@@ -72,4 +96,4 @@ def diagnose(
     if found.absorbed is not None:
         found.warnings += found.absorbed.words()
     found.warnings += doubts(model, log)
-    return found
+    return found, search

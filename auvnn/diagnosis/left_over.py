@@ -20,13 +20,27 @@ def slow(explanation: Explanation, floor: Array) -> bool:
         floor: (18,) no channel is trusted beyond.
     """
     sums = explanation.fitted.statistics
-    count, pairs = sums.count.sum(0), sums.pairs.sum(0)
-    spent = 12 * len(sums.cost) * count / max(count.sum(), 1.0)
+    channel, count, rough, pairs = (x.sum(0) for x in (sums.channel, sums.count, sums.rough, sums.pairs))
+    return lasting(channel, count, rough, pairs, len(sums.cost), floor)
+
+
+def lasting(channel: Array, count: Array, rough: Array, pairs: Array, windows: int, floor: Array) -> bool:
+    """Whether errors are slower than white noise, by their sums over all windows.
+
+    Args:
+        channel: (18,) squared errors.
+        count: (18,) samples.
+        rough: (18,) squared differences of successive errors.
+        pairs: (18,) differences.
+        windows: how many; each has spent twelve degrees of freedom on its initial state.
+        floor: (18,) no channel is trusted beyond.
+    """
+    spent = 12 * windows * count / max(count.sum(), 1.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        lasting = sums.channel.sum(0) / np.maximum(count - spent, 1.0)
-        fast = np.maximum(sums.rough.sum(0) / (2 * pairs), floor**2)
-        z = (lasting / fast - 1.0) * np.sqrt(count)
-        share = 1.0 - fast / lasting
+        slow_part = channel / np.maximum(count - spent, 1.0)
+        fast = np.maximum(rough / (2 * pairs), floor**2)
+        z = (slow_part / fast - 1.0) * np.sqrt(count)
+        share = 1.0 - fast / slow_part
     return bool(np.any((count > 0) & (z > SLOW_Z) & (share > SLOW_SHARE)))
 
 

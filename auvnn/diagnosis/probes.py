@@ -183,12 +183,25 @@ class Probed:
         self, statistics: Statistics, base: Sequence[str], name: str, free: Sequence[str]
     ) -> tuple[Score, str]:
         """Test an effect; return the score, and the name under which the layout knows it at its best."""
+        return self.best(name, lambda label: score(statistics, self.layout, base, label, free))
+
+    def best(self, name: str, test: Callable[[str], Score]) -> tuple[Score, str]:
+        """Return an effect's score at its best shape, and the name under which the layout knows that.
+
+        Args:
+            name: the effect.
+            test: gives the score of one of `labels`.
+        """
         if name not in self.starts:
-            return score(statistics, self.layout, base, name, free), name
-        found = {s: score(statistics, self.layout, base, s, free) for s in self.starts[name]}
+            return test(name), name
+        found = {s: test(s) for s in self.starts[name]}
         # The best shape is the likeliest; its own scores' variance says how sure it is, not which it is.
         best = max(found, key=lambda s: (found[s].degrees > 0, found[s].gain - found[s].degrees))
         return self._whole(name, found[best], self.starts[name][best], list(found.values())), best
+
+    def labels(self, name: str) -> list[str]:
+        """Return under which names the layout knows an effect: its own, or those of its stand-ins."""
+        return list(self.starts.get(name, [name]))
 
     def _whole(self, name: str, best: Score, shape: dict[str, float], all_of_them: list[Score]) -> Score:
         """Return the score of the effect, all parameters in it, corrected for having chosen the best shape."""

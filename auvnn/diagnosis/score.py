@@ -10,7 +10,7 @@ Reference: Rao (1948) for the score test; Newey and West (1987), Econometrica 55
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,9 +61,45 @@ def project(
 
     The effect itself is left out of the base where it stands for a stated uncertainty.
     """
+    found = projection(statistics.total, statistics.slope.sum(0), layout, base, effect, free)
+    by_window = statistics.slope[:, found.own] - statistics.slope[:, found.others] @ found.carry.T
+    return by_window, found.gradient, found.information
+
+
+@dataclass(frozen=True)
+class Projection:
+    """What is left of an effect's columns once the base has taken its share.
+
+    Attributes:
+        own: the effect's columns, (p,).
+        others: the base's columns that can move, (f,).
+        carry: (p, f), how the scores of the base go into those of the effect.
+        gradient: at the null, (p,).
+        information: (p, p).
+    """
+
+    own: NDArray[np.int64]
+    others: NDArray[np.int64]
+    carry: Array
+    gradient: Array
+    information: Array
+
+
+def projection(
+    total: Array, slope: Array, layout: Layout, base: Sequence[str], effect: str, free: Sequence[str] = ()
+) -> Projection:
+    """Return an effect's gradient and information by the sums over all windows, the base taken out.
+
+    Args:
+        total: J^T J, (P, P).
+        slope: J^T e, (P,).
+        layout: stated values.
+        base: effects that are free anyway.
+        effect: the one that is asked for.
+        free: those of the base whose stated uncertainty is left out.
+    """
     others = [n for n in base if n != effect]
     f, c = layout.of(others), layout.columns[effect]
-    total = statistics.total
     held = priors(layout, others, free)
     theta = parameters_of(layout.model, others)
     # What is at the end of its reach cannot move further to take the candidate's share.
@@ -72,24 +108,30 @@ def project(
     held = Priors(held.mean[movable], held.precision[movable])
     inner = total[np.ix_(f, f)] + np.diag(held.precision)
     carry = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
-    by_window = statistics.slope[:, c] - statistics.slope[:, f] @ carry.T
-    gradient = by_window.sum(0) + carry @ (held.precision * (theta - held.mean))
+    gradient = slope[c] - carry @ slope[f] + carry @ (held.precision * (theta - held.mean))
     information = total[np.ix_(c, c)] - carry @ total[np.ix_(f, c)]
-    return by_window, gradient, 0.5 * (information + information.T)
+    return Projection(c, f, np.asarray(carry, dtype=np.float64), gradient, 0.5 * (information + information.T))
 
 
 def _explained(
     statistics: Statistics, layout: Layout, base: Sequence[str], effect: str, free: Sequence[str], step: Array
 ) -> Array:
     """Return what of the scores by window (B, p) a step of the effect's parameters explains, the base following."""
-    others = [n for n in base if n != effect]
-    f, c = layout.of(others), layout.columns[effect]
-    total = statistics.total
-    inner = total[np.ix_(f, f)] + np.diag(priors(layout, others, free).precision)
-    carry = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
+    c, f, carry = following(statistics.total, layout, base, effect, free)
     both = np.concatenate([c, f])
     moved = statistics.hessian[:, both[:, None], both] @ np.concatenate([step, -carry.T @ step])
     return moved[:, : len(c)] - moved[:, len(c) :] @ carry.T
+
+
+def following(
+    total: Array, layout: Layout, base: Sequence[str], effect: str, free: Sequence[str] = ()
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    """Return an effect's columns, those of the base, and how these follow a step of the effect's, (p, f)."""
+    others = [n for n in base if n != effect]
+    f, c = layout.of(others), layout.columns[effect]
+    inner = total[np.ix_(f, f)] + np.diag(priors(layout, others, free).precision)
+    carry = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
+    return c, f, np.asarray(carry, dtype=np.float64)
 
 
 def inflation(by_window: Array, information: Array, run: NDArray[np.int64], spent: int = 1) -> float:
@@ -107,15 +149,25 @@ def inflation(by_window: Array, information: Array, run: NDArray[np.int64], spen
     spread = centred.T @ centred
     next_to = run[1:] == run[:-1]
     lagged = centred[1:][next_to].T @ centred[:-1][next_to]
-    spread = spread + 0.5 * (lagged + lagged.T)
+    return ratio(spread + 0.5 * (lagged + lagged.T), information, len(by_window), spent)
+
+
+def ratio(spread: Array, information: Array, count: int, spent: int = 1) -> float:
+    """Return how much larger the scores' spread is than white noise would have it, at least one.
+
+    Args:
+        spread: sum of the products of the windows' centred scores, neighbours included, (p, p).
+        information: (p, p) of all windows.
+        count: windows.
+        spent: degrees of freedom that have gone into the scores' mean.
+    """
     values, vectors = np.linalg.eigh(information)
     keep = values > TINY * max(values.max(initial=0.0), 1e-300)
     if not keep.any():
         return 1.0
     white = vectors[:, keep] / np.sqrt(values[keep])
-    count = len(by_window)
-    ratio = np.trace(white.T @ spread @ white) / keep.sum() * count / max(count - spent, 1)
-    return float(max(1.0, ratio))
+    size = np.trace(white.T @ spread @ white) / keep.sum() * count / max(count - spent, 1)
+    return float(max(1.0, size))
 
 
 def score(
@@ -123,6 +175,33 @@ def score(
 ) -> Score:
     """Test one effect at the fitted null; see the module's text."""
     by_window, gradient, information = project(statistics, layout, base, effect, free)
+
+    def factor(step: Array, spent: int) -> float:
+        # An effect that shows in few windows makes their scores differ; that is no noise, and is taken out first.
+        left = by_window - _explained(statistics, layout, base, effect, free, step)
+        return inflation(left, information, statistics.run, spent)
+
+    return judged(layout, effect, gradient, information, factor, len(by_window))
+
+
+def judged(
+    layout: Layout,
+    effect: str,
+    gradient: Array,
+    information: Array,
+    factor_of: Callable[[Array, int], float],
+    windows: int,
+) -> Score:
+    """Test one effect by its gradient and information at the null.
+
+    Args:
+        layout: stated values.
+        effect: its name.
+        gradient: (p,), the base taken out.
+        information: (p, p), the base taken out.
+        factor_of: the scores' inflation, given the step (p,) that the test estimates and the degrees of freedom spent.
+        windows: how many there are.
+    """
     scale = scales(layout, effect)
     # A stand-in is at its null, which the layout knows.
     now = layout.means[effect] if "@" in effect else parameters_of(layout.model, [effect])
@@ -136,9 +215,7 @@ def score(
     unseen = FREE**2 * (vectors[:, ~seen] ** 2).sum(1)
     values, vectors = values[seen], vectors[:, seen]
     along = vectors.T @ (gradient * scale) / values  # one-step estimate, in scales
-    # An effect that shows in few windows makes their scores differ; that is no noise, and is taken out first.
-    left = by_window - _explained(statistics, layout, base, effect, free, scale * (vectors @ along))
-    factor = inflation(left, information, statistics.run, 1 + len(values))
+    factor = factor_of(scale * (vectors @ along), 1 + len(values))
     spread = factor / values
     prior = _prior_variance(layout, effect, vectors)
     if prior is None:
@@ -159,7 +236,6 @@ def score(
             - np.linalg.slogdet(beyond)[1]
         )
     degrees = len(values)
-    windows = len(by_window)
     p_value = float(stats.f.sf(statistic / degrees, degrees, max(windows - degrees, 4)))
     estimate = now + scale * (vectors @ along)
     std = scale * np.sqrt(vectors**2 @ spread + unseen)

@@ -61,6 +61,8 @@ class Search:
         self.left: Unnamed | None = None
         self.nearest: list[str] = []
         self.unexplained = 1.0
+        # The fit of what is uncertain alone, once it has been made.
+        self.first: Explanation | None = None
 
     def statistics(self, found: Explanation, remaining: list[str]) -> tuple[Statistics, Layout, Probed]:
         """Linearise towards every parameter at a fit, those of the remaining effects at several shapes."""
@@ -79,7 +81,8 @@ class Search:
         """Search for one effect after the other."""
         self.say("fitting the uncertain coefficients")
         current = explain(self.layout, self.windows, self.base, ())
-        first, chosen, steps = current, [], []
+        self.first = first = current
+        chosen, steps = [], []
         # What turned out to have stood in for something else is not asked for again.
         withdrawn: list[str] = []
         table: dict[str, dict[str, Any]] = {}
@@ -92,7 +95,7 @@ class Search:
             base = [*self.base, *[c for c in chosen if c not in self.base]]
             asked_at = {n: asked.score(sums, base, n, chosen) for n in remaining}
             scores = {n: found for n, (found, _) in asked_at.items()}
-            p_value = _together([s.p_value for s in scores.values() if s.degrees])
+            p_value = together([s.p_value for s in scores.values() if s.degrees])
             if not table:
                 global_p = p_value
                 similar = (remaining, similarity(sums, asked.layout, base, [k for _, k in asked_at.values()]))
@@ -237,6 +240,6 @@ class Search:
         return found
 
 
-def _together(p_values: list[float]) -> float:
+def together(p_values: list[float]) -> float:
     """Return one p-value for many dependent tests: Bonferroni's, which holds whatever the dependence."""
     return float(min(1.0, len(p_values) * min(p_values))) if p_values else 1.0

@@ -46,7 +46,9 @@ class Reading:
 
 
 @dataclass
-class _Collector:
+class Collector:
+    """What has been read so far."""
+
     runs: list[Run] = field(default_factory=list)
     repairs: list[Repair] = field(default_factory=list)
     unknown: dict[str, None] = field(default_factory=dict)
@@ -68,7 +70,7 @@ def read(
     if doubled:
         raise ConfigError(f"log files named twice: {', '.join(sorted(doubled))}")
     plan = Mapping.read(mapping)
-    collector = _Collector()
+    collector = Collector()
     hashes = []
     for file in paths:
         before = _stamp(file)
@@ -85,7 +87,7 @@ def read(
         first = len(collector.runs)
         # Damaged numbers may overflow on their way; what comes of it is masked and counted.
         with np.errstate(all="ignore"):
-            _collect(table, plan, file, collector)
+            collect(table, plan, file, collector)
         _number_apart(collector, first, file, len(paths) > 1)
     same = {h for h in hashes if hashes.count(h) > 1}
     if same:
@@ -114,7 +116,7 @@ def _file_hash(path: Path) -> str:
         raise InputError(f"{path}: disappeared while it was read: {problem}") from None
 
 
-def _number_apart(collector: _Collector, first: int, file: Path, several: bool) -> None:
+def _number_apart(collector: Collector, first: int, file: Path, several: bool) -> None:
     """Give the runs of a further file numbers of their own where they clash with earlier ones."""
     taken = {run.number for run in collector.runs[:first]}
     new = collector.runs[first:]
@@ -127,7 +129,8 @@ def _number_apart(collector: _Collector, first: int, file: Path, several: bool) 
         collector.repairs.append(Repair(f"read as run {numbers}", str(file), len(new), "info"))
 
 
-def _collect(table: Table, plan: Mapping, file: Path, collector: _Collector) -> None:
+def collect(table: Table, plan: Mapping, file: Path, collector: Collector) -> None:
+    """Turn a table into runs: told apart, in order of time, mended and checked."""
     where = str(file)
     required.check(table, where)
     collector.repairs.extend(required.notes(table, where))
@@ -158,7 +161,7 @@ def _collect(table: Table, plan: Mapping, file: Path, collector: _Collector) -> 
             collector.runs.append(run)
 
 
-def _groups(table: Table, name: str, where: str, collector: _Collector) -> list[tuple[int, NDArray[np.intp]]]:
+def _groups(table: Table, name: str, where: str, collector: Collector) -> list[tuple[int, NDArray[np.intp]]]:
     """Return number and rows of each run, in the order of their first appearance."""
     if name in table.text:
         text = table.text[name]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -96,11 +96,30 @@ class Windows:
         )
 
 
-def _starts(run: Run, part: slice, horizon: float, stride: float, partial: bool) -> list[tuple[int, int]]:
-    """Return first and last sample (included) of the windows of one stretch."""
+def starts(
+    run: Run,
+    part: slice,
+    horizon: float,
+    stride: float,
+    partial: bool,
+    begin: float | None = None,
+    until: float = np.inf,
+) -> tuple[list[tuple[int, int]], float]:
+    """Return first and last sample (included) of the windows of one stretch, and the time from which the next begins.
+
+    Args:
+        run: the run.
+        part: the stretch.
+        horizon: length, s.
+        stride: from start to start, s.
+        partial: also keep a last window of at least half the length.
+        begin: where the first window begins, s; where the stretch does by default.
+        until: the stretch goes on beyond `part`, which is believed up to then, s: windows that end later are left out.
+    """
     t = run.t[part]
     usable = run.valid[part]
-    found, begin = [], t[0]
+    found: list[tuple[int, int]] = []
+    begin = float(t[0]) if begin is None else begin
     tolerance = 1e-6 * run.dt + 1e-3 * run.dt
     while begin <= t[-1] - run.dt:
         at = int(np.searchsorted(t, begin - tolerance))
@@ -110,12 +129,34 @@ def _starts(run: Run, part: slice, horizon: float, stride: float, partial: bool)
             break
         end = int(np.searchsorted(t, t[at] + horizon + tolerance)) - 1
         complete = t[-1] >= t[at] + horizon - tolerance
+        if np.isfinite(until) and not (complete and t[end] <= until):
+            break
         if end > at and (complete or (partial and t[end] - t[at] >= 0.5 * horizon)):
             found.append((part.start + at, part.start + end))
         if not complete:
             break
-        begin = max(begin + stride, t[at] + run.dt)
-    return found
+        begin = float(max(begin + stride, t[at] + run.dt))
+    return found, begin
+
+
+# A run, its commands, first and last sample of a window, and the first sample of its unbroken stretch.
+Piece = tuple[Run, np.ndarray, int, int, int]
+
+
+def commands(run: Run, kind: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return a run's commands (N, n), and which rows (N,) have commands and fin angles.
+
+    Raises:
+        InputError: the run has no such commands.
+    """
+    command = run.thrusters if kind == "thrusters" else run.wrench
+    if command is None:
+        wanted = "thruster_1 ..." if kind == "thrusters" else "tau_X ... tau_N"
+        raise InputError(f"run {run.number} has no {wanted}: the model is driven by {kind}")
+    known = np.asarray(np.isfinite(command).all(axis=1))
+    if run.fins is not None:
+        known &= np.isfinite(run.fins).all(axis=1)
+    return command, known
 
 
 def cut_windows(
@@ -144,25 +185,27 @@ def cut_windows(
         InputError: the log has no such commands, or no stretch is long enough.
     """
     kind = kind or log.kind
-    pieces = []
+    pieces: list[Piece] = []
     for run in log.runs:
-        command = run.thrusters if kind == "thrusters" else run.wrench
-        if command is None:
-            wanted = "thruster_1 ..." if kind == "thrusters" else "tau_X ... tau_N"
-            raise InputError(f"run {run.number} has no {wanted}: the model is driven by {kind}")
-        known = np.asarray(np.isfinite(command).all(axis=1))
-        if run.fins is not None:
-            known &= np.isfinite(run.fins).all(axis=1)
+        command, known = commands(run, kind)
         for part in run.unbroken(known):
             span = float(run.t[part.stop - 1] - run.t[part.start]) if np.isinf(horizon) else horizon
-            pieces += [
-                (run, command, a, b, part.start)
-                for a, b in _starts(run, part, span, stride or span, partial or bool(np.isinf(horizon)))
-            ]
+            found, _ = starts(run, part, span, stride or span, partial or bool(np.isinf(horizon)))
+            pieces += [(run, command, a, b, part.start) for a, b in found]
     if not pieces:
         raise InputError(
             f"no stretch of {log.name} is {horizon:g} s long without a gap: choose a shorter horizon"
         )
+    return gathered(pieces, warmup)
+
+
+def gathered(pieces: Sequence[Piece], warmup: float) -> Windows:
+    """Return windows that have been found, as tensors.
+
+    Args:
+        pieces: at least one.
+        warmup: history for the actuators, s.
+    """
     length = np.array([b - a + 1 for _, _, a, b, _ in pieces])
     rows = int(length.max())
     before = max((int(np.ceil(warmup / run.dt - 1e-6)) for run, *_ in pieces), default=0)

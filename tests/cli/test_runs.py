@@ -9,6 +9,7 @@ import pytest
 import yaml
 from stand_ins import Plain, write_two
 
+from auvnn.cli.sweep import note, statuses
 from auvnn.errors import InputError
 
 pytestmark = pytest.mark.usefixtures("stand_in")
@@ -151,6 +152,31 @@ def test_of_many_jobs_one_may_fail(auvnn, stand_in):
     assert Path("many/2/quality.json").read_text() == "c"
     assert not Path("many/1").exists()
     assert out.count("read it") == 2
+
+
+def test_jobs_run_in_processes_of_their_own_and_one_may_fail(auvnn):
+    words = ["simulate", "model=rov90,nosuch", "runs=1", "duration=2", "noise=none", "out=many"]
+    status, out, err = auvnn(*words, "--multirun", "-j", "2")
+    assert status == 2
+    first, last = err.splitlines()
+    assert first.startswith("auvnn simulate (job 1): ") and "nosuch" in first
+    assert last == "auvnn simulate: 1 of 2 jobs failed: 1"
+    assert Path("many/0/log.parquet").exists() and not Path("many/1").exists()
+    assert [p.name for p in Path("many").iterdir()] == ["0"]
+    assert out.count("written") == 1
+
+
+@pytest.mark.parametrize("words", [["-j", "2"], ["-m", "-j", "none"], ["-m", "-j", "2", "hydra/launcher=basic"]])
+def test_jobs_are_asked_for_in_one_way(refused, words):
+    assert "-j" in refused("check", "log=dive.csv", "mapping=a,b", "out=many", *words)
+
+
+def test_a_job_that_leaves_no_word_has_failed(tmp_path):
+    with statuses(tmp_path, 3) as ended:
+        note(tmp_path, 0, 0)
+        note(tmp_path, 2, 2)
+    assert ended == [0, 1, 2]
+    assert not any(tmp_path.rglob("ended"))
 
 
 def test_a_fault_in_one_of_many_jobs_weighs_most(auvnn, stand_in):

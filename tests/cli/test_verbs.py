@@ -198,6 +198,35 @@ def test_an_interrupted_training_goes_on_to_the_same_end(auvnn, made, monkeypatc
 
 
 @pytest.mark.long
+def test_a_folder_is_diagnosed_in_parts_where_that_is_asked_for(auvnn, made, monkeypatch, tmp_path):
+    from auvnn.diagnosis import many
+
+    asked = {}
+
+    def record(model, paths, effects, **options):
+        asked.update(options, actuation=model.actuation, paths=paths, effects=effects)
+        raise InputError("asked")
+
+    monkeypatch.setattr(many, "diagnose_files", record)
+    words = ["diagnose", "model=rov95", f"log={made}", "stream=true", "windows=all", "workers=2", f"out={tmp_path / 'o'}"]
+    assert auvnn(*words)[0] == 2
+    assert asked["paths"] == [made / "log.parquet"] and asked["actuation"] == Log.read(made / "log.parquet").kind
+    assert asked["windows"] is None and asked["leading"] == many.LEADING and asked["search"] == many.SEARCH
+    assert asked["workers"] == 2 and asked["executor"] is None and asked["effects"] is None
+    status, _, err = auvnn(*words, "max_duration=10")
+    assert status == 2 and "stream=false" in err
+
+
+def test_fleet(report, made, tmp_path):
+    whole = Log.read(made / "log.parquet")
+    for k, run in enumerate(whole.runs[:2]):
+        Log.from_runs([run]).write(tmp_path / "dives" / f"{k}.parquet")
+    words = ["model=rov95", "effects=[net_buoyancy]", f"log={tmp_path / 'dives'}", "window=3"]
+    answer = report("fleet", *words)
+    assert answer["schema"] == "auvnn/fleet/1" and answer["along"] == "dive"
+    assert [d["dive"] for d in answer["dives"]] == [1, 2] and answer["trends"][0]["dives"] == 2
+
+
 def test_demo_reduced(report, monkeypatch):
     from auvnn.studies import demo
 

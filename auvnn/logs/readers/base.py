@@ -82,3 +82,46 @@ class Reader(ABC):
             InputError: as `read`.
         """
         return self.read(path)
+
+    def rows(self, path: Path) -> int:
+        """Return how many rows the file has; a format that does not say reads all of it.
+
+        Raises:
+            InputError: as `read`.
+        """
+        return _whole(self, path).rows
+
+    def read_rows(self, path: Path, first: int, count: int) -> Table:
+        """Read some of the rows; a format that cannot seek reads all of them, and remembers them for the next call.
+
+        Columns that hold dates count their seconds from the file's first row, whichever rows are read.
+
+        Raises:
+            InputError: as `read`.
+        """
+        whole = _whole(self, path)
+        part = slice(first, first + count)
+        columns = {name: column[part] for name, column in whole.columns.items()}
+        text = {name: column[part] for name, column in whole.text.items()}
+        return Table(columns, len(range(*part.indices(whole.rows))), text, set(whole.seconds), [])
+
+    def first_stamp(self, path: Path, column: str) -> float | None:
+        """Return the date in a column's first row, s since 1970; None where the column holds no dates.
+
+        Raises:
+            InputError: as `read`.
+        """
+        return None
+
+
+def _whole(reader: Reader, path: Path) -> Table:
+    """Return a file's whole table; the last one is kept for as long as the file does not change."""
+    state = path.stat()
+    key = (reader.name, str(path), state.st_size, state.st_mtime_ns)
+    if key not in _KEPT:
+        _KEPT.clear()
+        _KEPT[key] = reader.read(path)
+    return _KEPT[key]
+
+
+_KEPT: dict[tuple[str, str, int, int], Table] = {}

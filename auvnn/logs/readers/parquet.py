@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
+from datetime import UTC
 from pathlib import Path
 
 import polars as pl
@@ -42,7 +45,7 @@ class ParquetReader(Reader):
         names, notes = clean_names(contents.flat, where)
         rows = max(1, int(share * contents.rows))
         refuse_more_than_memory(int(share * contents.bytes) + 8 * rows * len(contents.flat), where)
-        try:
+        with _damage_told(where):
             frame = pl.read_parquet(path, columns=contents.flat, n_rows=rows)
             stored = pl.read_parquet_metadata(path).get(HASH_KEY) if rows == contents.rows else None
             if stored is not None and stored != frame_hash(frame):
@@ -56,14 +59,78 @@ class ParquetReader(Reader):
                 notes.append(Repair("column without a name left out", where, 1, "warning", cure))
             text = {name: Text("it holds lists or records") for name in contents.nested}
             table = to_table(frame, where, text)
-        except InputError:
-            raise
-        except (pl.exceptions.PolarsError, OSError, ValueError, OverflowError, MemoryError) as problem:
-            raise InputError(f"{where}: is a damaged Parquet file: {one_line(problem, 200)}") from None
-        except BaseException as problem:
-            # On some damage polars' Rust core panics, which is no Exception and must not end the program.
-            if type(problem).__name__ != "PanicException":
-                raise
-            raise InputError(f"{where}: is a damaged Parquet file: {one_line(problem, 200)}") from None
         table.repairs[:0] = notes
         return table
+
+    def rows(self, path: Path) -> int:
+        """Return the number of rows that the file's table of contents states, once it has been checked.
+
+        Raises:
+            InputError: it is cut short or damaged.
+        """
+        return parquet_pages.check(path).rows
+
+    def read_rows(self, path: Path, first: int, count: int) -> Table:
+        """Read some of the rows, and no more of the file than the row groups that hold them.
+
+        The file's own hash covers all rows and is not looked at here.
+
+        Raises:
+            InputError: it is damaged, or a column of dates has none in its first row.
+        """
+        where = str(path)
+        with _damage_told(where):
+            lazy = pl.scan_parquet(path)
+            schema = lazy.collect_schema()
+            nested = [n for n, kind in schema.items() if kind.is_nested()]
+            flat = [n for n in schema.names() if n not in nested]
+            names, _ = clean_names(flat, where)
+            dates = [n for n, kind in schema.items() if kind.is_temporal() and kind != pl.Time]
+            frame = lazy.select(flat).slice(first, count).collect()
+            if dates:
+                # Seconds are counted from the first row of a table: it is put in front, and taken away again.
+                head = lazy.select(flat).slice(0, 1).collect()
+                if any(head[n].null_count() for n in dates):
+                    raise InputError(
+                        f"{where}: column '{dates[0]}' has no time in its first row: leave that row out"
+                    )
+                frame = pl.concat([head, frame])
+            frame.columns = names
+            if "" in names:
+                frame = frame.drop("")
+            table = to_table(frame, where, {name: Text("it holds lists or records") for name in nested})
+        if dates:
+            table.columns = {name: column[1:] for name, column in table.columns.items()}
+            table.text = {name: column[1:] for name, column in table.text.items()}
+            table.rows -= 1
+        return table
+
+    def first_stamp(self, path: Path, column: str) -> float | None:
+        """Return the date in a column's first row, s since 1970; None where the column holds no dates.
+
+        Raises:
+            InputError: it is damaged.
+        """
+        with _damage_told(str(path)):
+            lazy = pl.scan_parquet(path)
+            kind = lazy.collect_schema().get(column)
+            if kind is None or kind not in (pl.Date, pl.Datetime):
+                return None
+            first = lazy.select(pl.col(column).cast(pl.Datetime("us"))).head(1).collect()[column][0]
+        return None if first is None else first.replace(tzinfo=UTC).timestamp()
+
+
+@contextlib.contextmanager
+def _damage_told(where: str) -> Iterator[None]:
+    """Turn what a decoder raises on a damaged file into one line."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (pl.exceptions.PolarsError, OSError, ValueError, OverflowError, MemoryError) as problem:
+        raise InputError(f"{where}: is a damaged Parquet file: {one_line(problem, 200)}") from None
+    except BaseException as problem:
+        # On some damage polars' Rust core panics, which is no Exception and must not end the program.
+        if type(problem).__name__ != "PanicException":
+            raise
+        raise InputError(f"{where}: is a damaged Parquet file: {one_line(problem, 200)}") from None

@@ -17,7 +17,7 @@ from auvnn.report.plots.ranking import brackets, improvement, ranking
 from auvnn.report.plots.residual_tests import residual_tests
 from auvnn.report.plots.similarity import similarity
 from auvnn.report.view import View
-from auvnn.report.words import finite, listing, number, p_value, percent, plural
+from auvnn.report.words import count, finite, listing, number, p_value, percent, plural
 
 
 class DiagnosisPage(Page):
@@ -139,6 +139,7 @@ class DiagnosisPage(Page):
         tested = view.mapping("residual_tests").get("after")
         return [
             Table("Steps of the search", ["step", "verdict", "effects"], steps, words=3),
+            *_whole_log(view),
             Table("All candidates", head, rows, caption, words=2),
             Table("Parameters of every candidate", *_parameter_columns(fitted), folded=True, words=2),
             Table(
@@ -187,6 +188,36 @@ def _candidates(view: View) -> list[Mapping[str, Any]]:
 def _channels(view: View) -> list[str]:
     rows = [s for s in view.mapping("depends_on").values() if isinstance(s, Mapping)]
     return list(dict.fromkeys(str(name) for row in rows for name in row))
+
+
+def _whole_log(view: View) -> list[Table]:
+    """Return what all of a long log says, beside the sample on which the search ran."""
+    whole = view.mapping("whole_log")
+    if not whole:
+        return []
+    fitted = {**(whole.get("parameters") or {}), **(whole.get("coefficients") or {})}
+    rows = [
+        [str(c.get("effect")), p_value(c.get("p_value")), number(c.get("evidence"), 4), number(c.get("inflation"))]
+        for c in whole.get("candidates") or []
+    ]
+    words = str((whole.get("searched") or {}).get("words", ""))
+    caption = (
+        f"{words[:1].upper()}{words[1:]}. Here the leading effects are tested at the null on "
+        f"{count(whole.get('looked_at'))} of {count(whole.get('windows'))} windows ({count(whole.get('samples'))} "
+        f"samples in {plural(whole.get('files'), 'file')}). Evidence: natural logarithm of the Bayes factor; inflation: "
+        "by how much the scores vary more than white noise would."
+    )
+    left = "what is left is white" if whole.get("adequate") else "what is left is slower than white noise"
+    return [
+        Table("On all of the log: tests", ["effect", "p", "evidence", "inflation"], rows, caption),
+        Table(
+            "On all of the log: values",
+            common.PARAMETER_HEAD,
+            common.parameter_rows(fitted),
+            f"What was found, with the uncertain coefficients, fitted to the same windows; {left}.",
+            words=2,
+        ),
+    ]
 
 
 def _first_sentence(verdict: str, missing: list[str]) -> str:
