@@ -6,6 +6,7 @@ from typing import Any
 
 import torch
 from torch import Tensor
+from torch._decomp import decomposition_table
 
 from auvnn.compiled.operations import RULES, aten
 from auvnn.compiled.recorder import CannotCompile, Recorder, tensors
@@ -34,7 +35,7 @@ READS = frozenset(
 )
 
 
-def _move(r: Recorder, func: Any, args: tuple, kwargs: dict) -> Tensor:
+def _move(r: Recorder, func: Any, args: tuple[Any, ...], kwargs: dict) -> Tensor:
     """Let torch move the nodes' numbers as it moves the elements."""
     name = func._schema.name.removeprefix("aten::")
     if name == "constant_pad_nd":
@@ -98,7 +99,7 @@ def apply(r: Recorder, func: Any, args: tuple, kwargs: dict) -> Any:
     elif target is not None and r.followed(target) and not _views(func):
         raise CannotCompile(f"torch's operation {func}")
     elif followed and not fresh and name not in BLIND and not _views(func):
-        table = torch._decomp.decomposition_table
+        table: Any = decomposition_table
         if func in table and not mutable:
             with r:
                 return table[func](*args, **kwargs)
