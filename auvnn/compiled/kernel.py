@@ -171,7 +171,7 @@ class _Run(torch.autograd.Function):
             torch.zeros_like(x) if x is not None and n else None for x, n in zip(tensors, needed, strict=True)
         ]
         gy0, by_number = torch.zeros_like(y0), numbers.new_zeros(len(kernel.places))
-        problem = _problem(*tensors, ctx.parts)
+        problem = _problem(*tensors, ctx.parts)  # type: ignore[call-arg]
         adjoint = _Adjoint(
             _at(out), _at(back), _at(gy0), _at(found[1]), _at(found[2]), _at(found[3]), _at(by_number)
         )

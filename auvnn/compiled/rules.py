@@ -6,6 +6,7 @@ from typing import Any
 
 import torch
 from torch import Tensor
+from torch._decomp import decomposition_table
 
 from auvnn.compiled.operations import RULES, aten
 from auvnn.compiled.recorder import CannotCompile, Recorder, tensors
@@ -34,13 +35,12 @@ READS = frozenset(
 )
 
 
-def _move(r: Recorder, func: Any, args: tuple, kwargs: dict) -> Tensor:
+def _move(r: Recorder, func: Any, args: tuple[Any, ...], kwargs: dict) -> Tensor:
     """Let torch move the nodes' numbers as it moves the elements."""
     name = func._schema.name.removeprefix("aten::")
     if name == "constant_pad_nd":
-        value = args[2] if len(args) > 2 else kwargs.get("value", 0)
-        padded = aten.constant_pad_nd(r.nodes(args[0]), args[1], r.scalars.constant(float(value)))
-        return padded
+        given: list[Any] = [*args, kwargs.get("value", 0)]  # x, padding, and the value if it was given by place
+        return aten.constant_pad_nd(r.nodes(given[0]), given[1], r.scalars.constant(float(given[2])))
     positions = {"index_select": (2,), "gather": (2,), "index": (1,)}.get(name, ())
 
     def swapped(value: Any) -> Any:
@@ -98,7 +98,7 @@ def apply(r: Recorder, func: Any, args: tuple, kwargs: dict) -> Any:
     elif target is not None and r.followed(target) and not _views(func):
         raise CannotCompile(f"torch's operation {func}")
     elif followed and not fresh and name not in BLIND and not _views(func):
-        table = torch._decomp.decomposition_table
+        table: Any = decomposition_table
         if func in table and not mutable:
             with r:
                 return table[func](*args, **kwargs)

@@ -81,7 +81,7 @@ class Writer:
         groups: dict[int, list[int]] = {}
         for node in order:
             if s.operation[node] in FUNCTIONS and s.operation[node] not in INLINE:
-                groups.setdefault(s.group.get(node, -node), []).append(node)
+                groups.setdefault(s.group.get(node) or -node, []).append(node)
         kind = "double" if self.real else "V"
         lanes = "1" if self.real else "LANES"
         for node in order:
@@ -89,7 +89,7 @@ class Writer:
             if node in done or operation in ("constant", "truth", "input"):
                 continue
             if operation in FUNCTIONS and operation not in INLINE:
-                members = groups[s.group.get(node, -node)]
+                members = groups[s.group.get(node) or -node]
                 # Room to whole vectors, whatever their width: what is beyond is computed for nothing.
                 size = -(-len(members) // 8) * 8
                 lines.append(

@@ -201,17 +201,19 @@ def _compiled(
 
 def _require_plain(tensors: list[Tensor]) -> None:
     """Refuse tensors that are more than numbers in memory, and calls that somebody watches."""
+    transforms: Any = torch._C._functorch  # type: ignore[attr-defined]
+    tracing: Any = torch.jit
     for x in tensors:
         if type(x) not in (Tensor, nn.Parameter):
             raise CannotCompile(f"a tensor of type {type(x).__name__}")
         if x.dtype != torch.float64 or x.device.type != "cpu":
             kind = str(x.dtype).removeprefix("torch.")
             raise CannotCompile(f"{kind} on {x.device}: only double precision on the CPU")
-        if torch._C._functorch.is_functorch_wrapped_tensor(x):
+        if transforms.is_functorch_wrapped_tensor(x):
             raise CannotCompile("a function transform (torch.func) is at work")
-    if torch._C._functorch.peek_interpreter_stack() is not None:
+    if transforms.peek_interpreter_stack() is not None:
         raise CannotCompile("a function transform (torch.func) is at work")
-    if torch._C._len_torch_dispatch_stack() or torch.compiler.is_compiling() or torch.jit.is_tracing():
+    if torch._C._len_torch_dispatch_stack() or torch.compiler.is_compiling() or tracing.is_tracing():
         raise CannotCompile("torch itself is being traced")
     if torch.autograd.forward_ad._current_level >= 0:
         raise CannotCompile("forward-mode differentiation is at work")
