@@ -197,7 +197,6 @@ def test_an_interrupted_training_goes_on_to_the_same_end(auvnn, made, monkeypatc
     assert not Path("parts/.auvnn").exists()
 
 
-@pytest.mark.long
 def test_a_folder_is_diagnosed_in_parts_where_that_is_asked_for(auvnn, made, monkeypatch, tmp_path):
     from auvnn.diagnosis import many
 
@@ -227,6 +226,7 @@ def test_fleet(report, made, tmp_path):
     assert [d["dive"] for d in answer["dives"]] == [1, 2] and answer["trends"][0]["dives"] == 2
 
 
+@pytest.mark.long
 def test_demo_reduced(report, monkeypatch):
     from auvnn.studies import demo
 
