@@ -127,10 +127,8 @@ def deadly(shared: tuple[str, Point], task: Task) -> Any:
     return sums_of(at, task)
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["processes", pytest.param("ray", marks=pytest.mark.long), pytest.param("dask", marks=pytest.mark.long)],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["processes", "ray", "dask"])
 def test_a_worker_that_is_killed_changes_nothing(paths, small_parts, tmp_path, monkeypatch, name):
     if name != "processes":
         pytest.importorskip("ray" if name == "ray" else "distributed")
