@@ -101,22 +101,19 @@ class Unnamed:
         return float(np.clip(np.maximum(self.energy, 0.0).sum() / whole, 0.0, 1.0)) if whole > 0.0 else 1.0
 
 
-def any_force(explanation: Explanation, windows: Windows, sigma: Array | None = None) -> Unnamed:
+def any_force(explanation: Explanation, windows: Windows, sigma: Array) -> Unnamed:
     """Ask whether the errors that an explanation leaves look like those of a force.
 
     Args:
         explanation: the fit.
         windows: those it was fitted to.
-        sigma: (18,) weights' standard deviations; by default the white part of the errors that are left, so that a
-            slow part does not count as noise.
+        sigma: (18,) standard deviations of the noise, infinite for channels that do not count; see `white`.
     """
     fitted = explanation.fitted
     model = fitted.model
     times = windows.times[:, windows.warmup :]
     probe = AnyForce(model, float((times[:, -1] - times[:, 0]).max()))
     asked = GreyBox(model.vehicle, [*model.copied_effects(), probe], model.damping, model.actuation)
-    if sigma is None:
-        sigma = white(explanation)
     names = [*explanation.names, str(probe.name)]
     sums, _, _ = reduce(windows, answers(asked, windows, fitted.initial, names), sigma)
     known = len(fitted.theta)
@@ -203,9 +200,17 @@ def weighed(slope: Array, hessian: Array) -> tuple[float, float, float]:
     return above / np.sqrt(variance), p_value, above / scale
 
 
-def white(explanation: Explanation) -> Array:
-    """Return the white part of what is left, (18,), infinite for channels that do not count."""
+def white(explanation: Explanation, floor: Array) -> Array:
+    """Return the white part of what is left, (18,), infinite for channels that do not count.
+
+    A slow part is not noise; and no channel is trusted beyond the floor, below which solvers err too.
+
+    Args:
+        explanation: the fit.
+        floor: (18,).
+    """
     fitted = explanation.fitted
     noise = fitted.statistics.noise()
     known = np.isfinite(fitted.sigma) & np.isfinite(noise)
-    return np.where(known, np.minimum(np.where(known, noise, np.inf), fitted.sigma), np.inf)
+    noise = np.maximum(np.where(known, noise, 0.0), floor)
+    return np.where(known, np.minimum(noise, np.maximum(fitted.sigma, floor)), np.inf)

@@ -145,15 +145,17 @@ class Search:
             last: the fit with what was found.
         """
         self.say("asking whether a force without a name is left")
-        left = any_force(last, self.windows)
+        noise = white(last, self.floor)
+        left = any_force(last, self.windows, noise)
         given = [e for s in steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"]]
         if given:
-            self.unexplained = left.left_of(any_force(first, self.windows, white(last)))
+            self.unexplained = left.left_of(any_force(first, self.windows, noise))
         if left.p_value >= ALPHA_UNKNOWN:
             return steps
         if given and self.unexplained > PARTIAL:
             self.unexplained = 1.0
-            self.left, self.nearest, self.rivals = any_force(first, self.windows), given, []
+            own = white(first, self.floor)
+            self.left, self.nearest, self.rivals = any_force(first, self.windows, own), given, []
             return [{"verdict": "unknown", "effects": [], "p_value": steps[0]["p_value"]}]
         self.left = left
         if steps[-1]["verdict"] == "ambiguous":
