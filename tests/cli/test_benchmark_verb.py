@@ -55,6 +55,8 @@ def test_misspelt_words_are_refused(refused):
     assert not Path("out").exists()
 
 
+# .ci/run goes this way with the reduced plan.
+@pytest.mark.long
 def test_one_log_from_the_command_line_to_the_report(auvnn):
     status, out, err = auvnn("benchmark", *TINY, "out=out")
     assert status == 0 and "Traceback" not in err

@@ -58,6 +58,7 @@ def test_an_ambiguous_answer_says_what_to_drive_and_it_is_what_tilts_the_vehicle
     assert settled.next_experiment is None
 
 
+@pytest.mark.long
 def test_the_promise_is_what_a_full_refit_leaves(twins):
     """chi2 of the wrong explanation, refitted with its initial states, on noise-free data of the other one."""
     model, log = twins

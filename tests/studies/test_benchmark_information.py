@@ -122,6 +122,7 @@ def test_the_noise_is_that_of_the_condition(model, log):
     assert (noise_sigma("none", windows)[:12] < sigma[:12]).all()
 
 
+@pytest.mark.long
 def test_an_independent_plant_holds_the_same_information(model, point, found):
     pytest.importorskip("auvnn.plants")
     from auvnn.studies.benchmark.plant_information import covers, plant_information

@@ -1,4 +1,7 @@
-"""The demo keeps its promises: one run of it, looked at from all sides."""
+"""The demo keeps its promises: one run of it, looked at from all sides.
+
+By hand (-m long): `.ci/run` runs the README's demo itself, and tests/cli one of a quarter of the length.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,7 @@ from auvnn.metrics.rollouts import scale_of, table
 from auvnn.models import load
 from auvnn.studies import demo
 
+pytestmark = pytest.mark.long
 SPEEDS = ("v_north", "v_east", "v_down")
 
 
