@@ -70,9 +70,11 @@ class DaskCluster(Executor):
         for number, task in enumerate(tasks):
             handed.append((number, self.client.submit(function, shared, task, pure=False)))
             if len(handed) >= AHEAD * self.workers:
-                yield self._answer(*handed.popleft(), losses)
+                first, reference = handed.popleft()
+                yield self._answer(first, reference, losses)
         while handed:
-            yield self._answer(*handed.popleft(), losses)
+            first, reference = handed.popleft()
+            yield self._answer(first, reference, losses)
 
     def _answer(self, number: int, future: Any, losses: bool) -> Any:
         killed = importlib.import_module("distributed.scheduler").KilledWorker

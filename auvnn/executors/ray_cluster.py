@@ -71,9 +71,11 @@ class RayCluster(Executor):
         for number, task in enumerate(tasks):
             handed.append((number, call.remote(common, task)))
             if len(handed) >= AHEAD * self.workers:
-                yield self._answer(*handed.popleft(), losses)
+                first, reference = handed.popleft()
+                yield self._answer(first, reference, losses)
         while handed:
-            yield self._answer(*handed.popleft(), losses)
+            first, reference = handed.popleft()
+            yield self._answer(first, reference, losses)
 
     def _answer(self, number: int, reference: Any, losses: bool) -> Any:
         errors = self._ray.exceptions
