@@ -147,7 +147,9 @@ class Search:
         self.say("asking whether a force without a name is left")
         noise = white(last, self.floor)
         left = any_force(last, self.windows, noise)
-        given = [e for s in steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"]]
+        # What was withdrawn is none of the names that stand.
+        standing = {*last.effects, *(e for rival in self.rivals for e in rival.effects)}
+        given = [e for s in steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"] if e in standing]
         if given:
             self.unexplained = left.left_of(any_force(first, self.windows, noise))
         if left.p_value >= ALPHA_UNKNOWN:

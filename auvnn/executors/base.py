@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from types import TracebackType
 from typing import Any, ClassVar, Self
@@ -11,6 +12,8 @@ from auvnn.errors import AuvnnError, one_line
 
 # A task that has brought down this many workers is given up: it would bring down the next one too.
 TRIES = 3
+# Tasks handed in before their turn, for each worker: bounds what waits in memory.
+AHEAD = 4
 
 
 class Lost(AuvnnError):
@@ -80,6 +83,18 @@ class Executor(ABC):
         Raises:
             Lost: there is such a task, and `losses` is false.
         """
+
+
+def handed_ahead(
+    hand: Callable[[Any], Any], tasks: Sequence[Any], most: int
+) -> Iterator[tuple[int, Any]]:
+    """Hand tasks to a cluster, at most so many at a time, and yield number and reference of each in their order."""
+    handed: deque[tuple[int, Any]] = deque()
+    for number, task in enumerate(tasks):
+        handed.append((number, hand(task)))
+        if len(handed) >= most:
+            yield handed.popleft()
+    yield from handed
 
 
 def in_order(finished: Iterator[tuple[int, Any]]) -> Iterator[Any]:

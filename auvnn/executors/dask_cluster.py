@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import importlib
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from auvnn.errors import ConfigError, MissingExtra, one_line
-from auvnn.executors.base import TRIES, Executor, Lost
+from auvnn.executors.base import AHEAD, TRIES, Executor, Lost, handed_ahead
 
-# Tasks handed in before their turn, for each worker: bounds what waits in the cluster's memory.
-AHEAD = 4
 # s after which it is asked whether any worker is left, and s to wait for one.
 _LOOK, _PATIENCE = 20.0, 120.0
 
@@ -66,15 +63,12 @@ class DaskCluster(Executor):
         Raises:
             Lost: a task brought down three workers, and `losses` is false.
         """
-        handed: deque[Any] = deque()
-        for number, task in enumerate(tasks):
-            handed.append((number, self.client.submit(function, shared, task, pure=False)))
-            if len(handed) >= AHEAD * self.workers:
-                first, reference = handed.popleft()
-                yield self._answer(first, reference, losses)
-        while handed:
-            first, reference = handed.popleft()
-            yield self._answer(first, reference, losses)
+        client = self.client
+        handed = handed_ahead(
+            lambda task: client.submit(function, shared, task, pure=False), tasks, AHEAD * self.workers
+        )
+        for number, future in handed:
+            yield self._answer(number, future, losses)
 
     def _answer(self, number: int, future: Any, losses: bool) -> Any:
         killed = importlib.import_module("distributed.scheduler").KilledWorker

@@ -18,11 +18,8 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from auvnn.executors.base import TRIES, Executor, Lost, in_order
+from auvnn.executors.base import AHEAD, TRIES, Executor, Lost, in_order
 from auvnn.executors.packing import pack
-
-# Answers that may be ready before their turn, for each worker: bounds the memory.
-AHEAD = 4
 
 
 class _Worker:

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import importlib
 import os
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from auvnn.errors import ConfigError, MissingExtra, one_line
-from auvnn.executors.base import TRIES, Executor, Lost
-
-# Tasks handed in before their turn, for each worker: bounds what waits in the cluster's memory.
-AHEAD = 4
+from auvnn.executors.base import AHEAD, TRIES, Executor, Lost, handed_ahead
 
 
 class RayCluster(Executor):
@@ -67,15 +63,9 @@ class RayCluster(Executor):
         ray = self._ray
         call = ray.remote(num_cpus=1, max_retries=TRIES - 1)(function)
         common = ray.put(shared)
-        handed: deque[Any] = deque()
-        for number, task in enumerate(tasks):
-            handed.append((number, call.remote(common, task)))
-            if len(handed) >= AHEAD * self.workers:
-                first, reference = handed.popleft()
-                yield self._answer(first, reference, losses)
-        while handed:
-            first, reference = handed.popleft()
-            yield self._answer(first, reference, losses)
+        handed = handed_ahead(lambda task: call.remote(common, task), tasks, AHEAD * self.workers)
+        for number, reference in handed:
+            yield self._answer(number, reference, losses)
 
     def _answer(self, number: int, reference: Any, losses: bool) -> Any:
         errors = self._ray.exceptions

@@ -12,9 +12,11 @@ from strange_effects import ClockForce
 
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.any_force import Unnamed, any_force, weighed, white
+from auvnn.diagnosis.choose import Chooser
 from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.explain import explain
 from auvnn.diagnosis.nuisance import lay_out
+from auvnn.diagnosis.search import together
 from auvnn.diagnosis.words import tell
 from auvnn.models import GreyBox
 
@@ -90,6 +92,41 @@ def test_a_name_that_explains_a_part_is_the_nearest_and_not_the_cause(model):
     assert found.steps == [{"verdict": "unknown", "effects": [], "p_value": found.steps[0]["p_value"]}]
     assert any("constant_force comes nearest, and leaves too much of it" in line for line in tell(found))
     assert not any(line.startswith("Missing") for line in tell(found))
+
+
+def test_a_withdrawn_name_is_not_among_the_nearest(model, monkeypatch):
+    """A name that was taken first and withdrawn does not stand, whatever is left."""
+    truth = pushed(model, 12.0).with_effects({"constant_force": {"X": 8.0}, "net_buoyancy": {"force": 6.0}})
+    log = make_log(truth, runs=2, duration=15.0, noise=1.0)
+    both = diagnose(model, log, ["constant_force", "net_buoyancy"], advice=False).nearest
+    assert set(both) == {"constant_force", "net_buoyancy"}
+
+    def gone(self, taken, base):
+        return explain(self.layout, self.windows, base, taken.effects[1:]), [taken.effects[0]]
+
+    monkeypatch.setattr(Chooser, "withdrawn", gone)
+    assert diagnose(model, log, ["constant_force", "net_buoyancy"], advice=False).nearest == both[1:]
+
+
+def test_a_further_effect_takes_a_clearer_test_than_the_first(model, monkeypatch):
+    log = make_log(model.with_effects({"net_buoyancy": {"force": 6.0}}), runs=2, duration=15.0, noise=1.0)
+    asked_for: list[float] = []
+
+    def doubtful(p_values):
+        asked_for.append(together(p_values))
+        return asked_for[0] if len(asked_for) == 1 else 0.03
+
+    monkeypatch.setattr("auvnn.diagnosis.search.together", doubtful)
+    found = diagnose(model, log, ["net_buoyancy", "constant_force"], advice=False)
+    assert [s["verdict"] for s in found.steps] == ["named", "adequate"] and len(asked_for) == 2
+    assert found.steps[1]["p_value"] == 0.03
+    # The first is asked at 0.05.
+    monkeypatch.setattr("auvnn.diagnosis.search.together", lambda p_values: 0.03)
+    tried: list[int] = []
+    choose = Chooser.choose
+    monkeypatch.setattr(Chooser, "choose", lambda *a, **k: tried.append(1) or choose(*a, **k))
+    diagnose(model, log, ["net_buoyancy", "constant_force"], advice=False)
+    assert len(tried) == 1
 
 
 def test_solvers_that_differ_are_no_force(model):
