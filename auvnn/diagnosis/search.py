@@ -155,7 +155,6 @@ class Search:
         if left.p_value >= ALPHA_UNKNOWN:
             return steps
         if given and self.unexplained > PARTIAL:
-            self.unexplained = 1.0
             own = white(first, self.floor)
             self.left, self.nearest, self.rivals = any_force(first, self.windows, own), given, []
             return [{"verdict": "unknown", "effects": [], "p_value": steps[0]["p_value"]}]
