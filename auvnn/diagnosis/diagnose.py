@@ -29,6 +29,7 @@ def diagnose(
     max_effects: int = 4,
     window: float | None = None,
     advice: bool = True,
+    whiteness: bool = True,
     force: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
@@ -45,6 +46,7 @@ def diagnose(
         max_effects: look for at most this many.
         window: length of the windows of free running that are fitted, s; by default 5.
         advice: for an ambiguous answer, also work out which manoeuvre would tell the candidates apart.
+        whiteness: also test what is left for correlations, before and after; no verdict depends on these tests.
         force: go on with a log that contradicts itself: signs, units, axes.
         progress: told in words what is being done.
 
@@ -59,6 +61,7 @@ def diagnose(
         max_effects=max_effects,
         window=window,
         advice=advice,
+        whiteness=whiteness,
         force=force,
         progress=progress,
     )[0]
@@ -72,6 +75,7 @@ def searched(
     max_effects: int = 4,
     window: float | None = None,
     advice: bool = True,
+    whiteness: bool = True,
     force: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[Diagnosis, Search]:
@@ -88,7 +92,7 @@ def searched(
     # What subnetworks have swallowed leaves no residual: only what drag can be is kept of them.
     known, spread = reduced(model, log)
     layout = lay_out(known, usable, spread)
-    search = Search(layout, windows, usable, say, advice)
+    search = Search(layout, windows, usable, say, advice, whiteness)
     found = search.run(model, log, needs, max_effects)
     if spread is not None:
         found.warnings.append(LEARNED)

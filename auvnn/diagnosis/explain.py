@@ -30,6 +30,7 @@ class Explanation:
         left_out: (B,) weighted squared error of each window, fitted without its fold.
         left_out_count: (B,) samples of each window.
         misfit: the part of minus twice the evidence that is fit: squared error and departure from what was stated.
+        judged: what is assumed of the parameters where something is left out; as in the fit by default.
     """
 
     effects: tuple[str, ...]
@@ -39,6 +40,7 @@ class Explanation:
     left_out: Array
     left_out_count: Array
     misfit: float = 0.0
+    judged: Priors | None = None
 
     @property
     def cv(self) -> float:
@@ -52,6 +54,34 @@ def folds(windows: Windows) -> NDArray[np.int64]:
     if len(runs) >= 2:
         return np.searchsorted(runs, windows.run) % FOLDS
     return (np.arange(len(windows)) * min(FOLDS, len(windows)) // max(len(windows), 1)).astype(np.int64)
+
+
+def by_stretches(explanation: Explanation) -> Array:
+    """Return each window's weighted squared error, fitted without the windows of its part of every run, (B,)."""
+    statistics = explanation.fitted.statistics
+    fold = np.zeros(len(statistics.run), dtype=np.int64)
+    for run in np.unique(statistics.run):
+        own = np.nonzero(statistics.run == run)[0]
+        order = np.argsort(np.argsort(statistics.first[own], kind="stable"))
+        fold[own] = order * min(FOLDS, len(own)) // len(own)
+    held = explanation.judged or explanation.fitted.priors
+    return left_out(statistics, explanation.fitted.theta, held, fold)
+
+
+def plausible(layout: Layout, names: Sequence[str], effects: Sequence[str], held: Priors, theta: Array) -> Priors:
+    """Return the priors of a fit with the effects asked for within what is plausible of them.
+
+    What is left out may be all that says anything of a parameter. It is then not foreseen anywhere, but where the
+    evidence looks for it too; a shape near where it was found.
+    """
+    mean, precision, at = held.mean.copy(), held.precision.copy(), 0
+    for name in names:
+        own = slice(at, at + len(layout.columns[name]))
+        at = own.stop
+        if name in effects:
+            precision[own] = np.maximum(precision[own], scales(layout, name) ** -2.0)
+            mean[own] = np.where(shapes(layout, name), theta[own], mean[own])
+    return replace(held, mean=mean, precision=precision)
 
 
 def left_out(statistics: Statistics, theta: Array, held: Priors, fold: NDArray[np.int64]) -> Array:
@@ -114,9 +144,10 @@ def explain(
         sigma=sigma,
         iterations=iterations,
     )
-    cost = left_out(fitted.statistics, fitted.theta, held, folds(windows))
+    judged = plausible(layout, names, effects, held, fitted.theta)
+    cost = left_out(fitted.statistics, fitted.theta, judged, folds(windows))
     count = fitted.statistics.count[:, np.isfinite(fitted.sigma)].sum(1)
-    return Explanation(tuple(effects), fitted, names, 0.0, cost, count)
+    return Explanation(tuple(effects), fitted, names, 0.0, cost, count, judged=judged)
 
 
 def weigh(layout: Layout, explanation: Explanation, factor: float) -> Explanation:

@@ -18,7 +18,7 @@ import torch
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 from torch import Tensor, nn
-from torch.func import functional_call, jacfwd, vmap
+from torch.func import functional_call
 
 from auvnn.diagnosis.explain import Explanation
 from auvnn.diagnosis.nuisance import Layout
@@ -27,6 +27,7 @@ from auvnn.effects import Body, Effect, Extent, Moment, Sensed, effect_class
 from auvnn.metrics.windows import POSITION, Windows
 from auvnn.models import GreyBox
 from auvnn.training.prediction_error import Statistics, answers, reduce, set_parameters
+from auvnn.training.replay import Replayed
 
 Array = NDArray[np.float64]
 
@@ -73,7 +74,7 @@ class _One(nn.Module):
         return getattr(self.effect, hook)(*args)
 
 
-class StandIns(Effect):
+class StandIns(Replayed):
     """An effect at its null in several shapes at once, each with free parameters of its own.
 
     What the shapes do is added up, which is exact to first order at the null, and all that is asked for there.
@@ -118,19 +119,15 @@ class StandIns(Effect):
         """Return what all shapes together change of a hook's answer, to first order in the parameters.
 
         At the null an effect does nothing whatever the state, so that the state needs no derivative here; and
-        slopes from the few live parameters forwards cost far less than from all of an answer backwards.
+        the slopes by the few live parameters cost far less than those of all of an answer backwards.
         """
         start, place, args = self.get_buffer("start"), self.get_buffer("place"), list(map(_held, args))
-        held = self.get_buffer("held")
-        live = start.shape[1]
 
         def one(values: Tensor, shape: Tensor) -> list[Tensor]:
             theta = shape + values @ place
             return pick(functional_call(self.one, {"effect.theta": theta}, (hook, *args)))
 
-        slopes = vmap(jacfwd(one))(start, held)
-        moved = (self.theta - start.flatten()).unflatten(0, (len(held), live))
-        return [torch.einsum("s...p,sp->...", slope, moved.to(slope)) for slope in slopes]
+        return self.added(one, start, self.get_buffer("held"))
 
     def _thrust(self, thrust: Tensor, moment: Moment) -> Tensor:
         return thrust + self._change("thrust", (thrust, moment), lambda new: [new])[0]

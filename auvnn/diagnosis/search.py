@@ -33,6 +33,8 @@ ALPHA_NEXT = 0.01
 # "Something is missing, but nothing that has a name" is a claim of its own: where no effect pays on runs left
 # out, it takes stronger grounds than the test that opened the search.
 ALPHA_UNKNOWN = 0.001
+# A name that leaves a force is refuted on weaker grounds: to be silent about a cause costs less than a wrong one.
+ALPHA_LEFT = 0.01
 # Names that leave more than this share of what looks like a force have stood in for something without a name.
 PARTIAL = 0.1
 
@@ -47,9 +49,10 @@ class Search:
         usable: list[str],
         say: Callable[[str], None],
         advice: bool = True,
+        whiteness: bool = True,
     ) -> None:
         self.layout, self.windows, self.usable, self.say = layout, windows, usable, say
-        self.advice = advice
+        self.advice, self.whiteness = advice, whiteness
         self.chooser = Chooser(layout, windows, say)
         # The explanations between which the log cannot decide.
         self.rivals: list[Explanation] = []
@@ -152,12 +155,12 @@ class Search:
         given = [e for s in steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"] if e in standing]
         if given:
             self.unexplained = left.left_of(any_force(first, self.windows, noise))
-        if left.p_value >= ALPHA_UNKNOWN:
-            return steps
-        if given and self.unexplained > PARTIAL:
+        if given and self.unexplained > PARTIAL and left.p_value < ALPHA_LEFT:
             own = white(first, self.floor)
             self.left, self.nearest, self.rivals = any_force(first, self.windows, own), given, []
             return [{"verdict": "unknown", "effects": [], "p_value": steps[0]["p_value"]}]
+        if left.p_value >= ALPHA_UNKNOWN:
+            return steps
         self.left = left
         if steps[-1]["verdict"] == "ambiguous":
             return [*steps, {"verdict": "unknown", "effects": [], "p_value": left.p_value}]
@@ -215,6 +218,8 @@ class Search:
 
     def _tests(self, first: Explanation, last: Explanation) -> dict[str, Any]:
         """Return the residual tests without what was found and with it."""
+        if not self.whiteness:
+            return {}
         self.say("testing what is left for whiteness")
         before = residual_tests(first, self.windows).to_dict()
         after = before if last is first else residual_tests(last, self.windows).to_dict()

@@ -3,7 +3,8 @@
 `engine="auto"` compiles where it pays: when torch would take, by estimate and together with what the same model has
 taken before, longer than compiling does; code that was compiled before, in whatever process, is used at once. Where
 compiling is impossible torch runs, and `why_not` says why. Compiled results differ from torch's by rounding: who needs
-the same bits whatever was compiled before asks for one engine by name.
+the same bits whatever was compiled before asks for one engine by name, or for "firm": compiled wherever that is
+possible, whatever it costs, so that the answer depends on the model and the machine alone.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from auvnn.models.actuators import Drive
     from auvnn.models.grey_box import GreyBox
 
-ENGINES = ("auto", "torch", "compiled")
+ENGINES = ("auto", "torch", "compiled", "firm")
 
 PER_RATE, GRADIENT_FACTOR = 6e-5, 8.0
 """Seconds that torch takes per evaluation of the right-hand side, and how much more with a gradient."""
@@ -145,13 +146,15 @@ def compiled_run(
     """
     if engine not in ENGINES:
         raise ConfigError(f"no engine called {engine!r}: choose {', '.join(ENGINES)}")
-    engine = default_engine() if engine == "auto" else engine
+    # Who asks for "firm" means the same engine each time, and that may be torch.
+    named = default_engine()
+    engine = named if engine == "auto" or (engine == "firm" and named == "torch") else engine
     if engine == "torch":
         return None
     try:
         return _compiled(model, state, inputs, times, drive, substeps, tableau, engine == "auto")
     except CannotCompile as no:
-        if engine == "auto":
+        if engine in ("auto", "firm"):
             return None
         raise ConfigError(f"engine=compiled is not possible here: {no}; choose engine=torch") from None
 
@@ -267,7 +270,9 @@ def _made(model: GreyBox, inputs: Inputs, gradient: bool, tableau: tuple) -> _Ma
     if made is not None and made.holds(row):
         return made
     try:
-        kernel, fixed = _traced(side, layout, numbers, gradient, tableau)
+        # In inference mode some operations would show as wholes and not as what they are made of.
+        with torch.inference_mode(False):
+            kernel, fixed = _traced(side, layout, numbers, gradient, tableau)
         places = torch.nonzero(fixed).squeeze(-1)
         made = _Made(identity.held, kernel, "", places, row[places].clone())
     except CannotCompile as no:

@@ -123,8 +123,8 @@ def rollout(
         check: look for divergence, try shorter steps where that is the step's fault, and note where it leaves the
             velocities that its damping was trained on; off inside function transforms.
         engine: how the own solvers run: "torch"; "compiled", as machine code made from the torch functions, which
-            agrees to rounding and can be differentiated once; or "auto", compiled where that is possible and pays
-            (see `auvnn.models.engine`).
+            agrees to rounding and can be differentiated once; "auto", compiled where that is possible and pays; or
+            "firm", wherever that is possible, so that runs repeat to the bit (see `auvnn.models.engine`).
         **solver_options: handed to torchdiffeq (rtol, atol).
 
     Returns:

@@ -19,6 +19,9 @@ from auvnn.plants.base import Controller, Look, Motion, Plant, Task, diverged, r
 
 Array = NDArray[np.float64]
 
+# Steps from which machine code is worth its compiling.
+WORTH_COMPILING = 1000
+
 # What the sensors make of row k: position, quaternion and nu, reported and noisy.
 Seen = Callable[[int, Sensed], tuple[Array, Array, Array]]
 
@@ -94,9 +97,12 @@ def open_loop(plant: GreyBox, plan: Start, voltage: Tensor | None, t: Tensor, ma
     assert plan.command is not None
     fins = None if plan.fins is None else torch.tensor(plan.fins)
     inputs = Inputs(torch.tensor(plan.command), fins, voltage)
-    # A log is the same to the last bit for the same seed, whatever has been compiled before.
+    # A log is the same to the last bit for the same seed, whatever has been compiled before: how it is run depends
+    # on how long it is alone.
+    steps = steps_per_interval(t, max_step) * (t.shape[-1] - 1)
+    engine = "firm" if steps >= WORTH_COMPILING else "torch"
     nu0 = _first_velocity(plant, plan)
-    run = plant.rollout(torch.tensor(plan.eta0), nu0, inputs, t, max_step=max_step, engine="torch")
+    run = plant.rollout(torch.tensor(plan.eta0), nu0, inputs, t, max_step=max_step, engine=engine)
     if run.divergences:
         first = run.divergences[0]
         raise diverged(plant.vehicle.name, first.index, first.time, first.term)

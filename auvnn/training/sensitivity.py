@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
-from torch.func import functional_call, jacfwd, jacrev, vmap
+from torch.func import functional_call, jacrev, vmap
 from torch.utils._pytree import register_pytree_node
 
 from auvnn.effects import Sensed
@@ -34,6 +34,8 @@ from auvnn.physics.attitude import (
     rotvec_to_quat,
     skew,
 )
+from auvnn.training.few_inputs import slopes
+from auvnn.training.replay import Added, Replayed, given, joined, noted, nought
 
 
 @dataclass(frozen=True)
@@ -252,7 +254,8 @@ def run(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str])
     with torch.no_grad():
         # What is not there yet is differentiated elsewhere; the run itself is the same without it.
         there = model.without_absent()
-        eta, nu = predict(there, windows, initial)
+        # Many runs follow: compiling pays, and the same bits must come each time.
+        eta, nu = predict(there, windows, initial, engine="firm")
         error = window_error(there, windows, eta, nu)
         mean, start = module(windows, substeps)
     acting = {id(e) for e in model.before_thrust}
@@ -267,17 +270,27 @@ def run(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str])
     if not keys:
         none = mean.new_zeros(*mean.shape, 0)
         return Ran(eta, nu, error, mean, start, [], none, none)
-    slopes = jacfwd(lambda some: functional_call(module, some, (windows, substeps)))(keys)
-    joined = [torch.cat([which[k] for k in keys], dim=-1).detach() for which in slopes]
+    sizes = [theta.numel() for theta in keys.values()]
+
+    def thrusts(values: Tensor) -> tuple[Tensor, Tensor]:
+        some = dict(zip(keys, values.split(sizes), strict=True))
+        return functional_call(module, some, (windows, substeps))
+
+    joined = [x.detach() for x in slopes(thrusts, torch.cat(list(keys.values())))]
     return Ran(eta, nu, error, mean, start, columns, joined[0], joined[1])
 
 
 def _differentiate(
-    module: nn.Module, what: str, points: tuple, thetas: dict[str, Tensor], chunk: int
+    module: _Point, what: str, points: tuple, thetas: dict[str, Tensor], chunk: int
 ) -> list[Tensor]:
     """Return derivatives of a function of a point by position, turn, velocity, thrust and each theta, (N, out, in)."""
-    position, quaternion, nu, thrust, time, inputs = points
-    inputs, axes = _flat(inputs)
+    members = {f"model.effects.{k}.theta": e for k, e in enumerate(module.model.members)}
+    replayed = {key: e for key, e in members.items() if key in thetas and isinstance(e, Replayed)}
+    others = {key: theta for key, theta in thetas.items() if key not in replayed}
+    effects, turn = list(replayed.values()), points[2].new_zeros(3)
+
+    def note(p: Tensor, q: Tensor, v: Tensor, f: Tensor, t: Tensor, extra: Inputs) -> list[Added]:
+        return noted(effects, lambda: module(what, p, q, turn, v, f, t, extra))
 
     def one(
         p: Tensor,
@@ -285,26 +298,27 @@ def _differentiate(
         v: Tensor,
         f: Tensor,
         theta: dict[str, Tensor],
+        parts: list[Added],
         q: Tensor,
         t: Tensor,
         extra: Inputs,
     ) -> Tensor:
-        return functional_call(module, theta, (what, p, q, turn, v, f, t, extra))
+        return given(effects, parts, lambda: functional_call(module, theta, (what, p, q, turn, v, f, t, extra)))
 
-    slope = jacrev(one, argnums=(0, 1, 2, 3, 4))
-    many = vmap(slope, in_dims=(0, None, 0, 0, None, 0, 0, axes), chunk_size=chunk)
-    turn = torch.zeros(3, dtype=nu.dtype, device=nu.device)
-    by = many(
-        position.flatten(0, 1),
-        turn,
-        nu.flatten(0, 1),
-        thrust.flatten(0, 1),
-        thetas,
-        quaternion.flatten(0, 1),
-        time.flatten(),
-        inputs,
-    )
-    return [*(x.detach() for x in by[:4]), *(by[4][k].detach().flatten(2) for k in thetas)]
+    position, quaternion, nu, thrust, time = (x.flatten(0, 1) for x in points[:5])
+    inputs, axes = _flat(points[5])
+    slope = jacrev(one, argnums=(0, 1, 2, 3, 4, 5))
+    many = vmap(slope, in_dims=(0, None, 0, 0, None, None, 0, 0, axes))
+    found: list[list[Tensor]] = []
+    for begin in range(0, len(nu), chunk):
+        p, q, v, f, t = (x[begin : begin + chunk] for x in (position, quaternion, nu, thrust, time))
+        extra = inputs.rows(begin, begin + chunk)
+        of = vmap(note, in_dims=(0, 0, 0, 0, 0, axes))(p, q, v, f, t, extra) if effects else []
+        by = many(p, turn, v, f, others, nought(of), q, t, extra)
+        through = {key: joined(by[5][k], of[k]) for k, key in enumerate(replayed)}
+        by_theta = (through[key] if key in through else by[4][key].flatten(2) for key in thetas)
+        found.append([x.detach() for x in (*by[:4], *by_theta)])
+    return [torch.cat(parts) for parts in zip(*found, strict=True)]
 
 
 def _flatten_inputs(i: Inputs) -> tuple[list, None]:

@@ -46,6 +46,10 @@ def test_a_group_counts_where_no_one_can_tell_its_members_apart():
     assert not named_or_tied(row("a", *named("b")))
     assert named_or_tied(row("a", *GROUP, imitation={"a": {"nothing": 9.0, "b": 1.9}}))
     assert not named_or_tied(row("a", *GROUP, imitation={"a": {"nothing": 9.0, "b": 2.1}}))
+    silent = [("adequate", [])]
+    assert named_or_tied(row("a", *silent, imitation={"a": {"nothing": 1.5}})), "there was nothing to see"
+    assert not named_or_tied(row("a", *silent, imitation={"a": {"nothing": 2.5}}))
+    assert not named_or_tied(row("a", *silent)) and not named_or_tied(row("a", *named("b"), imitation={"a": {"nothing": 0.0}}))
     assert not named_or_tied(row("a", *GROUP)), "nobody has shown it"
     assert not named_or_tied(row("c", *GROUP, imitation={"c": {"a": 0.0, "b": 0.0}})), "not a member"
     three = [("ambiguous", ["a", "b", "c"])]
@@ -125,7 +129,7 @@ def test_each_rate_counts_its_own_kind():
         "all_named": (1, 1), "several_named_alone": (1, 1), "adequate_with_nothing": (1, 2),
         "unknown_with_stranger": (1, 2), "axis_of_stranger": (1, 2),
         # Given: a; b; a and b; c. Wrong: b and c.
-        "false_names": (2, 5), "exact_ties": (1, 2), "faults": (2, 9), "not_made": (1, 9),
+        "false_names": (2, 5), "exact_ties": (1, 2), "unseen": (0, 2), "faults": (2, 9), "not_made": (1, 9),
         # The share of each log that is no fault: 0, 0, 1, 0, 0, 1, 0.
         "false_discovery_rate": (None, 7),
     }  # fmt: skip

@@ -73,7 +73,7 @@ def _sizes(
     eta, nu = _tensor(np.broadcast_to(eta0, (*shape, 7))), _tensor(np.broadcast_to(nu0, (*shape, 6)))
     if limits.steady is not None:
         nu = over_ground(model, eta, nu)
-    run = model.rollout(eta, nu, inputs, _tensor(times), max_step=TRIAL_STEP, check=False)
+    run = model.rollout(eta, nu, inputs, _tensor(times), max_step=TRIAL_STEP, check=False, engine="firm")
     score = _score(run.eta.numpy(), run.nu.numpy(), most)
     best = score.argmax(axis=0)
     return pairs[best, 0] * effort, pairs[best, 1]

@@ -10,6 +10,8 @@ from auvnn.studies.benchmark.cases import JOIN, NOTHING
 Row = Mapping[str, Any]
 # Below this many standard errors the log cannot tell two effects apart; see `information`.
 TIED = 2.0
+# What the rival is called that is no effect at all.
+UNSEEN = "nothing"
 
 
 def kind_of(row: Row) -> str:
@@ -71,6 +73,12 @@ def tied(row: Row, effect: str, others: list[str]) -> bool:
     return all(distance.get(name) is not None and distance[name] <= TIED for name in others)
 
 
+def unseen(row: Row) -> bool:
+    """Whether what is uncertain of the coefficients can make up for all that the one hidden effect does."""
+    distance = [((row.get("imitation") or {}).get(e) or {}).get(UNSEEN) for e in effects_of(row)]
+    return bool(distance) and all(d is not None and d <= TIED for d in distance)
+
+
 def effect_named(row: Row, effect: str) -> bool:
     """Whether a hidden effect was named in some step, or declared in a group that the log cannot tell apart.
 
@@ -84,9 +92,14 @@ def effect_named(row: Row, effect: str) -> bool:
 
 
 def named_or_tied(row: Row) -> bool:
-    """Whether the hidden effect was named first, or is in a first group that the log cannot tell apart."""
+    """Whether the hidden effect was named first, or is in a first group that the log cannot tell apart.
+
+    Where it cannot be told from nothing at all, `adequate` says so.
+    """
     if named_first(row):
         return True
+    if row["verdict"] == "adequate":
+        return unseen(row)
     mine = [n for n in effects_of(row) if n in row["missing"]]
     return (
         row["verdict"] == "ambiguous"

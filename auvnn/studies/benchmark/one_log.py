@@ -81,7 +81,8 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
     log = made.log.select(numbers[: case.runs]) if case.held_out else made.log
     simulated = time.monotonic()
     begun["made"] = True
-    found = diagnose(model, log, None if case.candidates is None else list(case.candidates), advice=False)
+    candidates = None if case.candidates is None else list(case.candidates)
+    found = diagnose(model, log, candidates, advice=False, whiteness=False)
     diagnosed = time.monotonic()
     row: dict[str, Any] = {
         "verdict": found.verdict,
