@@ -11,13 +11,16 @@ from linear_world import STATED, World, layout
 from scipy.stats import multivariate_normal
 from small_logs import make_log, small_vehicle
 
+from auvnn.diagnosis.choose import in_one_run, pays
 from auvnn.diagnosis.explain import (
     FOLDS,
     Explanation,
+    by_stretches,
     determined,
     explain,
     folds,
     left_out,
+    plausible,
     standard_errors,
     weigh,
 )
@@ -70,6 +73,35 @@ def test_what_is_left_out_is_predicted_by_a_fit_without_it(world):
         missed = errors[~keep] - world.jacobian[~keep][..., columns] @ step
         np.testing.assert_allclose(cost[~keep], np.sum(missed**2, 1), rtol=1e-7)
     assert cost.sum() > found.fitted.statistics.cost.sum()
+
+
+def judged(world, errors, effects):
+    """Return the explanation with what it leaves on runs left out."""
+    found, _ = fitted(world, errors, effects)
+    held = plausible(world.layout, found.names, found.effects, found.fitted.priors, found.fitted.theta)
+    return replace(found, judged=held, left_out=left_out(found.fitted.statistics, found.fitted.theta, held, world.run))
+
+
+@pytest.mark.parametrize("heard", [range(60), range(45, 60), [50]])
+def test_what_one_run_or_one_window_alone_says_of_an_effect_counts(world, heard):
+    """Net buoyancy leaves its trace in all windows, in those of the last of four runs, or in one."""
+    column = int(world.layout.columns["net_buoyancy"][0])
+    trace = np.zeros_like(world.jacobian)
+    trace[heard] = world.jacobian[heard] * np.sqrt(60 / len(heard))
+    jacobian = world.jacobian.copy()
+    jacobian[..., column] = trace[..., column]
+    here = World(world.layout, jacobian, world.run)
+    size = float(scales(here.layout, "net_buoyancy")[0])
+    there, absent = drawn(here, 5, net_buoyancy=size), drawn(here, 5)
+    after, before = judged(here, there, ["net_buoyancy"]), judged(here, there, [])
+    assert in_one_run(after) == (len(heard) < 60)
+    assert pays(after, before)
+    assert not pays(judged(here, absent, ["net_buoyancy"]), judged(here, absent, []))
+    if len(heard) == 15:
+        # Stretches of the run in which it shows foresee each other, the other runs do not foresee it.
+        by_run, by_stretch = before.left_out - after.left_out, by_stretches(before) - by_stretches(after)
+        assert by_stretch[heard].sum() > 2 * np.sqrt(15) * by_stretch[heard].std(ddof=1)
+        assert by_run[heard].sum() < 0.2 * by_stretch[heard].sum()
 
 
 def test_nothing_to_fit_leaves_the_error_as_it_is(world):

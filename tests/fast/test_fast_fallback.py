@@ -226,3 +226,29 @@ class Counts(Strange):
 
 def test_what_changes_itself_is_left_to_torch(compiler):
     assert "changed in place" in engines.why_not(rov(Counts()), gradient=False)
+
+
+def test_firm_is_the_same_whatever_came_before(compiler, monkeypatch):
+    """Short runs that auto would leave to torch; and torch where torch is asked for, or nothing else is possible."""
+    monkeypatch.setenv("AUVNN_ENGINE", "auto")
+    model = rov()
+    with torch.no_grad():
+        assert torch.equal(run(model, "firm"), run(model, "compiled"))
+        assert not torch.equal(run(model, "firm"), run(model, "torch")), "not by the bits, or this test says nothing"
+        strange = rov(Rare())
+        assert torch.equal(run(strange, "firm"), run(strange, "torch"))
+        monkeypatch.setenv("AUVNN_ENGINE", "torch")
+        assert torch.equal(run(model, "firm"), run(model, "torch"))
+
+
+def test_inference_mode_is_no_hindrance(compiler):
+    """There some operations show as wholes, of which the graph has no rule."""
+    with torch.inference_mode():
+        known = GreyBox(load_vehicle("rov95"))
+        nothing = torch.zeros(6, 8, dtype=DOUBLE)
+        eta, nu, times = nothing[0, :6], nothing[1, :6], 0.05 * torch.arange(6, dtype=DOUBLE)
+        engines._KERNELS.clear()
+        # One that has not been traced outside.
+        fast = known.rollout(eta, nu + 0.1, nothing + 0.2, times, engine="compiled", check=False).nu
+        slow = known.rollout(eta, nu + 0.1, nothing + 0.2, times, engine="torch", check=False).nu
+    assert torch.allclose(fast, slow, rtol=1e-12, atol=1e-14)

@@ -206,3 +206,11 @@ def test_divergence_says_when_and_by_what():
     what = task(known, actuation="wrench", rows=200)
     with pytest.raises(AuvnnError, match=r"rov95: run \d diverged after .* s; the largest term was drag"):
         move("numpy", what)
+
+
+def test_longer_steps_are_hidden_by_noise():
+    """The noise is of milliradians and millimetres per second; thrown about as here, longer steps change 2 % of that."""
+    vehicle = "bluerov2_heavy"
+    fine, coarse = (move("numpy", task(vehicle, {"ocean_current": plausible("ocean_current", vehicle)}, max_step=h))
+                    for h in (0.01, 0.025))  # fmt: skip
+    assert 0.0 < np.abs(fine.nu - coarse.nu).max() < 1e-4

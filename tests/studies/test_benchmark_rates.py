@@ -49,7 +49,8 @@ def test_a_group_counts_where_no_one_can_tell_its_members_apart():
     silent = [("adequate", [])]
     assert named_or_tied(row("a", *silent, imitation={"a": {"nothing": 1.5}})), "there was nothing to see"
     assert not named_or_tied(row("a", *silent, imitation={"a": {"nothing": 2.5}}))
-    assert not named_or_tied(row("a", *silent)) and not named_or_tied(row("a", *named("b"), imitation={"a": {"nothing": 0.0}}))
+    assert not named_or_tied(row("a", *silent))
+    assert not named_or_tied(row("a", *named("b"), imitation={"a": {"nothing": 0.0}})), "a wrong name is wrong"
     assert not named_or_tied(row("a", *GROUP)), "nobody has shown it"
     assert not named_or_tied(row("c", *GROUP, imitation={"c": {"a": 0.0, "b": 0.0}})), "not a member"
     three = [("ambiguous", ["a", "b", "c"])]
