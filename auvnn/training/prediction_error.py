@@ -22,7 +22,7 @@ from torch import Tensor
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.training.sensitivity import Response, respond, run
+from auvnn.training.sensitivity import Response, respond_by, run
 
 Array = NDArray[np.float64]
 
@@ -34,8 +34,10 @@ LOOSE = np.array([10.0] * 3 + [1.0] * 3 + [2.0] * 3 + [2.0] * 3)
 TRUST = 1e-4
 # Windows worked out at a time, as long as there are no more parameters than columns: this bounds the memory.
 CHUNK, COLUMNS = 48, 80
+# Numbers of an answer that stay near the processor.
+NEAR = 2_500_000
 # Windows run free at a time.
-BLOCK = 4 * CHUNK
+BLOCK = 2 * CHUNK
 
 
 @dataclass(frozen=True)
@@ -212,9 +214,10 @@ def answers(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[s
         block = slice(start, start + BLOCK)
         some, states = windows.pick(block), initial[block]
         ran = run(model, some, states, names)
+        few = max(NEAR // (some.nu.shape[1] * 18 * (12 + columns)), 1)
         for begin in range(0, len(some), size):
             part = slice(begin, begin + size)
-            yield respond(model, some.pick(part), states[part], names, ran=ran.pick(part))
+            yield from respond_by(few, model, some.pick(part), states[part], names, ran=ran.pick(part))
 
 
 def reduce(windows: Windows, responses: Iterable[Response], sigma: Array) -> tuple[Statistics, Array, Array]:

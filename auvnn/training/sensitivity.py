@@ -13,7 +13,7 @@ integrator's, so that a perfect model still leaves no residual at all.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -172,6 +172,25 @@ def respond(
             `model.damping.parameters()`.
         ran: the same windows as `run` returns them, where that has been done.
     """
+    (whole,) = respond_by(len(windows), model, windows, initial, names, chunk, weights=weights, ran=ran)
+    return whole
+
+
+def respond_by(
+    size: int,
+    model: GreyBox,
+    windows: Windows,
+    initial: Tensor,
+    names: Sequence[str],
+    chunk: int = 2048,
+    *,
+    weights: bool = False,
+    ran: Ran | None = None,
+) -> Iterator[Response]:
+    """Yield the same for `size` windows at a time.
+
+    Differentiating is quickest for many windows at once, what follows for so few that they stay near the processor.
+    """
     order = [model.effect_names.index(name) for name in names]
     thetas = {f"model.effects.{k}.theta": model.members[k].theta.detach() for k in order}
     if weights and model.damping is not None:
@@ -198,13 +217,14 @@ def respond(
     jac_theta = torch.cat(rate[4:], dim=-1) if total else jac_state.new_zeros(*jac_state.shape[:-1], 0)
     if len(ran.columns):
         jac_theta[..., ran.columns] += rate[3] @ ran.mean_slope[:, :-1].flatten(0, 1)
-
-    sensitivity = _propagate(
-        jac_state, jac_theta, points[1].flatten(0, 1), points[2].flatten(0, 1), steps.flatten(), count, length
-    )
-    state, parameters = _outputs(model, windows, ran, times, inputs, thetas, sensitivity, chunk)
-    seen = windows.mask.unsqueeze(-1)
-    return Response(ran.error, state.mul_(seen), parameters.mul_(seen))
+    along = [x.unflatten(0, (count, length - 1)) for x in (jac_state, jac_theta)]
+    seen = _reports(model, windows, ran, times, inputs, thetas, chunk)
+    for begin in range(0, count, size):
+        part = slice(begin, begin + size)
+        sensitivity = _propagate(along[0][part], along[1][part], points[1][part], points[2][part], steps[part])
+        state, parameters = _outputs(seen, part, sensitivity)
+        mask = windows.mask[part].unsqueeze(-1)
+        yield Response(ran.error[part], state.mul_(mask), parameters.mul_(mask))
 
 
 @dataclass(frozen=True)
@@ -329,56 +349,68 @@ def _flatten_inputs(i: Inputs) -> tuple[list, None]:
 register_pytree_node(Inputs, _flatten_inputs, lambda children, _: Inputs(*children))
 
 
-def _propagate(
-    jac_state: Tensor,
-    jac_theta: Tensor,
-    quaternion: Tensor,
-    nu: Tensor,
-    steps: Tensor,
-    count: int,
-    length: int,
-) -> Tensor:
-    """Return the change of the state with initial state and parameters, (B, L, 12, 12 + P)."""
-    points, size = jac_state.shape[0], jac_theta.shape[-1]
+def _propagate(jac_state: Tensor, jac_theta: Tensor, quaternion: Tensor, nu: Tensor, steps: Tensor) -> Tensor:
+    """Return the change of the state with initial state and parameters, (B, L, 12, 12 + P).
+
+    Args:
+        jac_state: of the acceleration, (B, L - 1, 6, 12).
+        jac_theta: (B, L - 1, 6, P).
+        quaternion: (B, L - 1, 4).
+        nu: (B, L - 1, 6).
+        steps: s, (B, L - 1).
+    """
+    count, intervals, size = *steps.shape, jac_theta.shape[-1]
     rotation = quat_to_matrix(quaternion)
-    a = jac_state.new_zeros(points, 12, 12)
-    a[:, 0:3, 3:6] = -rotation @ skew(nu[:, :3])
-    a[:, 0:3, 6:9] = rotation
-    a[:, 3:6, 3:6] = -skew(nu[:, 3:])
-    a[:, 3:6, 9:12] = torch.eye(3, dtype=a.dtype, device=a.device)
-    a[:, 6:12] = jac_state
-    ha = a * steps[:, None, None]
+    a = jac_state.new_zeros(count, intervals, 12, 12)
+    a[..., 0:3, 3:6] = -rotation @ skew(nu[..., :3])
+    a[..., 0:3, 6:9] = rotation
+    a[..., 3:6, 3:6] = -skew(nu[..., 3:])
+    a[..., 3:6, 9:12] = torch.eye(3, dtype=a.dtype, device=a.device)
+    a[..., 6:12, :] = jac_state
+    ha = a * steps[..., None, None]
     eye = torch.eye(12, dtype=a.dtype, device=a.device)
     # Horner's form of (exp(hA) - 1)/(hA); eight terms reach rounding for any step the integrator may take.
     phi = eye + ha / 8
     for k in range(7, 1, -1):
         phi = eye + (ha / k) @ phi
-    forward = (eye + ha @ phi).reshape(count, length - 1, 12, 12)
-    forcing = ((phi * steps[:, None, None])[..., 6:] @ jac_theta).reshape(count, length - 1, 12, size)
+    forward = eye + ha @ phi
+    forcing = (phi * steps[..., None, None])[..., 6:] @ jac_theta
     now = torch.cat([eye.expand(count, 12, 12), a.new_zeros(count, 12, size)], dim=-1)
     rows = [now]
-    for k in range(length - 1):
+    for k in range(intervals):
         now = forward[:, k] @ now
         now[..., 12:] += forcing[:, k]
         rows.append(now)
     return torch.stack(rows, dim=1)
 
 
-def _outputs(
+@dataclass(frozen=True)
+class _Reports:
+    """How what is reported follows from the state; `state` is None where the state itself is reported.
+
+    Attributes:
+        state: (B, L, out, 12), out being 12, or 18 where accelerations are measured.
+        parts: begin of an effect's columns, and (B, L, out, p): what its sensors report changes with them.
+        thrust: columns on which the thrust depends, and (B, L, out, Q).
+    """
+
+    state: Tensor | None
+    parts: list[tuple[int, Tensor]]
+    thrust: tuple[list[int], Tensor] | None
+
+
+def _reports(
     model: GreyBox,
     windows: Windows,
     ran: Ran,
     times: Tensor,
     inputs: Inputs,
     thetas: dict[str, Tensor],
-    sensitivity: Tensor,
     chunk: int,
-) -> tuple[Tensor, Tensor]:
-    """Return the change of the 18 outputs with initial state, (B, L, 18, 12), and parameters, (B, L, 18, P)."""
+) -> _Reports:
     measured_rate = windows.nu_dot is not None
     if not measured_rate and not model.using("sense"):
-        full = torch.nn.functional.pad(sensitivity, (0, 0, 0, 6))
-        return full[..., :12], full[..., 12:]
+        return _Reports(None, [], None)
     what = "sense and rate" if measured_rate else "sense"
     acting = thetas
     if not measured_rate:
@@ -386,19 +418,28 @@ def _outputs(
         reporting = {id(e) for e in model.using("sense")}
         acting = {k: t for k, t in thetas.items() if id(model.members[int(k.split(".")[2])]) in reporting}
     points = (ran.eta[..., :3], ran.eta[..., 3:], ran.nu, ran.start, times, inputs)
-    by = _differentiate(_Point(model), what, points, acting, chunk)
-    shape = sensitivity.shape[:2]
-    by_state = torch.cat(by[:3], dim=-1).reshape(*shape, -1, 12)
-    full = sensitivity.new_zeros(*shape, 18, sensitivity.shape[-1])
+    by = [x.unflatten(0, ran.nu.shape[:2]) for x in _differentiate(_Point(model), what, points, acting, chunk)]
+    found = dict(zip(acting, by[4:], strict=True))
+    parts, at = [], 12
+    for key, theta in thetas.items():
+        if key in found:
+            parts.append((at, found[key]))
+        at += theta.numel()
+    thrust = ([12 + c for c in ran.columns], by[3] @ ran.start_slope) if len(ran.columns) else None
+    return _Reports(torch.cat(by[:3], dim=-1), parts, thrust)
+
+
+def _outputs(seen: _Reports, part: slice, sensitivity: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the change of the 18 outputs with initial state, (B, L, 18, 12), and parameters, (B, L, 18, P)."""
+    if seen.state is None:
+        full = torch.nn.functional.pad(sensitivity, (0, 0, 0, 6))
+        return full[..., :12], full[..., 12:]
+    by_state = seen.state[part]
+    full = sensitivity.new_zeros(*sensitivity.shape[:2], 18, sensitivity.shape[-1])
     outputs = full[:, :, : by_state.shape[-2]]
     outputs.copy_(by_state @ sensitivity)
-    at = 12
-    found = dict(zip(acting, by[4:], strict=True))
-    for k, theta in thetas.items():
-        if k in found:
-            outputs[..., at : at + theta.numel()] += found[k].reshape(*shape, -1, theta.numel())
-        at += theta.numel()
-    if len(ran.columns):
-        through = by[3].reshape(*shape, -1, ran.start.shape[-1]) @ ran.start_slope
-        outputs[..., [12 + c for c in ran.columns]] += through
+    for at, slope in seen.parts:
+        outputs[..., at : at + slope.shape[-1]] += slope[part]
+    if seen.thrust is not None:
+        outputs[..., seen.thrust[0]] += seen.thrust[1][part]
     return full[..., :12], full[..., 12:]

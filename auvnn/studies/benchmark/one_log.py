@@ -12,6 +12,7 @@ from auvnn.answers import plain
 from auvnn.effects import EFFECTS
 from auvnn.errors import AuvnnError, one_line
 from auvnn.studies.benchmark.cases import Case
+from auvnn.studies.benchmark.counting import TIED
 from auvnn.studies.benchmark.strangers import axis_of, said_axis, sized_stranger
 
 # The plant's step, s: the error of 2e-5 m/s that the longer one leaves is far below any noise, but not below none.
@@ -146,8 +147,8 @@ def _hidden(case: Case, model: Any) -> dict[str, dict[str, float]]:
 def _ties(case: Case, model: Any, log: Any, truth: Mapping[str, Any], found: Any) -> dict[str, Any]:
     """Return which effects can pass for the hidden ones on this log, by distance in standard errors.
 
-    Of every candidate by the package's own equations; of a group that was declared and holds a hidden effect also
-    by differences of the plant, where another plant made the log and windows can say it.
+    Of every candidate by the package's own equations; of a group that was declared, holds a hidden effect
+    and one that can pass for it, also by differences of the plant, where another plant made the log and windows say it.
     """
     from auvnn.studies.benchmark.information import Truth, imitation, information, point_of
     from auvnn.studies.benchmark.plant_information import covers, plant_information
@@ -156,9 +157,12 @@ def _ties(case: Case, model: Any, log: Any, truth: Mapping[str, Any], found: Any
     rivals = [c["effect"] for c in found.candidates if c["p_value"] is not None]
     rivals = [n for n in rivals if n not in hidden]
     point = point_of(model, log, Truth(hidden, truth["coefficients"]), rivals, noise_of(case))
-    out: dict[str, Any] = {"imitation": imitation(information(point), rivals)}
+    own = imitation(information(point), rivals)
+    out: dict[str, Any] = {"imitation": own}
     group = [s["effects"] for s in found.steps if s["verdict"] == "ambiguous" and {*s["effects"]} & {*hidden}]
-    if case.plant != "own" and group:
+    # A tie takes the plant's word as well; where the equations find none, there is nothing to confirm.
+    close = group and any(own[h].get(n, np.inf) <= TIED for h in own for n in group[0])
+    if case.plant != "own" and close:
         names = list(dict.fromkeys([*hidden, *group[0]]))
         if covers(point, names):
             bottom = truth["conditions"]["bottom"]

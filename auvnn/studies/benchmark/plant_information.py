@@ -22,6 +22,8 @@ from auvnn.training.sensitivity import Response
 Array = NDArray[np.float64]
 # Steps: of a parameter, as a share of its plausible scale; of an initial state, m, rad, m/s and rad/s.
 SHARE, STATE = 1e-3, 1e-4
+# Longest step of the plant, s: differences do not see what both runs err by alike.
+STEP = 0.025
 # Effects that count the time since the run began, which a window does not know, or remember commands before it.
 REMEMBERING = ("biofouling", "flooding", "payload", "waves", "thrust_overshoot")
 
@@ -67,6 +69,7 @@ class PlantOutputs:
             vehicle=self.model.vehicle, actuation=self.model.actuation, effects=dict(effects),
             strangers=dict(strangers or {}), model=None, eta0=states[:, :7], nu0=states[:, 7:], t=self.t,
             command=repeat(self.command), fins=repeat(self.fins), voltage=repeat(self.voltage), bottom=self.bottom,
+            max_step=STEP,
         )  # fmt: skip
         motion = self.maker.move(task, lambda k, position, quaternion, nu: (position, quaternion, nu))
         return np.concatenate([motion.position, motion.quaternion, motion.velocity, motion.rate], axis=-1)
