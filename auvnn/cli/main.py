@@ -36,6 +36,8 @@ VERBS = Catalogue(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `auvnn` with its arguments, those of the process by default, and return the exit status."""
+    # Threads that wait by spinning cost a machine that others use many times what they gain; torch is not there yet.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     verb, *rest = [*(sys.argv[1:] if arguments is None else arguments)] or ["--help"]
     label = "auvnn" if verb.startswith("-") else f"auvnn {verb}"
     statuses: list[int] = []

@@ -36,8 +36,8 @@ TRUST = 1e-4
 CHUNK, COLUMNS = 48, 80
 # Numbers of an answer that stay near the processor.
 NEAR = 2_500_000
-# Windows run free at a time.
-BLOCK = 2 * CHUNK
+# Windows run free at a time, and their thrusts differentiated.
+BLOCK = CHUNK
 
 
 @dataclass(frozen=True)
@@ -236,21 +236,26 @@ def reduce(windows: Windows, responses: Iterable[Response], sigma: Array) -> tup
     # Channels that were not measured would only be multiplied by nought.
     live = torch.nonzero(weight).flatten().tolist()
     parts: list[list[Array]] = []
-    begin = 0
+    begin, hessian = 0, np.zeros((len(windows), 0, 0))
     for answer in responses:
-        count, length = answer.error.shape[:2]
-        mask = windows.mask[begin : begin + count] * (weight > 0)
+        count, length, _, size = answer.parameters.shape
+        here = slice(begin, begin + count)
+        mask = windows.mask[here] * (weight > 0)
         begin += count
-        error = (answer.error[..., live] * weight[live]).reshape(count, length * len(live), 1)
-        slopes = answer.parameters[:, :, live].mul_(weight[live, None])
-        slopes = slopes.reshape(count, length * len(live), slopes.shape[-1])
+        # The largest of all arrays: made once, and not joined from pieces.
+        if hessian.shape[-1] != size:
+            hessian = np.empty((len(windows), size, size))
+        both = answer.error.new_empty(count, length, len(live), 1 + size)
+        both[..., 0] = answer.error[..., live]
+        both[..., 1:] = answer.parameters[:, :, live]
+        both = both.mul_(weight[live, None]).reshape(count, length * len(live), 1 + size)
         state = answer.state[:, :, live].mul_(weight[live, None]).reshape(count, length * len(live), 12)
         q, r = torch.linalg.qr(torch.cat([state, loose.expand(count, 12, 12)], dim=1))
         q = q[:, :-12]
-        both = torch.cat([error, slopes], dim=-1)
         along = q.mT @ both
         # With the loose rows left out, this difference is the sum of squares after the best initial state.
-        sums = both.mT @ both - along.mT @ along
+        sums = (both.mT @ both).sub_(along.mT @ along)
+        hessian[here] = sums[:, 1:, 1:].numpy()
         solved = torch.linalg.solve_triangular(r, along, upper=True)
         remaining = answer.error - (answer.state @ solved[:, None, :, :1]).squeeze(-1)
         remaining = torch.where(mask > 0, remaining, torch.zeros_like(remaining))
@@ -260,9 +265,8 @@ def reduce(windows: Windows, responses: Iterable[Response], sigma: Array) -> tup
             [
                 x.numpy()
                 for x in (
-                    sums[:, 1:, 1:],
-                    sums[:, 1:, 0],
-                    sums[:, 0, 0],
+                    sums[:, 1:, 0].clone(),
+                    sums[:, 0, 0].clone(),
                     (remaining**2).sum(1),
                     mask.sum(1),
                     (step**2).sum(1),
@@ -273,7 +277,7 @@ def reduce(windows: Windows, responses: Iterable[Response], sigma: Array) -> tup
             ]
         )
     joined = [np.concatenate(p) for p in zip(*parts, strict=True)]
-    hessian, slope, cost, channel, count, rough, pairs, change, follow = joined
+    slope, cost, channel, count, rough, pairs, change, follow = joined
     run, first = windows.run.astype(np.int64), windows.first.astype(np.int64)
     return Statistics(hessian, slope, cost, channel, count, rough, pairs, run, first), change, follow
 

@@ -61,9 +61,10 @@ def similarity(
     ax.tick_params(length=0, labelsize=7.5)
     for spine in ax.spines.values():
         spine.set_visible(False)
-    figure.colorbar(
-        mesh, ax=ax, shrink=0.6, aspect=25, label=f"similarity of the residual (framed: ≥ {alike:g})"
-    )
+    # Beside few candidates the bar is short, and so must be the lines of its label.
+    small = n < 12
+    words = f"similarity of the residual{chr(10) if small else ' '}(framed: ≥ {alike:g})"
+    figure.colorbar(mesh, ax=ax, shrink=1.0 if small else 0.6, aspect=15 if small else 25, label=words)
     return figure
 
 
