@@ -36,8 +36,6 @@ VERBS = Catalogue(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `auvnn` with its arguments, those of the process by default, and return the exit status."""
-    # Threads that wait by spinning cost a machine that others use many times what they gain; torch is not there yet.
-    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     verb, *rest = [*(sys.argv[1:] if arguments is None else arguments)] or ["--help"]
     label = "auvnn" if verb.startswith("-") else f"auvnn {verb}"
     statuses: list[int] = []
@@ -66,7 +64,9 @@ def _dispatch(verb: str, rest: list[str]) -> int:
 
 
 def _prepare() -> None:
-    """Let SIGTERM end a run as Ctrl-C does, let no character be unprintable, and keep libraries quiet."""
+    """Let SIGTERM end a run as Ctrl-C does, let no character be unprintable, and keep threads and libraries quiet."""
+    # Threads that wait by spinning cost a machine that others use many times what they gain; torch is not there yet.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
     def end(_signal: int, _frame: Any) -> None:
         raise Terminated

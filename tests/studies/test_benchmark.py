@@ -80,8 +80,14 @@ def test_there_is_a_case_for_every_combination():
 
 
 def test_each_repeat_has_a_seed_of_its_own():
-    seeds = [c.seed for c in cases({**OPTIONS, "effects": "cg_offset", "sizes": "small"})]
-    assert seeds == [1000, 1001, 1002]
+    nothing = [c.seed for c in cases({**OPTIONS, "effects": "nothing"})]
+    assert nothing == [1000, 1001, 1002]
+    # No two effects are hidden under the same noise, and none changes with what else is asked for.
+    both = cases({**OPTIONS, "effects": ["cg_offset", "waves"], "sizes": "small"})
+    assert len({c.seed for c in both}) == 6
+    assert [c for c in both if c.hidden == "waves"] == cases({**OPTIONS, "effects": "waves", "sizes": "small"})
+    everything = {c.hidden: c.seed for c in cases({**OPTIONS, "effects": "all", "strangers": "all", "repeats": 1})}
+    assert len(set(everything.values())) == len(everything) > 40
 
 
 def test_all_is_the_catalogue_without_what_such_a_log_says_nothing_of():

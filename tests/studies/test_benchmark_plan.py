@@ -14,7 +14,7 @@ from auvnn.effects import EFFECTS
 from auvnn.errors import ConfigError
 from auvnn.models import load
 from auvnn.simulate import EXCITATIONS, make_excitation
-from auvnn.studies.benchmark.cases import CLOSED, KEYS, Case, cases, targets, together
+from auvnn.studies.benchmark.cases import CLOSED, KEYS, Case, apart, cases, targets, together
 from auvnn.studies.benchmark.rates import NUMBERS, RATES
 from auvnn.studies.benchmark.strangers import said_axis, stranger_names
 
@@ -31,8 +31,9 @@ def plan(**parts: Any) -> dict[str, Any]:
 
 def test_a_plan_is_its_parts_one_after_the_other():
     found = cases(plan(one={"effects": "cg_offset", "sizes": "small"}, two={"effects": "nothing", "repeats": 3}))
+    away = apart("cg_offset")
     assert [(c.part, c.hidden, c.size, c.seed) for c in found] == [
-        ("one", "cg_offset", "small", 10), ("one", "cg_offset", "small", 11),
+        ("one", "cg_offset", "small", 10 + away), ("one", "cg_offset", "small", 11 + away),
         ("two", "nothing", "none", 10), ("two", "nothing", "none", 11), ("two", "nothing", "none", 12),
     ]  # fmt: skip
     # What a part does not say is common to the plan, and then as asked for beside it.

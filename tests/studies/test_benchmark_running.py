@@ -49,7 +49,9 @@ def test_a_line_cut_short_by_a_kill_costs_that_log_alone(tmp_path, todo):
     assert list(journal.rows(todo)) == todo[:2]
     journal.append(answered(todo[2]))
     assert list(journal.rows(todo)) == todo[:3]
-    assert [json.loads(line)["seed"] for line in journal.path.read_text().splitlines()] == [1, 2, 3]
+    assert [json.loads(line)["seed"] for line in journal.path.read_text().splitlines()] == [
+        case.seed for case in todo[:3]
+    ]
 
 
 def test_a_damaged_line_in_the_middle_is_refused(tmp_path, todo):
