@@ -42,7 +42,10 @@ def _run(job: Job) -> Answering:
     # Not among the answer's files yet: those of a run that is interrupted are taken away.
     journal = job.out / WORK / JOURNAL
     try:
-        answer = benchmark(options, progress=job.say.progress, journal=journal, any_code=job["any_code"])
+        answer = benchmark(
+            options, job.say.progress, journal=journal, any_code=job["any_code"], further=_files(job["rows"]),
+            only_done=job["only_done"],
+        )  # fmt: skip
     except KeyboardInterrupt as end:
         raise type(end)(
             "the rows that are done are kept, and the same command goes on with the others"
@@ -66,6 +69,11 @@ def _run(job: Job) -> Answering:
         of = f" of {aim['count']}" if aim["count"] else ""
         job.say(f"target    {aim['part']}: {aim['rate']} {_shown(aim['share'])}{of}, wanted {bounds}: {met}")
     return answer
+
+
+def _files(given: Any) -> list[str]:
+    """Return one file or several as a list."""
+    return [] if given is None else [str(x) for x in ([given] if isinstance(given, str) else given)]
 
 
 def _shown(value: Any) -> Any:

@@ -138,3 +138,26 @@ def test_an_error_of_the_program_in_the_pool_is_not_swallowed(todo, monkeypatch)
 def test_real_processes_do_the_work(todo):
     rows = list(run_all(todo, 2, answered))
     assert len(rows) == 6 and {Case.of_row(r) for r in rows} == set(todo)
+
+
+def test_rows_of_other_runs_count_as_done_and_what_is_done_can_be_counted(tmp_path, todo, monkeypatch):
+    """As if half of the logs had been made on another machine, and one on this."""
+    monkeypatch.setattr(study, "run_case", lambda case: pytest.fail("a log is made again"))
+    journal, other = tmp_path / "rows.jsonl", tmp_path / "other.jsonl"
+    Journal(journal).append(answered(todo[0]))
+    for case in todo[:3]:
+        Journal(other).append({**answered(case), "seconds": 7.0})
+    found = benchmark(OPTIONS, journal=journal, further=[other], only_done=True)
+    assert [Case.of_row(r) for r in found.rows] == todo[:3]
+    assert found.rows[0]["seconds"] == 0.1, "what is done here stays"
+    assert "3 of 6 logs are done" in found.warnings[0]
+    # They are this run's own from now on.
+    assert list(Journal(journal).rows(todo)) == todo[:3]
+    assert benchmark(OPTIONS, journal=journal, only_done=True).rows == found.rows
+
+
+def test_there_must_be_something_to_count(tmp_path, todo):
+    with pytest.raises(InputError, match="no log of this benchmark is done"):
+        benchmark(OPTIONS, journal=tmp_path / "rows.jsonl", only_done=True)
+    with pytest.raises(InputError, match="no such file"):
+        benchmark(OPTIONS, further=[tmp_path / "none.jsonl"])
