@@ -78,7 +78,7 @@ class Beside:
         world = Replayed(layout.model, log, how)
         theta = parameters_of(layout.model, self.base)
         gap = world.gap()
-        self.good = np.isfinite(gap).all(1)
+        self.good = np.asarray(np.isfinite(gap).all(1))
         if not self.good.any():
             raise InputError(
                 f"{log.name} has no sample with state, command and acceleration: nothing to rank by"
@@ -213,8 +213,7 @@ class Beside:
         return out
 
     def _weigh(self, gap: Array, slopes: Array, theta: Array, held: Priors) -> None:
-        self.good &= np.isfinite(gap).all(1) & np.isfinite(slopes).all((1, 2))
-        rows = self.good
+        self.good = rows = np.asarray(self.good & np.isfinite(gap).all(1) & np.isfinite(slopes).all((1, 2)))
         self.weight = np.zeros_like(gap)
         self.weight[rows] = weights(gap[rows], slopes[rows], held.precision, held.mean - theta)
 

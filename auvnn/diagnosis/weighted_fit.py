@@ -37,12 +37,14 @@ def solve(gap: Array, x: Array, precision: Array, weight: Array, mean: Array) ->
 
 
 def _sums(gap: Array, x: Array, weight: Array) -> tuple[Array, Array]:
-    flat, w = x.reshape(-1, x.shape[-1]), weight.ravel()
+    flat, w = x.reshape(gap.size, x.shape[-1]), weight.ravel()
     heavy = flat * w[:, None]
     return heavy.T @ flat, heavy.T @ gap.ravel()
 
 
 def _solved(square: Array, right: Array, precision: Array, mean: Array) -> Array:
+    if not len(right):
+        return np.zeros(0)
     square, right = square + np.diag(precision), right + precision * mean
     scale = 1.0 / np.sqrt(np.maximum(np.diag(square), 1e-300))
     return scale * np.linalg.lstsq(square * np.outer(scale, scale), scale * right, rcond=1e-13)[0]
