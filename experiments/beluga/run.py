@@ -25,7 +25,7 @@ from auvnn.models import GreyBox, load
 HERE = Path(__file__).parent
 FITTED = ("surge-1", "sway-1", "heave-1", "yaw-1", "random-1")
 HELD_OUT = "random-2"
-STEPS = ("cg_offset", "turning_forces", "thrust_overshoot", "tilted_vertical", "velocity_lever_arm")
+STEPS = ("cg_offset", "turning_forces", "thrust_overshoot", "tilted_vertical")
 # Roll and pitch are driven in random-1 alone: it is fitted whole, of the others this much, s.
 SECONDS = 100.0
 FILTER = {"method": "local_polynomial", "half_width": 4, "order": 2}
