@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.nuisance import Layout, lay_out, priors
+from auvnn.diagnosis.nuisance import FREE, Layout, lay_out, priors
 from auvnn.diagnosis.one_step_slopes import Replayed, extent_of_log
 from auvnn.diagnosis.weighted_fit import left_out, parts, solve, weights
 from auvnn.effects import effect_class
@@ -93,18 +93,76 @@ class Beside:
         self.before = self._after(self.fit, self.base, self.held, self.good, layout.model)
         set_parameters(layout.model, self.base, self.fit.theta)
         self.refitted = layout.model
+        # Sums that every candidate needs: its own share is what these leave of it.
+        flat = self.fit.slopes[self.good].reshape(int(6 * self.good.sum()), len(self.fit.theta))
+        self.heavy = flat * self.weight[self.good].reshape(-1, 1)
+        away = self.held.mean - self.fit.theta
+        self.square = self.heavy.T @ flat + np.diag(self.held.precision)
+        self.right = self.heavy.T @ self.fit.gap[self.good].ravel() + self.held.precision * away
 
     def alone(self, name: str) -> Point | None:
         """Fit an effect with the slopes of everything else as they were; None where the log says nothing of it.
 
-        Of the values that the effect offers for its shape, the one is taken that fits best.
+        Of the values that the effect offers for its shape, the one is taken that promises most.
         """
-        kind = effect_class(name)
-        described = kind.describe(self.model.vehicle, self.model.actuation)
-        starts = [[s.get(p.name, p.null) for p in described] for s in kind.starts(described, self.extent)]
+        layout, names, held = self._with(name)
+        world = Replayed(layout.model, self.log, self.how)
+        theta = parameters_of(world.model, names)
+        first = len(parameters_of(world.model, names[: names.index(name)]))
+        own = np.arange(first, first + len(layout.columns[name]))
+        described = layout.described(name)
+        starts = effect_class(name).starts(described, self.extent)
         if len(starts) > 1:
-            starts = sorted(starts, key=lambda start: self._alone(name, start, 1)[0])
-        return self._alone(name, starts[0], LINEARISED)[1]
+            tried = [[s.get(p.name, p.null) for p in described] for s in starts]
+            theta[own] = max(tried, key=lambda start: self._promise(world, name, np.array(start)))
+            set_parameters(world.model, [name], theta[own])
+        others = np.setdiff1d(np.arange(len(theta)), own)
+        low, high = limits(world.model, names, held)
+        free = ~_shapes(world.model, names)
+        gap, begin = world.gap(), theta
+        slopes = np.zeros((*gap.shape, len(theta)))
+        slopes[..., : self.fit.slopes.shape[-1]] = self.fit.slopes
+        cost, point = np.inf, None
+        for _ in range(LINEARISED):
+            slopes[..., own] = world.slopes([name], gap)
+            # Everything else follows along slopes that stay as they were.
+            left = gap - slopes[..., others] @ (theta - begin)[others]
+            rows = self.good & np.isfinite(left).all(1) & np.isfinite(slopes[..., own]).all((1, 2))
+            if rows.sum() < SAID * self.good.sum() or not np.abs(slopes[rows][..., own]).max() > 0.0:
+                break
+            x, mean, precision = slopes[rows][..., free], (held.mean - theta)[free], held.precision[free]
+            weight = self.weight[rows]
+            step = np.zeros(len(theta))
+            step[free] = solve(left[rows], x, precision, weight, mean)
+            error = left[rows] - x @ step[free]
+            now = float((weight * error**2).sum() + held.precision @ (theta + step - held.mean) ** 2)
+            after = np.full(len(gap), np.nan)
+            after[rows] = left_out(left[rows], x, precision, mean, weight, self.fifth[rows])
+            theta = np.clip(theta + step, low, high)
+            fell, cost = cost - now, now
+            point = Point(theta, after, _values(world.model, name, theta[own]))
+            if fell < SETTLED * now:
+                break
+            gap = world.at([name], theta[own])
+        return point
+
+    def _promise(self, world: Replayed, name: str, start: Array) -> float:
+        """Return by how much the cost falls with an effect of a given shape, as its slopes at the null have it."""
+        set_parameters(world.model, [name], start)
+        # Whatever its shape, at the null it does nothing: the gap is that of the fit without it.
+        world.gap(world.model.effect(name).hooks())
+        own = world.slopes([name], self.fit.gap)[self.good]
+        live = ~_shapes(world.model, [name])
+        own = own[..., live].reshape(-1, int(live.sum()))
+        if not np.isfinite(own).all() or not own.size:
+            return -np.inf
+        described = world.model.effect(name).parameters_of
+        loose = (FREE * np.array([p.scale for p in described])[live]) ** -2.0
+        carry = np.linalg.lstsq(self.square, self.heavy.T @ own, rcond=1e-13)[0]
+        weighted = own * self.weight[self.good].reshape(-1, 1)
+        right = weighted.T @ self.fit.gap[self.good].ravel() - carry.T @ self.right
+        square = weighted.T @ own - carry.T @ (self.heavy.T @ own) + np.diag(loose)
+        return float(right @ np.linalg.lstsq(square, right, rcond=1e-13)[0])
 
     def jointly(self, name: str, start: Point) -> Point:
         """Fit an effect together with everything else, from where it was fitted alone."""
@@ -121,49 +179,6 @@ class Beside:
         set_parameters(layout.model, self.base, self.fit.theta)
         names = [*self.base, *([] if name in self.base else [name])]
         return layout, names, priors(layout, names, free=[name])
-
-    def _alone(self, name: str, start: Sequence[float], rounds: int) -> tuple[float, Point | None]:
-        """Return the cost and where the fit has come to after so many linearisations of the effect itself."""
-        layout, names, held = self._with(name)
-        theta = parameters_of(layout.model, names)
-        known = name in self.base
-        size = len(layout.columns[name])
-        first = len(parameters_of(layout.model, names[: names.index(name)]))
-        own = np.arange(first, first + size)
-        if not known:
-            theta[own] = start
-            set_parameters(layout.model, names, theta)
-        others = np.setdiff1d(np.arange(len(theta)), own)
-        world = Replayed(layout.model, self.log, self.how)
-        low, high = limits(layout.model, names, held)
-        free = ~_shapes(layout.model, names)
-        gap, begin = world.gap(), theta
-        slopes = np.zeros((*gap.shape, len(theta)))
-        slopes[..., : self.fit.slopes.shape[-1]] = self.fit.slopes
-        cost, point = np.inf, None
-        for _ in range(rounds):
-            slopes[..., own] = world.slopes([name], gap)
-            # Everything else follows along slopes that stay as they were.
-            left = gap - slopes[..., others] @ (theta - begin)[others]
-            rows = self.good & np.isfinite(left).all(1) & np.isfinite(slopes[..., own]).all((1, 2))
-            if rows.sum() < SAID * self.good.sum() or not np.abs(slopes[rows][..., own]).max() > 0.0:
-                break
-            x, mean, precision = slopes[rows][..., free], (held.mean - theta)[free], held.precision[free]
-            step = np.zeros(len(theta))
-            step[free] = solve(left[rows], x, precision, self.weight[rows], mean)
-            error = left[rows] - x @ step[free]
-            now = float(
-                (self.weight[rows] * error**2).sum() + held.precision @ (theta + step - held.mean) ** 2
-            )
-            after = np.full(len(gap), np.nan)
-            after[rows] = left_out(left[rows], x, precision, mean, self.weight[rows], self.fifth[rows])
-            theta = np.clip(theta + step, low, high)
-            fell, cost = cost - now, now
-            point = Point(theta, after, _values(layout.model, name, theta[own]))
-            if fell < SETTLED * now:
-                break
-            gap = world.at([name], theta[own])
-        return cost, point
 
     def _settled(
         self, world: Replayed, names: Sequence[str], theta: Array, held: Priors, rows: NDArray[np.bool_]
