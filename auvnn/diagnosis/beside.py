@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.nuisance import FREE, Layout, lay_out, priors
+from auvnn.diagnosis.nuisance import FREE, Layout, lay_out, priors, scales
 from auvnn.diagnosis.one_step_slopes import Replayed, extent_of_log
 from auvnn.diagnosis.weighted_fit import left_out, parts, solve, weights
 from auvnn.effects import effect_class
@@ -74,7 +74,7 @@ class Beside:
         self.extent = extent_of_log(log)
         layout = lay_out(model, ())
         self.base = list(layout.names)
-        self.held = priors(layout, self.base)
+        self.held = self._priors(layout, self.base)
         world = Replayed(layout.model, log, how)
         theta = parameters_of(layout.model, self.base)
         gap = world.gap()
@@ -150,7 +150,6 @@ class Beside:
         """Return by how much the cost falls with an effect of a given shape, as its slopes at the null have it."""
         set_parameters(world.model, [name], start)
         # Whatever its shape, at the null it does nothing: the gap is that of the fit without it.
-        world.gap(world.model.effect(name).hooks())
         own = world.slopes([name], self.fit.gap)[self.good]
         live = ~_shapes(world.model, [name])
         own = own[..., live].reshape(-1, int(live.sum()))
@@ -178,7 +177,22 @@ class Beside:
         layout = lay_out(self.model, [name])
         set_parameters(layout.model, self.base, self.fit.theta)
         names = [*self.base, *([] if name in self.base else [name])]
-        return layout, names, priors(layout, names, free=[name])
+        return layout, names, self._priors(layout, names, name)
+
+    def _priors(self, layout: Layout, names: Sequence[str], asked: str = "") -> Priors:
+        """Return priors: stated uncertainties; of effects that the model has, what is plausible about what they are.
+
+        An effect that the model has was fitted or stated: were it free, a log in which only a part knows of it would say
+        more about that part than about the candidates once the part is left out.
+        """
+        held = priors(layout, names, free=[asked])
+        precision, at = held.precision.copy(), 0
+        for name in names:
+            size = len(layout.columns[name])
+            if name in self.model.effect_names and name not in layout.spreads and name != asked:
+                precision[at : at + size] = scales(layout, name) ** -2.0
+            at += size
+        return Priors(held.mean, precision, held.reach)
 
     def _settled(
         self, world: Replayed, names: Sequence[str], theta: Array, held: Priors, rows: NDArray[np.bool_]

@@ -17,9 +17,9 @@ from auvnn.training.prediction_error import parameters_of, set_parameters
 
 Array = NDArray[np.float64]
 
-MOVED = 0.25
-"""Share of the plausible scale by which a parameter is moved to find its slope: a slope that vanishes at the null,
-as that of an effect which goes with a square, would hide the effect otherwise."""
+MOVED, TOUCHED = 0.25, 1e-3
+"""Shares of the plausible scale by which parameters are moved to find their slopes: far where an effect is absent, for a
+slope that vanishes there, as that of what goes with a square, would hide it; and little where it is at work."""
 
 
 class Replayed:
@@ -88,10 +88,11 @@ class Replayed:
         for name in names:
             effect = self.model.effect(name)
             theta = parameters_of(self.model, [name])
+            share = MOVED if effect.absent() else TOUCHED
             for k, p in enumerate(effect.parameters_of):
                 column = np.zeros_like(here)
                 if not p.shape:
-                    step = MOVED * p.scale * (1.0 if theta[k] + MOVED * p.scale <= p.high else -1.0)
+                    step = share * p.scale * (1.0 if theta[k] + share * p.scale <= p.high else -1.0)
                     trial = theta.copy()
                     trial[k] += step
                     set_parameters(self.model, [name], trial)

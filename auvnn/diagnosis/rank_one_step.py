@@ -3,8 +3,8 @@
 Where waves, held samples or a tank's own flow limit a free run, errors one step ahead tell more than those of free
 running. First everything that is uncertain without any candidate is refitted: coefficients within their stated
 uncertainty, and the effects that the model has already. Then each candidate is fitted beside it, at first cheaply, with
-the slopes of everything else as they were; those that lead are fitted again jointly with everything else, until none
-that leads, or that is tied with the one that does, is left that has not been. What is left out is a fifth of every run in
+the slopes of everything else as they were; those that lead, or are tied with the one that does, are fitted again jointly
+with everything else, one after the other and six at most. What is left out is a fifth of every run in
 turn, so that every part of the fit has seen every kind of motion.
 
 A parameter that says how an effect acts and not how much (an onset, a frequency, a slack length) stays at the best of the
@@ -33,8 +33,8 @@ from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
 
-LEADERS = 5
-"""So many of those that lead are fitted again jointly at least."""
+LEADERS, MOST = 3, 6
+"""So many of those that lead are fitted again jointly at least, and at most where ever others lead."""
 
 
 @dataclass(frozen=True)
