@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -243,6 +243,8 @@ def _by_windows(model: GreyBox, log: Log, window: float | None) -> Fit:
 
 def _by_one_step(log: Log, derivative: dict[str, Any] | None) -> Fit:
     how = choose_derivative(log, derivative)
+    # The slope of a velocity that leaves its neighbours for one sample is no acceleration.
+    log = replace(log, runs=tuple(run.cleaned for run in log.runs))
 
     def fit(
         layout: Layout, base: Sequence[str], effects: Sequence[str], before: Explanation | None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from strange_effects import HeavePush, listed
 
 from auvnn.diagnosis import add
 from auvnn.diagnosis.bake import with_body
-from auvnn.diagnosis.improve import noise_floor, paired_gain
+from auvnn.diagnosis.improve import _by_one_step, noise_floor, paired_gain
+from auvnn.diagnosis.nuisance import lay_out
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run
 from auvnn.metrics.rollouts import Rolled, Scale, roll, scale_of, table
@@ -316,6 +318,19 @@ def test_one_step_errors_find_the_current_too_and_say_what_runs_left_out_make_of
     assert better.accepted and better.left_out["gain"] > 3 * better.left_out["std"] > 0
     assert better.left_out["before"] - better.left_out["after"] == pytest.approx(better.left_out["gain"])
     assert better.to_dict()["objective"] == "one_step"
+
+
+def test_a_fit_one_step_ahead_leaves_spikes_out_as_the_warning_says(model):
+    """To the last digit as if the sample were missing."""
+    run = make_log(model.with_effects({"net_buoyancy": {"force": 6.0}}), runs=1, duration=10.0, noise=0.3).runs[0]
+    fits = []
+    for value in (run.nu[40, 2] + 0.6, np.nan):
+        nu = run.nu.copy()
+        nu[40, 2] = value
+        log = Log.from_runs([replace(run, nu=nu)])
+        found = _by_one_step(log, None)(lay_out(model, ["net_buoyancy"]), [], ["net_buoyancy"], None)
+        fits.append(found.fitted.theta)
+    assert fits[0] == pytest.approx(fits[1], rel=1e-9) and fits[0] == pytest.approx(6.0, abs=0.5)
 
 
 @pytest.mark.parametrize(
