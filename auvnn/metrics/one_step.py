@@ -188,7 +188,7 @@ class Replay:
         self._read_sensors()
         self._drive()
 
-    def update(self, hooks: Collection[str] = ("sense", "command", "respond")) -> None:
+    def update(self, hooks: Collection[str] = ("sense", "command", "delay", "respond")) -> None:
         """Work out again what depends on the model's parameters; what does not is kept.
 
         Args:
@@ -196,7 +196,7 @@ class Replay:
         """
         if "sense" in hooks and self.model.using("sense"):
             self._read_sensors()
-        if any(h in hooks and self.model.using(h) for h in ("command", "respond")):
+        if any(h in hooks and self.model.using(h) for h in ("command", "delay", "respond")):
             self._drive()
 
     def _read_sensors(self) -> None:

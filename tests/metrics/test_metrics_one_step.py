@@ -12,6 +12,7 @@ from small_logs import make_log, small_vehicle
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run
 from auvnn.metrics.one_step import (
+    Replay,
     choose_derivative,
     integrated,
     model_acceleration,
@@ -132,6 +133,23 @@ def test_a_model_with_a_lever_arm_and_a_lag_explains_its_own_log(accelerations):
     for name, with_it in scores(one_step(model, log, how)).items():
         assert with_it["r2"] > 0.9999, name
     assert min(v["r2"] for v in scores(one_step(bare, log, how)).values()) < 0.99
+
+
+@pytest.mark.parametrize(("name", "values"), [
+    ("actuation_delay", {"delay": 0.03}), ("thruster_lag", {"time_constant": 0.3}),
+    ("thruster_gain", {"thruster_1": 0.7}), ("velocity_lever_arm", {"x": 0.2}),
+])  # fmt: skip
+def test_a_parameter_that_changes_later_counts(name, values):
+    """Told which hooks the effect has, a replay says what a new one would."""
+    model = GreyBox(small_vehicle()).with_effects({name: values})
+    run = make_log(model, runs=1, duration=3.0, rate=20.0).runs[0]
+    before = GreyBox(small_vehicle()).with_effects({name: None})
+    replay = Replay(before, run)
+    first = replay.acceleration()
+    before.effect(name).load_state_dict(model.effect(name).state_dict())
+    replay.update(before.effect(name).hooks())
+    np.testing.assert_array_equal(replay.acceleration(), Replay(model, run).acceleration())
+    assert np.nanmax(np.abs(replay.acceleration() - first)) > 1e-4
 
 
 def test_scores_are_the_usual_ones(moving):
