@@ -13,13 +13,12 @@ import torch
 from torch import Tensor
 
 from auvnn.damping.bank import DampingBank
-from auvnn.damping.region import Region
 from auvnn.errors import ConfigError
 from auvnn.training.checkpoint import Checkpoints
 from auvnn.training.history import Callback, History, Record
 from auvnn.training.problem import DampingProblem
 from auvnn.training.schemes import SCHEMES
-from auvnn.training.schemes.base import Samples, Scheme, Task
+from auvnn.training.schemes.base import Scheme, Task
 from auvnn.training.scrutiny import energy_warnings
 
 
@@ -117,11 +116,10 @@ def fit_damping(
             part.check_axes(learned)
     working = copy.deepcopy(bank)
     if not warm_start:
-        working.set_scales(*_scaling_data(train))
+        working.scale_to(*train.mean_squares())
     spread = train.spread() / working.output_scale.cpu().double()
     spread = torch.where(spread > 0, spread, 1.0)
-    samples = Samples.scaled(train, working)
-    task = Task(working, samples, held and Samples.scaled(held, working), spread, seed, warm_start)
+    task = Task(working, train.scaled(working), held and held.scaled(working), spread, seed, warm_start)
     described = {"scheme": chosen.name, **chosen.options()}
     store = None
     if checkpoint_folder is not None:
@@ -156,8 +154,8 @@ def fit_damping(
     errors, held_errors = chosen.errors()
     unit = spread * working.output_scale.cpu().double()
     bank.load_state_dict(result.state_dict())
-    bank.region = Region.of(train.nu[(train.weights > 0).any(-1)])
-    energy = tuple(energy_warnings(bank, train))
+    bank.region = train.region()
+    energy = tuple(energy_warnings(bank, train)) if isinstance(train, DampingProblem) else ()
     return Fit(
         history=history,
         iterations=iterations,
@@ -170,13 +168,6 @@ def fit_damping(
         scheme=described,
         energy=energy,
     )
-
-
-def _scaling_data(train: DampingProblem) -> tuple[Tensor, Tensor]:
-    """Return velocities and targets of which the root mean square counts usable samples alone."""
-    counted = (train.weights > 0).double()
-    share = counted.mean(0).clamp_min(1e-300).sqrt()
-    return train.nu, train.target * counted / share
 
 
 def _record(iteration: int, scheme: Scheme) -> Record:
