@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import shutil
+from typing import TYPE_CHECKING, Any
 
-from auvnn.cli.job import Answering, Job, Verb
+from auvnn.cli.folder import WORK
+from auvnn.cli.job import Answering, Job, Verb, files
+from auvnn.errors import ConfigError
+
+if TYPE_CHECKING:
+    from auvnn.training import Training
 
 
 def _run(job: Job) -> Answering:
-    from auvnn.training import train
-
-    log, test = job.log(), job.held_out()
-    model = job.model(log)
-    if job["overwrite"] and not job["resume"]:
-        shutil.rmtree(job.checkpoint, ignore_errors=True)
     try:
-        training = train(
-            model, log, job["scheme"], job["damping"], objective=job["objective"], test=test, seed=job["seed"],
-            derivative=job["derivative"], checkpoint=job.checkpoint, resume=job["resume"] or False,
-            force=job["force"],
-            progress=job.say.progress,
-        )  # fmt: skip
+        training = _in_parts(job) if _parted(job) else _in_memory(job)
     except KeyboardInterrupt as end:
         if job.checkpoint.is_dir():
             raise type(end)(f"go on by the same command with out={job.out} resume=true") from None
@@ -29,7 +24,7 @@ def _run(job: Job) -> Answering:
     training.write(job.folder)
     data = training.to_dict()
     job.say(f"assumed   {data['derivative']['held_out']}")
-    job.warn([warning for warning in data["warnings"] if warning not in model.vehicle.warnings])
+    job.warn([warning for warning in data["warnings"] if warning not in training.model.vehicle.warnings])
     job.say(f"trained   {data['metrics']['iterations']} iterations: {data['stopped']}")
     for when in ("before", "after"):
         scores = {name: data["metrics"][f"held_out_r2_{name}_{when}"] for name in _ACCELERATIONS}
@@ -39,6 +34,50 @@ def _run(job: Job) -> Answering:
     if None not in free:
         job.say(f"result    held-out free running over 5 s: {free[0]:.4g} one step, {free[1]:.4g} rollout")
     return training
+
+
+def _parted(job: Job) -> bool:
+    """Say whether the log is read in parts: as told, or where it is large and the fit can be spread."""
+    from auvnn.logs.portions import is_large
+    from auvnn.training.fit_damping import build_scheme
+    from auvnn.training.objectives.base import build_objective
+
+    if job["stream"] is not None:
+        return bool(job["stream"])
+    able = build_scheme(job["scheme"]).parted and build_objective(job["objective"]).name == "one_step"
+    return able and job["max_duration"] is None and is_large(files(job.options, "log"))
+
+
+def _in_memory(job: Job) -> Training:
+    from auvnn.training import train
+
+    log, test = job.log(), job.held_out()
+    model = job.model(log)
+    return train(model, log, job["scheme"], job["damping"], test=test, **_options(job))
+
+
+def _in_parts(job: Job) -> Training:
+    from auvnn.logs.portions import kind_of
+    from auvnn.training import train_files
+
+    if job["max_duration"] is not None:
+        raise ConfigError("max_duration= reads the beginning of each file: leave it out, or say stream=false")
+    paths, mapping = files(job.options, "log"), job.mapping()
+    job.say(f"log       {len(paths)} files, read in parts by {job['workers']} workers")
+    model = job.model(kind=kind_of(paths, mapping))
+    return train_files(
+        model, paths, job["scheme"], job["damping"],
+        test=None if job["test"] is None else files(job.options, "test"), mapping=mapping,
+        scratch=job.out / WORK / "samples",
+        **{key: job[key] for key in ("workers", "executor", "address")}, **_options(job),
+    )  # fmt: skip
+
+
+def _options(job: Job) -> dict[str, Any]:
+    if job["overwrite"] and not job["resume"]:
+        shutil.rmtree(job.checkpoint, ignore_errors=True)
+    same = {key: job[key] for key in ("objective", "seed", "derivative", "force")}
+    return {**same, "checkpoint": job.checkpoint, "resume": job["resume"] or False, "progress": job.say.progress}
 
 
 _ACCELERATIONS = ("du", "dv", "dw", "dp", "dq", "dr")
