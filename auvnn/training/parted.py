@@ -56,7 +56,8 @@ def light(value: Any) -> Any:
 def heavy(value: Any) -> Any:
     """Return what `light` was given."""
     if isinstance(value, np.ndarray):
-        return torch.from_numpy(value)
+        # What Ray hands over must not be written to.
+        return torch.from_numpy(value if value.flags.writeable else value.copy())
     if isinstance(value, tuple) and len(value) == 2 and value[0] is Normal:
         return Normal(*heavy(value[1]))
     return tuple(map(heavy, value)) if isinstance(value, tuple) else value
