@@ -256,9 +256,7 @@ def cut_at(pieces: Pieces, share: float, mapping: Mapping) -> tuple[Pieces, Piec
     end, begin = before[-1].end, after[0].begin
     return (
         replace(pieces, pieces=tuple(replace(p, high=min(p.high, end)) for p in before)),
-        replace(
-            pieces, pieces=tuple(replace(p, low=max(p.low, begin), opening=begin) for p in after)
-        ),
+        replace(pieces, pieces=tuple(replace(p, low=max(p.low, begin), opening=begin) for p in after)),
     )
 
 

@@ -7,10 +7,9 @@ import time
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import torch
-from torch import Tensor
 
 from auvnn.damping.bank import DampingBank
 from auvnn.errors import ConfigError
@@ -20,6 +19,9 @@ from auvnn.training.problem import DampingProblem
 from auvnn.training.schemes import SCHEMES
 from auvnn.training.schemes.base import Scheme, Task
 from auvnn.training.scrutiny import energy_warnings
+
+if TYPE_CHECKING:
+    from auvnn.training.parted import PartedProblem
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ def build_scheme(description: str | Mapping[str, Any] | Scheme) -> Scheme:
 
 def fit_damping(
     bank: DampingBank,
-    problem: DampingProblem,
+    problem: DampingProblem | PartedProblem,
     *,
     scheme: str | Mapping[str, Any] | Scheme = "levenberg_marquardt",
     held_out: Collection[int] | None = None,
@@ -82,7 +84,7 @@ def fit_damping(
 
     Args:
         bank: what is fitted; its scales are set from the data unless `warm_start`.
-        problem: the samples.
+        problem: the samples, in memory or in pieces of a log.
         scheme: a name of the catalogue, `{scheme: name, <options>}`, or a scheme.
         held_out: run numbers that are never fitted and decide when to stop and which weights to keep.
         seed: of initial weights and mini-batches.
@@ -109,6 +111,8 @@ def fit_damping(
         raise ConfigError(f"resume is {resume!r}: give true, false or force")
     if resume and checkpoint_folder is None:
         raise ConfigError("resume needs the folder of the checkpoints: give checkpoint_folder")
+    if not (chosen.parted or isinstance(problem, DampingProblem)):
+        raise ConfigError(f"scheme {chosen.name} needs its samples in memory: take levenberg_marquardt")
     train, held = problem.split(held_out) if held_out else (problem, None)
     learned = [axis for form in bank.groups() if list(form.parameters()) for axis in form.axes]
     for part in (train, held):

@@ -68,7 +68,11 @@ def problems_of(form: DampingForm, nu: Tensor, targets: Tensor, weights: Tensor 
         return group_problems(form, nu, targets, weights)
     groups = [
         group_problems(
-            form, nu[p], targets[:, p].contiguous(), None if weights is None else weights[:, p].contiguous(), p.start
+            form,
+            nu[p],
+            targets[:, p].contiguous(),
+            None if weights is None else weights[:, p].contiguous(),
+            p.start,
         )
         for p in parts
     ]
@@ -98,8 +102,7 @@ def grouped(form: DampingForm, ask: Ask, samples: int, total: Tensor) -> Problem
         samples: of all groups.
         total: (m,) sum of the weights.
     """
-    kind = _Networks if type(form) is MLP else _Forms
-    return kind(form, ask, samples, total)
+    return (_Networks if type(form) is MLP else _Forms)(form, ask, samples, total)
 
 
 class _Grouped:
@@ -120,7 +123,7 @@ class _Grouped:
 
 
 class _Networks(_Grouped):
-    def __init__(self, form: MLP, ask: Ask, samples: int, total: Tensor) -> None:
+    def __init__(self, form: Any, ask: Ask, samples: int, total: Tensor) -> None:
         super().__init__(form, ask, samples, total)
         self.inner_size = form.hidden * 13
         self.outer_size = form.hidden + (0 if form.zero_at_rest else 1)

@@ -81,7 +81,11 @@ def _gaps(asked: _Asked, piece: Piece) -> tuple[Gaps, ...]:
 
 
 def score(
-    pool: Executor, pieces: Sequence[Piece], models: Sequence[GreyBox], derivative: Derivative, mapping: Mapping
+    pool: Executor,
+    pieces: Sequence[Piece],
+    models: Sequence[GreyBox],
+    derivative: Derivative,
+    mapping: Mapping,
 ) -> list[dict[str, dict[str, float]]]:
     """Return rmse and R2 of each acceleration, for each model.
 

@@ -195,7 +195,9 @@ def answer(question: Question, group: Group) -> Any:
         inputs, outputs = heavy(question.scales)
         nu, target = nu / inputs, target / outputs
     thing = [unpacked(question.thing)] if question.thing else []
-    return light(_ANSWERS[question.name](Samples(nu, target, weight), group.first, *thing, *heavy(question.values)))
+    return light(
+        _ANSWERS[question.name](Samples(nu, target, weight), group.first, *thing, *heavy(question.values))
+    )
 
 
 def _square(samples: Samples, first: int, share: Tensor) -> tuple[Tensor, Tensor]:
@@ -303,7 +305,9 @@ class PartedProblem:
 
     def _of_runs(self, runs: Collection[int], wanted: bool) -> PartedProblem:
         some = [(p, k) for p, k in zip(self.pieces, self.known, strict=True) if (p.run in runs) == wanted]
-        return PartedProblem(self.pool, self.source, tuple(p for p, _ in some), tuple(k for _, k in some), self.size)
+        return PartedProblem(
+            self.pool, self.source, tuple(p for p, _ in some), tuple(k for _, k in some), self.size
+        )
 
     def check_axes(self, axes: Collection[int]) -> None:
         """Refuse to fit degrees of freedom for which no sample counts.

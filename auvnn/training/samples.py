@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import reduce
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import torch
@@ -21,6 +21,22 @@ from auvnn.training.networks import Problems
 
 if TYPE_CHECKING:
     from auvnn.training.problem import DampingProblem
+
+
+class Sums(Protocol):
+    """What a fit may ask of its samples, in memory or not."""
+
+    def problems(self, form: DampingForm) -> Problems:
+        """Return the least-squares problems of a form."""
+        ...
+
+    def triangles(self, form: Polynomial) -> NDArray[np.float64]:
+        """Return what the samples say about the coefficients of a polynomial; see `linear.triangles`."""
+        ...
+
+    def error_sums(self, bank: DampingBank) -> tuple[Tensor, Tensor]:
+        """Return the sums of the weighted squared error of a bank, and of the weights, (6,) each."""
+        ...
 
 
 @dataclass(frozen=True)

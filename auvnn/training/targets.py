@@ -42,7 +42,11 @@ def targets(model: GreyBox, log: Log, derivative: Derivative) -> tuple[Array, Ar
     each = Targets(model, derivative)
     found = [each(run) for run in log.runs]
     numbers = [np.full(run.samples, run.number) for run in log.runs]
-    return np.concatenate([nu for nu, _ in found]), np.concatenate([d for _, d in found]), np.concatenate(numbers)
+    return (
+        np.concatenate([nu for nu, _ in found]),
+        np.concatenate([d for _, d in found]),
+        np.concatenate(numbers),
+    )
 
 
 class Targets:

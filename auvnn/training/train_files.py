@@ -17,24 +17,18 @@ from __future__ import annotations
 
 import copy
 import tempfile
-from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from auvnn.damping.bank import DampingBank
-from auvnn.errors import ConfigError, InputError
+from auvnn.errors import ConfigError
 from auvnn.executors import Executor, executor_for
 from auvnn.logs import Log
 from auvnn.logs.mapping import Mapping
-from auvnn.logs.overlap import refuse_shared, rows_of
-from auvnn.logs.portions import log_files
-from auvnn.metrics.one_step import Derivative, chosen_derivative
-from auvnn.metrics.pieces import Piece, Pieces, Reading, cut_at, inside, joined, pieces_of_file, run_of, spread
+from auvnn.metrics.pieces import Pieces, Reading, spread
 from auvnn.models import GreyBox
 from auvnn.training.absorbed import absorption
 from auvnn.training.fit_damping import build_scheme, fit_damping
@@ -43,23 +37,11 @@ from auvnn.training.held_out import score
 from auvnn.training.history import Record
 from auvnn.training.objectives.base import build_objective
 from auvnn.training.parted import PartedProblem, Source
-from auvnn.training.train import STOPPING, Training, history_of, metrics_of
+from auvnn.training.shares import Say, Shares, named, paths_of, planned, refuse_leakage, shared_out
+from auvnn.training.train import Training, history_of, metrics_of
 
-# Samples that are looked at in one place; of the test, how many may be compared with the log that is fitted.
-LOOKED_AT, COMPARED = 20_000, 20_000
-# Share of a single run that is held out, as in `Log.split`.
-HELD_OUT = 0.3
-
-Say = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class _Shares:
-    fitted: Pieces
-    stopping: Pieces
-    test: Pieces
-    held_words: str
-    stop_words: str
+# Samples that are looked at in one place.
+LOOKED_AT = 20_000
 
 
 def train_files(
@@ -125,19 +107,21 @@ def train_files(
     half = dict(derivative or {}).get("half_width")
     reading = Reading(plan, None if half is None else int(half))
     bank = DampingBank.from_description(damping, seed)
-    paths = _paths(log)
+    paths = paths_of(log)
+    name = named(paths)
+    test_name = name if test is None else named(paths_of(test))
     with (
         executor_for(executor, workers, address) as pool,
         tempfile.TemporaryDirectory(prefix="auvnn-", dir=_made(scratch)) as folder,
     ):
-        whole = _planned(pool, paths, reading, say)
-        tested = None if test is None else _planned(pool, _paths(test), reading, say)
-        shares, how = _shared_out(whole, tested, derivative, plan, _named(paths), None if test is None else _named(_paths(test)))
+        whole = planned(pool, paths, reading, say)
+        tested = None if test is None else planned(pool, paths_of(test), reading, say)
+        shares, how = shared_out(whole, tested, derivative, plan, name, test_name)
         if tested is not None:
             say("comparing the test log with the log that is fitted")
-            _refuse_leakage(pool, whole, tested, plan)
-        looked = _sample(shares.fitted, plan, _named(paths))
-        for some in (looked, *([] if tested is None else [_sample(tested, plan, "test")])):
+            refuse_leakage(pool, whole, tested, plan)
+        looked = _sample(shares.fitted, plan, name)
+        for some in (looked, *([] if tested is None else [_sample(tested, plan, test_name)])):
             some.quality().refuse_contradictions(force)
         problem, held = _problem(pool, Source.of(model, how, plan, Path(folder)), shares, group, say)
 
@@ -169,8 +153,8 @@ def train_files(
     warnings += [] if absorbed is None else absorbed.words()
     return Training(
         model.vehicle.name,
-        _named(paths),
-        _named(paths) if test is None else _named(_paths(test)),
+        name,
+        test_name,
         fit.scheme,
         bank.describe(),
         seed,
@@ -201,73 +185,12 @@ def _made(scratch: str | Path | None) -> Path | None:
     return None if scratch is None else Path(scratch)
 
 
-def _paths(log: str | Path | Sequence[str | Path]) -> list[Path]:
-    return log_files([log] if isinstance(log, (str, Path)) else log)
-
-
-def _named(paths: Sequence[Path]) -> str:
-    return paths[0].stem if len(paths) == 1 else f"{paths[0].stem} and {len(paths) - 1} more"
-
-
-def _plan_one(reading: Reading, path: Path) -> Pieces | InputError:
-    try:
-        return pieces_of_file(reading, path)
-    except InputError as problem:
-        return problem
-
-
-def _planned(pool: Executor, paths: Sequence[Path], reading: Reading, say: Say) -> Pieces:
-    good: list[Pieces] = []
-    bad: list[InputError] = []
-    for path, found in zip(paths, pool.run(_plan_one, reading, list(paths)), strict=True):
-        say(f"looking through {path}")
-        (bad if isinstance(found, InputError) else good).append(found)  # type: ignore[arg-type]
-    # One file alone that cannot be read is the user's; one of many is left out and told.
-    if not good:
-        raise bad[0]
-    whole = joined(good)
-    return replace(whole, notes=(*map(str, bad), *whole.notes))
-
-
-def _shared_out(
-    whole: Pieces,
-    tested: Pieces | None,
-    derivative: Dict[str, Any] | None,
-    mapping: Mapping,
-    name: str,
-    test_name: str | None,
-) -> tuple[_Shares, Derivative]:
-    """Say what is fitted, what decides when to stop and what is held out, and how accelerations are obtained."""
-    rest, test, held_words = whole, tested, f"{test_name} is held out"
-    if test is None:
-        rest, test, held_words = _split(whole, HELD_OUT, mapping, name)
-    measured = all("nu_dot" in p.blocks for p in rest.pieces)
-    how = chosen_derivative(name, measured, rest.dt(), derivative)
-    fitted, stopping, stop_words = _split(rest, STOPPING, mapping, name)
-    return _Shares(fitted, stopping, test, held_words, stop_words), how
-
-
-def _split(whole: Pieces, share: float, mapping: Mapping, name: str) -> tuple[Pieces, Pieces, str]:
-    """Return what `Log.split` does."""
-    runs = whole.runs
-    if len(runs) > 1:
-        held = whole.of_runs([runs[-1]])
-        words = f"run {runs[-1]}, the last of '{name}', is held out ({held.samples} samples)"
-        return whole.of_runs(runs[:-1]), held, words
-    first, held = cut_at(whole, share, mapping)
-    words = (
-        f"the last {100 * share:.0f} % of the single run of '{name}', from t = {held.pieces[0].begin:.6g} s, "
-        f"are held out ({held.samples} samples)"
-    )
-    return first, held, words
-
-
 def _sample(pieces: Pieces, mapping: Mapping, name: str) -> Log:
     return Log.from_runs(spread(pieces, LOOKED_AT, mapping), name)
 
 
 def _problem(
-    pool: Executor, source: Source, shares: _Shares, size: int, say: Say
+    pool: Executor, source: Source, shares: Shares, size: int, say: Say
 ) -> tuple[PartedProblem, int]:
     """Return the one-step problem, and the run number of what decides when to stop."""
     held = max(shares.fitted.runs) + 1
@@ -275,18 +198,3 @@ def _problem(
     pieces = [*shares.fitted.pieces, *stopping]
     say(f"what the subnetworks should give: {len(pieces)} pieces")
     return PartedProblem.of(pool, source, pieces, size), held
-
-
-def _shared_rows(shared: tuple[Mapping, NDArray[np.void]], piece: Piece) -> NDArray[np.bool_]:
-    mapping, held = shared
-    run = run_of(piece, mapping)
-    return np.isin(held, rows_of([run.cut(inside(piece, run))]))
-
-
-def _refuse_leakage(pool: Executor, log: Pieces, test: Pieces, mapping: Mapping) -> None:
-    """Refuse a test log that shares samples with what is fitted, as `logs.overlap.leakage` does, by some samples."""
-    held = rows_of(spread(test, COMPARED, mapping))
-    shared = np.zeros(len(held), dtype=bool)
-    for found in pool.run(_shared_rows, (mapping, held), list(log.pieces)):
-        shared |= found
-    refuse_shared(int(shared.sum()), len(held), "the test log", "the log")

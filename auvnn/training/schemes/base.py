@@ -10,9 +10,9 @@ from torch import Tensor
 
 from auvnn.damping.bank import DampingBank
 from auvnn.errors import ConfigError
-from auvnn.training.samples import Samples
+from auvnn.training.samples import Samples, Sums
 
-__all__ = ["Samples", "Scheme", "State", "Task", "positive", "relative_errors", "whole"]
+__all__ = ["Samples", "Scheme", "State", "Sums", "Task", "positive", "relative_errors", "whole"]
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class Task:
     """
 
     bank: DampingBank
-    train: Samples
-    held_out: Samples | None
+    train: Sums
+    held_out: Sums | None
     spread: Tensor
     seed: int
     warm: bool
@@ -83,7 +83,7 @@ class Scheme:
         raise TypeError(f"training scheme '{type(self).__name__}' gives no answer")
 
 
-def relative_errors(bank: DampingBank, samples: Samples, spread: Tensor) -> Tensor:
+def relative_errors(bank: DampingBank, samples: Sums, spread: Tensor) -> Tensor:
     """Return the weighted root-mean-square error of the bank divided by the spread, (6,) float64."""
     square, weight = samples.error_sums(bank)
     return (square / weight.clamp_min(1e-300)).sqrt() / spread

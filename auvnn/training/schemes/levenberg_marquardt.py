@@ -16,7 +16,7 @@ from auvnn.training.forms import pack, unpack
 from auvnn.training.least_squares import REASONS, LeastSquares, Rules
 from auvnn.training.linear import solve_triangles
 from auvnn.training.networks import Problems
-from auvnn.training.schemes.base import Samples, Scheme, State, Task, positive, relative_errors, whole
+from auvnn.training.schemes.base import Scheme, State, Sums, Task, positive, relative_errors, whole
 
 MOST_HIDDEN = 200
 
@@ -155,7 +155,7 @@ class LevenbergMarquardt(Scheme):
         return self.task.bank
 
 
-def _problems(form: DampingForm, samples: Samples) -> Problems:
+def _problems(form: DampingForm, samples: Sums) -> Problems:
     if type(form) is MLP and form.hidden > MOST_HIDDEN:
         raise ConfigError(
             f"levenberg_marquardt takes networks of up to {MOST_HIDDEN} hidden units, not {form.hidden}: "
