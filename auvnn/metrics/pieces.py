@@ -17,6 +17,7 @@ from auvnn.logs import Run
 from auvnn.logs.log import blocks_of
 from auvnn.logs.mapping import Mapping
 from auvnn.logs.portions import Portion, read_portion
+from auvnn.logs.reading import file_hash
 from auvnn.metrics.parts import CHANGED, HOLD, Cut, Walk
 
 # Samples of a piece at most, and s of history that it is read with, beside a filter's width.
@@ -69,11 +70,13 @@ class Pieces:
         pieces: at least one.
         rows: of all files.
         notes: what could not be used, in words.
+        hashes: SHA-256 of each file's bytes.
     """
 
     pieces: tuple[Piece, ...]
     rows: int
     notes: tuple[str, ...] = ()
+    hashes: tuple[str, ...] = ()
 
     @property
     def samples(self) -> int:
@@ -130,8 +133,12 @@ def joined(found: Sequence[Pieces]) -> Pieces:
     """Return the pieces of several files; runs get numbers of their own where they clash with earlier ones.
 
     Raises:
-        InputError: the files do not have the same columns.
+        InputError: the files do not have the same columns, or two hold the same bytes.
     """
+    hashes = [h for each in found for h in each.hashes]
+    if len(set(hashes)) < len(hashes):
+        twins = [str(e.pieces[0].path) for e in found if e.pieces and hashes.count(e.hashes[0]) > 1]
+        raise InputError(f"these files hold the same bytes: {', '.join(twins)}; name each recording once")
     pieces: list[Piece] = []
     taken: set[int] = set()
     for each in found:
@@ -147,7 +154,8 @@ def joined(found: Sequence[Pieces]) -> Pieces:
                 f"{pieces[0].path}, run {pieces[0].run}, and {piece.path}, run {piece.run}, differ in "
                 f"{', '.join(differ)}: one log holds one vehicle; read them as separate logs"
             )
-    return Pieces(tuple(pieces), sum(e.rows for e in found), tuple(n for e in found for n in e.notes))
+    notes = tuple(n for e in found for n in e.notes)
+    return Pieces(tuple(pieces), sum(e.rows for e in found), notes, tuple(hashes))
 
 
 class _Walk(Walk):
@@ -159,7 +167,7 @@ class _Walk(Walk):
 
     def pieces(self) -> Pieces:
         rows = self.walk()
-        return Pieces(tuple(self.found), rows, tuple(self.notes))
+        return Pieces(tuple(self.found), rows, tuple(self.notes), (file_hash(self.path),))
 
     def windows(self, run: Run, anchor: float | None, ends: bool) -> tuple[list[tuple[int, int]], float]:
         half = self.reading.half_width or max(4, round(0.2 / run.dt))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
+import tempfile
 import uuid
 from collections import OrderedDict
 from collections.abc import Collection, Iterator, Sequence
@@ -63,6 +64,9 @@ def heavy(value: Any) -> Any:
     return tuple(map(heavy, value)) if isinstance(value, tuple) else value
 
 
+_own: dict[str, tempfile.TemporaryDirectory[str]] = {}
+
+
 @lru_cache(maxsize=16)
 def unpacked(data: bytes) -> Any:
     """Return what was packed; many questions hold the same."""
@@ -75,7 +79,7 @@ class Source:
 
     Attributes:
         packed: model, derivative and mapping, as bytes: they are sent with every question.
-        scratch: folder for what was worked out.
+        scratch: folder for what was worked out; a process that does not see it takes one of its own.
         token: another one for each training.
     """
 
@@ -97,18 +101,25 @@ class Source:
 
     def samples(self, piece: Piece) -> Array:
         """Return velocity and target of a piece's samples that can be used, (n, 12); NaN where a target is missing."""
-        place = self.scratch / f"{piece.name}.npy"
+        place = self._folder() / f"{piece.name}.npy"
         try:
             return np.load(place)
         except (OSError, ValueError):
             pass
         found = self.worked_out(piece)
-        self.scratch.mkdir(parents=True, exist_ok=True)
         unfinished = place.with_suffix(f".{os.getpid()}.partial")
         with unfinished.open("wb") as stream:
             np.save(stream, found)
         unfinished.replace(place)
         return found
+
+    def _folder(self) -> Path:
+        if self.scratch.is_dir():
+            return self.scratch
+        # On another machine: a folder that goes with this process.
+        if self.token not in _own:
+            _own[self.token] = tempfile.TemporaryDirectory(prefix="auvnn-")
+        return Path(_own[self.token].name)
 
     def worked_out(self, piece: Piece) -> Array:
         """Return what `samples` does, from the log itself."""

@@ -212,6 +212,25 @@ def test_files_of_different_vehicles_are_refused(bare, dives, tmp_path):
         parted(bare, [*sorted(dives.iterdir()), other.write(tmp_path / "other.parquet")])
 
 
+def test_the_same_recording_twice_is_refused(bare, dives, tmp_path):
+    twin = tmp_path / "copy.parquet"
+    twin.write_bytes((dives / "dive0.parquet").read_bytes())
+    with pytest.raises(InputError, match="same bytes"):
+        parted(bare, [*sorted(dives.iterdir()), twin])
+
+
+def test_a_worker_that_does_not_see_the_scratch_folder_works_it_out_again(bare, log, dives, tmp_path):
+    mapping = Mapping.read(None)
+    piece = pieces_of_file(Reading(mapping), dives / "dive0.parquet").pieces[0]
+    source = Source.of(bare, choose_derivative(log), mapping, tmp_path / "elsewhere")
+    first = source.samples(piece)
+    assert not (tmp_path / "elsewhere").exists()
+    np.testing.assert_array_equal(source.samples(piece), first)
+    here = Source.of(bare, choose_derivative(log), mapping, tmp_path)
+    np.testing.assert_array_equal(here.samples(piece), first)
+    assert [p.suffix for p in tmp_path.iterdir()] == [".npy"]
+
+
 def test_what_cannot_be_spread_is_refused(bare, dives):
     with pytest.raises(ConfigError, match="needs the log in memory"):
         train_files(bare, dives, "adam")
