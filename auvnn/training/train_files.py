@@ -44,6 +44,17 @@ from auvnn.training.train import Training, history_of, metrics_of
 LOOKED_AT = 20_000
 
 
+def spreads(
+    scheme: str | Dict[str, Any] = "levenberg_marquardt", objective: str | Dict[str, Any] = "one_step"
+) -> bool:
+    """Return whether a training by this scheme, on this objective, can be spread: it asks for sums alone.
+
+    Raises:
+        ConfigError: an unknown scheme, objective or option.
+    """
+    return build_scheme(scheme).parted and build_objective(objective).name == "one_step"
+
+
 def train_files(
     model: GreyBox,
     log: str | Path | Sequence[str | Path],
@@ -94,12 +105,12 @@ def train_files(
         InputError: nothing to fit, the same data on both sides, or a log that contradicts itself.
     """
     say = progress or (lambda words: None)
-    if build_objective(objective).name != "one_step":
+    if not spreads(objective=objective):
         raise ConfigError(
             "training on free running needs the log in memory: leave objective= out, read less of it (max_duration=), "
             "or say stream=false"
         )
-    if not build_scheme(scheme).parted:
+    if not spreads(scheme):
         raise ConfigError(
             f"scheme {build_scheme(scheme).name} needs the log in memory: take levenberg_marquardt, or say stream=false"
         )

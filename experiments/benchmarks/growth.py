@@ -9,7 +9,7 @@ noise), and measures in a process of its own for each size
     sums      that, and one pass over all windows: initial states settled, sums towards the uncertain coefficients,
     train     `train_files` with its defaults, from a vehicle of which no damping is known: six networks until they have
               converged or the held-out run says stop,
-    train20   the same for 20 iterations of one starting point, so that every size does the same work per sample,
+    trainN    the same for N iterations of one starting point (train20), so that every size does the same per sample,
     diagnose  `diagnose_files` with its defaults (search on 240 windows, tests and fit on 1000) and six candidates.
 
 Processor time (user and system) is what grows; wall-clock time is printed beside it. Peak memory is the process's own
@@ -94,11 +94,12 @@ def measure(what: str, path: Path, workers: int) -> dict[str, float]:
     model = auvnn.load("rov90", actuation="wrench")
     begin, cpu = time.perf_counter(), _cpu()
     windows = 0
-    if what in ("train", "train20"):
+    if what.startswith("train"):
         vehicle = replace(model.vehicle, linear_damping=None, quadratic_damping=None)
         scheme: dict[str, Any] = {"scheme": "levenberg_marquardt"}
-        if what == "train20":
-            scheme |= {"max_iterations": 20, "restarts": 1, "tolerance": 0.0, "patience": 1000}
+        if what != "train":
+            count = int(what.removeprefix("train"))
+            scheme |= {"max_iterations": count, "restarts": 1, "tolerance": 0.0, "patience": 1000}
         trained = auvnn.train_files(auvnn.GreyBox(vehicle, actuation="wrench"), path, scheme, workers=workers)
         windows = trained.metrics["iterations"]
     elif what == "diagnose":
