@@ -24,6 +24,7 @@ __all__ = [
     "remove",
     "simulate",
     "train",
+    "train_files",
 ]
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from auvnn.models import GreyBox, load, remove
     from auvnn.online import adapt
     from auvnn.simulate import simulate
-    from auvnn.training import train
+    from auvnn.training import train, train_files
     from auvnn.vehicle import Vehicle
 
 # Imported when first used: torch alone takes longer than any listing should.
@@ -53,6 +54,7 @@ _WHERE = {
     "remove": "auvnn.models",
     "simulate": "auvnn.simulate",
     "train": "auvnn.training",
+    "train_files": "auvnn.training",
 }
 
 

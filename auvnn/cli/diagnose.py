@@ -34,7 +34,8 @@ def _in_memory(job: Job) -> Diagnosis:
 
 
 def _in_parts(job: Job) -> Diagnosis:
-    from auvnn.diagnosis.many import diagnose_files, kind_of
+    from auvnn.diagnosis.many import diagnose_files
+    from auvnn.logs.portions import kind_of
 
     if job["max_duration"] is not None:
         raise ConfigError("max_duration= reads the beginning of each file: leave it out, or say stream=false")

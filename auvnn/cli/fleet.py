@@ -7,7 +7,7 @@ from auvnn.cli.job import Answering, Job, Verb, files
 
 def _run(job: Job) -> Answering:
     from auvnn.diagnosis import fleet
-    from auvnn.diagnosis.many import kind_of
+    from auvnn.logs.portions import kind_of
 
     paths, mapping = files(job.options, "log"), job.mapping()
     job.say(f"log       {len(paths)} dives")

@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 import shutil
+from typing import Any
 
-from auvnn.cli.job import Answering, Job, Verb
+from auvnn.cli.folder import WORK
+from auvnn.cli.job import Answering, Job, Verb, files
+from auvnn.errors import ConfigError
 
 
 def _run(job: Job) -> Answering:
-    from auvnn.training import train
-
-    log, test = job.log(), job.held_out()
-    model = job.model(log)
-    if job["overwrite"] and not job["resume"]:
-        shutil.rmtree(job.checkpoint, ignore_errors=True)
     try:
-        training = train(
-            model, log, job["scheme"], job["damping"], objective=job["objective"], test=test, seed=job["seed"],
-            derivative=job["derivative"], checkpoint=job.checkpoint, resume=job["resume"] or False,
-            force=job["force"],
-            progress=job.say.progress,
-        )  # fmt: skip
+        training = _in_parts(job) if _parted(job) else _in_memory(job)
     except KeyboardInterrupt as end:
         if job.checkpoint.is_dir():
             raise type(end)(f"go on by the same command with out={job.out} resume=true") from None
@@ -29,10 +21,10 @@ def _run(job: Job) -> Answering:
     training.write(job.folder)
     data = training.to_dict()
     job.say(f"assumed   {data['derivative']['held_out']}")
-    job.warn([warning for warning in data["warnings"] if warning not in model.vehicle.warnings])
+    job.warn([warning for warning in data["warnings"] if warning not in training.model.vehicle.warnings])
     job.say(f"trained   {data['metrics']['iterations']} iterations: {data['stopped']}")
     for when in ("before", "after"):
-        scores = {name: data["metrics"][f"held_out_r2_{name}_{when}"] for name in _ACCELERATIONS}
+        scores = {name: data["metrics"][f"held_out_r2_{name}_{when}"] for name in ["du", "dv", "dw", "dp", "dq", "dr"]}
         shown = ", ".join(f"{n} {'unknown' if v is None else format(v, '.3f')}" for n, v in scores.items())
         job.say(f"result    held-out one-step R2 {when}: {shown}")
     free = [data["metrics"].get(f"held_out_rollout_5_s_total_{when}") for when in ("one_step", "after")]
@@ -41,7 +33,43 @@ def _run(job: Job) -> Answering:
     return training
 
 
-_ACCELERATIONS = ("du", "dv", "dw", "dp", "dq", "dr")
+def _parted(job: Job) -> bool:
+    """Say whether the log is read in parts: as told, or where it is large and the fit can be spread."""
+    from auvnn.logs.portions import is_large
+    from auvnn.training.train_files import spreads
+
+    if job["stream"] is not None or job["max_duration"] is not None:
+        return bool(job["stream"])
+    return spreads(job["scheme"], job["objective"]) and is_large(files(job.options, "log"))
+
+
+def _in_memory(job: Job) -> Any:
+    from auvnn.training import train
+
+    log, test = job.log(), job.held_out()
+    return train(job.model(log), log, test=test, **_options(job))
+
+
+def _in_parts(job: Job) -> Any:
+    from auvnn.logs.portions import kind_of
+    from auvnn.training import train_files
+
+    if job["max_duration"] is not None:
+        raise ConfigError("max_duration= reads the beginning of each file: leave it out, or say stream=false")
+    paths, mapping = files(job.options, "log"), job.mapping()
+    test = None if job["test"] is None else files(job.options, "test")
+    job.say(f"log       {len(paths)} files, read in parts by {job['workers']} workers")
+    shared = {key: job[key] for key in ("workers", "executor", "address")}
+    return train_files(job.model(kind=kind_of(paths, mapping)), paths, test=test, mapping=mapping,
+                       scratch=job.out / WORK / "samples", **shared, **_options(job))  # fmt: skip
+
+
+def _options(job: Job) -> dict[str, Any]:
+    if job["overwrite"] and not job["resume"]:
+        shutil.rmtree(job.checkpoint, ignore_errors=True)
+    same = {key: job[key] for key in ("scheme", "damping", "objective", "seed", "derivative", "force")}
+    return {**same, "checkpoint": job.checkpoint, "resume": job["resume"] or False, "progress": job.say.progress}
+
 
 VERB = Verb(
     summary="train the damping subnetworks on a log",

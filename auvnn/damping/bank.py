@@ -91,8 +91,13 @@ class DampingBank(nn.Module):
             nu: velocities (N, 6).
             force: damping that is to be learned (N, 6).
         """
-        for scale, data in ((self.input_scale, nu), (self.output_scale, force)):
-            rms = data.detach().to(torch.float64).square().mean(0).sqrt()
+        means = (data.detach().to(torch.float64).square().mean(0) for data in (nu, force))
+        self.scale_to(*means)
+
+    def scale_to(self, nu: Tensor, force: Tensor) -> None:
+        """Set both scales by the mean squares (6,) of velocities and of the damping that is to be learned."""
+        for scale, square in ((self.input_scale, nu), (self.output_scale, force)):
+            rms = square.sqrt()
             scale.copy_(torch.where(torch.isfinite(rms) & (rms > 1e-12), rms, torch.ones_like(rms)))
 
     def reset(self, seed: int = 0) -> None:

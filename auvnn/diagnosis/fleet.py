@@ -16,7 +16,7 @@ from auvnn.diagnosis.cut import HORIZON, WARMUP, candidates_for, check_window, w
 from auvnn.diagnosis.explain import Explanation, explain, standard_errors
 from auvnn.diagnosis.learned_drag import reduced
 from auvnn.diagnosis.left_over import slow
-from auvnn.diagnosis.many import SEARCH, kind_of
+from auvnn.diagnosis.many import SEARCH
 from auvnn.diagnosis.nuisance import Layout, lay_out
 from auvnn.diagnosis.probes import start_at
 from auvnn.diagnosis.trend import Trend, trend
@@ -25,7 +25,7 @@ from auvnn.errors import AuvnnError, ConfigError, InputError, one_line
 from auvnn.executors import Lost, executor_for
 from auvnn.logs import Log
 from auvnn.logs.mapping import Mapping
-from auvnn.logs.portions import is_large, log_files, start_of
+from auvnn.logs.portions import is_large, kind_of, log_files, start_of
 from auvnn.metrics.parts import Cut, plan_file, runs_of
 from auvnn.models import GreyBox
 from auvnn.training.prediction_error import TRUST, motion

@@ -37,24 +37,13 @@ from auvnn.errors import ConfigError, InputError
 from auvnn.executors import Executor, executor_for
 from auvnn.logs import Log
 from auvnn.logs.mapping import Mapping
-from auvnn.logs.portions import log_files, read_portion
+from auvnn.logs.portions import log_files
 from auvnn.metrics.parts import Cut, Plan, joined, plan_file, runs_of
 from auvnn.models import GreyBox
 from auvnn.training.prediction_error import set_parameters
 
 # Windows for the search, and for the look and the fit; effects of the catalogue that are looked at beside those found.
 SEARCH, WINDOWS, LEADING = 240, 1000, 8
-# Rows by which a file's kind is told.
-_FIRST = 5000
-
-
-def kind_of(paths: Sequence[Path], mapping: Any = None) -> str:
-    """Return what drives the vehicle of a log: "thrusters" or "wrench", by the first rows of its first file.
-
-    Raises:
-        InputError: they cannot be read.
-    """
-    return read_portion(paths[0], Mapping.read(mapping), 0, _FIRST).runs[0].kind
 
 
 def diagnose_files(

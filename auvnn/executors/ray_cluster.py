@@ -10,6 +10,10 @@ from typing import Any
 from auvnn.errors import ConfigError, MissingExtra, one_line
 from auvnn.executors.base import AHEAD, TRIES, Executor, Lost, handed_ahead
 
+# Ray gives the agents of a node 15 s to come up, and cannot be told otherwise (ray-project/ray issue 65983). On a busy
+# machine the first try reads their code from the disk and may fail; the next one finds it in memory.
+_STARTS = 3
+
 
 class RayCluster(Executor):
     """Tasks of a Ray cluster; Ray itself gives a dead worker's task to another.
@@ -35,17 +39,24 @@ class RayCluster(Executor):
         if not self._ours:
             return
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        # How long a process waits for the node that it belongs to.
+        os.environ.setdefault("RAY_raylet_start_wait_time_s", "120")
         own = {"num_cpus": self.workers, "include_dashboard": False} if self.address is None else {}
-        try:
-            ray.init(address=self.address, log_to_driver=False, logging_level="ERROR", **own)
-        except Exception as problem:  # Ray raises a bare Exception where a node does not come up in time
-            ray.shutdown()
-            words = (
-                "no Ray cluster comes up here"
-                if self.address is None
-                else f"no Ray cluster at {self.address}"
-            )
-            raise ConfigError(f"executor=ray: {words} ({one_line(problem, 200)})") from None
+        for left in reversed(range(_STARTS if self.address is None else 1)):
+            try:
+                ray.init(address=self.address, log_to_driver=False, logging_level="ERROR", **own)
+                return
+            except Exception as problem:  # Ray raises a bare Exception where a node does not come up in time
+                ray.shutdown()
+                if left:
+                    continue
+                words = (
+                    f"no Ray cluster comes up here, tried {_STARTS} times: is the machine too busy to start its agents "
+                    "within Ray's 15 s? Start one beforehand, 'ray start --head', and give its address="
+                    if self.address is None
+                    else f"no Ray cluster at {self.address}"
+                )
+                raise ConfigError(f"executor=ray: {words} ({one_line(problem, 200)})") from None
 
     def stop(self) -> None:
         """Leave the cluster; one that was started here ends."""

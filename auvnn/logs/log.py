@@ -51,9 +51,9 @@ class Log:
         if len(set(numbers)) != len(numbers):
             twice = sorted({n for n in numbers if numbers.count(n) > 1})
             raise InputError(f"log '{self.name}': run numbers {twice} occur twice; number the runs apart")
-        first = _signature(self.runs[0])
+        first = blocks_of(self.runs[0])
         for run in self.runs[1:]:
-            differ = sorted(first ^ _signature(run))
+            differ = sorted(first ^ blocks_of(run))
             if differ:
                 raise InputError(
                     f"log '{self.name}': runs {self.runs[0].number} and {run.number} differ in "
@@ -189,7 +189,7 @@ class Log:
         return digest.hexdigest()
 
 
-def _signature(run: Run) -> set[str]:
+def blocks_of(run: Run) -> frozenset[str]:
     """Return the names of the blocks a run has, thrusters and fins with their number."""
     names = {
         b for b in ("nu_dot", "position", "wrench", "altitude", "voltage") if getattr(run, b) is not None
@@ -198,4 +198,4 @@ def _signature(run: Run) -> set[str]:
         value = getattr(run, block)
         if value is not None:
             names.add(f"{block} ({value.shape[1]})")
-    return names
+    return frozenset(names)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from auvnn.errors import InputError
 
 if TYPE_CHECKING:
     from auvnn.logs.log import Log
+    from auvnn.logs.run import Run
 
 _SHARE = 0.02
 _COUNT = 5
@@ -30,20 +32,30 @@ def leakage(log: Log, test: Log) -> None:
     Raises:
         InputError: more than 2 % (and at least five) of the test's samples are in the log.
     """
-    fitted, held = _rows(log), _rows(test)
+    fitted, held = rows_of(log.runs), rows_of(test.runs)
     if len(held) == 0 or len(fitted) == 0:
         return
     shared = int(np.isin(held, fitted, assume_unique=True).sum())
-    if shared >= _COUNT and shared > _SHARE * len(held):
+    refuse_shared(shared, len(held), f"the test log '{test.name}'", f"the log '{log.name}'")
+
+
+def refuse_shared(shared: int, held: int, test: str, log: str) -> None:
+    """Refuse a test of which so many of its samples that were looked for are in the log that is fitted.
+
+    Raises:
+        InputError: they are too many.
+    """
+    if shared >= _COUNT and shared > _SHARE * held:
         raise InputError(
-            f"the test log '{test.name}' shares {shared} of {len(held)} samples with the log '{log.name}' "
+            f"{test} shares {shared} of {held} samples with {log} "
             "that is fitted: the score would be a memory, not a prediction; hold out another run"
         )
 
 
-def _rows(log: Log) -> NDArray[np.void]:
+def rows_of(runs: Iterable[Run]) -> NDArray[np.void]:
+    """Return a key for each sample of some runs that is moving and occurs once."""
     parts = []
-    for run in log.runs:
+    for run in runs:
         sign = np.where(run.quaternion[:, :1] < 0.0, -1.0, 1.0)
         rows = np.concatenate([run.nu, sign * run.quaternion], axis=1)
         moving = np.isfinite(rows).all(axis=1) & (run.nu != 0.0).any(axis=1)

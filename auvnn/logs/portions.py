@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,6 +117,19 @@ def is_large(paths: Sequence[Path]) -> bool:
         if rows > LARGE:
             return True
     return False
+
+
+# Rows by which a file's kind is told.
+_FIRST = 5000
+
+
+def kind_of(paths: Sequence[Path], mapping: Any = None) -> str:
+    """Return what drives the vehicle of a log: "thrusters" or "wrench", by the first rows of its first file.
+
+    Raises:
+        InputError: they cannot be read.
+    """
+    return read_portion(paths[0], Mapping.read(mapping), 0, _FIRST).runs[0].kind
 
 
 # s since 1970 beyond which a stamp is a date.

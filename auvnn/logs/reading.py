@@ -78,7 +78,7 @@ def read(
         collector.repairs.extend(notes)
         with np.errstate(all="ignore"):
             table = read_table(reader, file, plan, max_duration)
-        hashes.append(_file_hash(file))
+        hashes.append(file_hash(file))
         if _stamp(file) != before:
             raise InputError(
                 f"{file}: changed while it was read; wait until the recording or the copy is done"
@@ -108,7 +108,12 @@ def _stamp(path: Path) -> tuple[int, int] | None:
     return state.st_size, state.st_mtime_ns
 
 
-def _file_hash(path: Path) -> str:
+def file_hash(path: Path) -> str:
+    """Return the SHA-256 of a file's bytes.
+
+    Raises:
+        InputError: it cannot be read.
+    """
     try:
         with path.open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()

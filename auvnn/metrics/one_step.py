@@ -64,17 +64,28 @@ def choose_derivative(log: Log, options: Mapping[str, Any] | None = None) -> Der
         ConfigError: an unknown option or method.
         InputError: measured accelerations are asked for and not there.
     """
+    measured = all(run.nu_dot is not None for run in log.runs)
+    return chosen_derivative(log.name, measured, float(np.median([run.dt for run in log.runs])), options)
+
+
+def chosen_derivative(
+    name: str, measured: bool, dt: float, options: Mapping[str, Any] | None = None
+) -> Derivative:
+    """Return what `choose_derivative` does for a log of this name and median step, s, whose accelerations are measured.
+
+    Raises:
+        ConfigError: an unknown option or method.
+        InputError: measured accelerations are asked for and not there.
+    """
     given = {k: v for k, v in dict(options or {}).items() if v is not None}
     for key in given:
         if key not in ("method", "half_width", "order"):
             raise ConfigError(unknown_name("derivative option", key, ("method", "half_width", "order")))
-    measured = all(run.nu_dot is not None for run in log.runs)
     method = given.get("method", "measured" if measured else "local_polynomial")
     if method not in METHODS:
         raise ConfigError(unknown_name("derivative method", str(method), METHODS))
     if method == "measured" and not measured:
-        raise InputError(f"{log.name} has no columns du ... dr: use derivative.method=local_polynomial")
-    dt = float(np.median([run.dt for run in log.runs]))
+        raise InputError(f"{name} has no columns du ... dr: use derivative.method=local_polynomial")
     width = int(given.get("half_width", max(4, round(0.2 / dt))))
     return Derivative(method, width, int(given.get("order", 2)))
 
@@ -269,13 +280,13 @@ def _rms(x: Array) -> Array:
     return np.sqrt((np.where(good, x, 0.0) ** 2).sum(0) / np.maximum(good.sum(0), 1))
 
 
-def inertia_of(model: GreyBox, run: Run) -> Array:
-    """Return the model's inertia matrix (6, 6); of a body that varies in time, that at the start of the run."""
+def inertia_of(model: GreyBox, run: Run, time: float | None = None) -> Array:
+    """Return the model's inertia matrix (6, 6); of a body that varies in time, that at a time or the run's start."""
     moment = None
     if model.time_varying:
         zero3, zero6 = torch.zeros(3, dtype=torch.float64), torch.zeros(6, dtype=torch.float64)
         moment = Moment(
-            torch.tensor(float(run.t[0])),
+            torch.tensor(float(run.t[0] if time is None else time)),
             zero3,
             torch.eye(3, dtype=torch.float64),
             zero6,

@@ -173,13 +173,19 @@ def plan_file(cut: Cut, path: Path) -> Plan:
     Raises:
         InputError: it cannot be read, rows of one run are apart, or none of its rows can be used.
     """
-    return _Walk(path, cut).go()
+    return Walk(path, cut).go()
 
 
-class _Walk:
-    """One file, walked through portion by portion."""
+class Walk:
+    """One file, walked through portion by portion; what is kept of each run is for `windows` and `add` to say.
+
+    Args:
+        path: the file.
+        cut: how to read it, and how windows are cut.
+    """
 
     def __init__(self, path: Path, cut: Cut) -> None:
+        """Stand at the beginning of the file."""
         self.path, self.cut = path, cut
         self.margin = cut.warmup + BEFORE
         self.parts: list[Part] = []
@@ -192,6 +198,15 @@ class _Walk:
 
     def go(self) -> Plan:
         """Return the plan."""
+        total = self.walk()
+        return Plan(tuple(self.parts), total, self.duration, len(self.known), tuple(self.notes))
+
+    def walk(self) -> int:
+        """Go through the file and return its rows.
+
+        Raises:
+            InputError: it cannot be read, rows of one run are apart, or none of its rows can be used.
+        """
         total = rows_in(self.path)
         at, size, failed = 0, ROWS, None
         while at < total:
@@ -211,7 +226,7 @@ class _Walk:
             at = max(then, at) if then > at else at
         if failed is not None and not self.known:
             raise failed
-        return Plan(tuple(self.parts), total, self.duration, len(self.known), tuple(self.notes))
+        return total
 
     def _portion(self, portion: Portion, at: int, last: bool) -> None:
         self._refuse_scattered(portion)
@@ -224,11 +239,18 @@ class _Walk:
             before = self.reached if goes_on else run.t[0]
             self.duration += float(run.t[-1]) - float(before)
             self.reached = float(run.t[-1])
-            pieces, begin = self._windows(run, anchor, ends)
-            self._add(portion, at, run, label, number, pieces)
+            pieces, begin = self.windows(run, anchor, ends)
+            self.add(portion, at, run, label, number, pieces)
             self.open = None if ends else (number, label, begin)
 
-    def _windows(self, run: Run, anchor: float | None, ends: bool) -> tuple[list[tuple[int, int]], float]:
+    def windows(self, run: Run, anchor: float | None, ends: bool) -> tuple[list[tuple[int, int]], float]:
+        """Return first and last sample of each window of a run, and the time from which to go on.
+
+        Args:
+            run: as far as the portion holds it.
+            anchor: the time from which to go on with a run that has begun in the portion before.
+            ends: whether the run ends in this portion.
+        """
         cut, (_, known) = self.cut, commands(run, self.cut.kind)
         until = run.t[-1] if ends else run.t[-1] - HOLD
         found: list[tuple[int, int]] = []
@@ -245,9 +267,19 @@ class _Walk:
                 return found, then
         return found, float(until)
 
-    def _add(
+    def add(
         self, portion: Portion, at: int, run: Run, label: float, number: int, pieces: list[tuple[int, int]]
     ) -> None:
+        """Keep the windows found in a run.
+
+        Args:
+            portion: of the file, from row `at` on.
+            at: that row.
+            run: the run.
+            label: its number in the file.
+            number: its number in the plan.
+            pieces: what `windows` has found.
+        """
         mine = portion.label == label
         channels = frozenset(run.channels)
         for k in range(0, len(pieces), WINDOWS):
@@ -309,7 +341,7 @@ def windows_of(part: Part, cut: Cut) -> Windows:
         if begin is not None:
             pieces.append((replace(run, number=part.run), command, int(a), int(b), begin))
     if len(pieces) != len(part):
-        raise InputError(_CHANGED.format(part.path))
+        raise InputError(CHANGED.format(part.path))
     made = gathered(pieces, cut.warmup)
     return replace(made, first=part.number + np.arange(len(part)))
 
@@ -329,7 +361,7 @@ def runs_of(parts: Sequence[Part], cut: Cut) -> list[Run]:
     return found
 
 
-_CHANGED = "{}: is no longer the file that was looked through: start again"
+CHANGED = "{}: is no longer the file that was looked through: start again"
 
 
 def _covering(portion: Portion, part: Part) -> Run:
@@ -338,4 +370,4 @@ def _covering(portion: Portion, part: Part) -> Run:
     for run in portion.runs:
         if low in run.t and high in run.t:
             return run
-    raise InputError(_CHANGED.format(part.path))
+    raise InputError(CHANGED.format(part.path))

@@ -7,20 +7,21 @@ import time
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import torch
-from torch import Tensor
 
 from auvnn.damping.bank import DampingBank
-from auvnn.damping.region import Region
 from auvnn.errors import ConfigError
 from auvnn.training.checkpoint import Checkpoints
 from auvnn.training.history import Callback, History, Record
 from auvnn.training.problem import DampingProblem
 from auvnn.training.schemes import SCHEMES
-from auvnn.training.schemes.base import Samples, Scheme, Task
+from auvnn.training.schemes.base import Scheme, Task
 from auvnn.training.scrutiny import energy_warnings
+
+if TYPE_CHECKING:
+    from auvnn.training.parted import PartedProblem
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ def build_scheme(description: str | Mapping[str, Any] | Scheme) -> Scheme:
 
 def fit_damping(
     bank: DampingBank,
-    problem: DampingProblem,
+    problem: DampingProblem | PartedProblem,
     *,
     scheme: str | Mapping[str, Any] | Scheme = "levenberg_marquardt",
     held_out: Collection[int] | None = None,
@@ -83,7 +84,7 @@ def fit_damping(
 
     Args:
         bank: what is fitted; its scales are set from the data unless `warm_start`.
-        problem: the samples.
+        problem: the samples, in memory or in pieces of a log.
         scheme: a name of the catalogue, `{scheme: name, <options>}`, or a scheme.
         held_out: run numbers that are never fitted and decide when to stop and which weights to keep.
         seed: of initial weights and mini-batches.
@@ -110,6 +111,8 @@ def fit_damping(
         raise ConfigError(f"resume is {resume!r}: give true, false or force")
     if resume and checkpoint_folder is None:
         raise ConfigError("resume needs the folder of the checkpoints: give checkpoint_folder")
+    if not (chosen.parted or isinstance(problem, DampingProblem)):
+        raise ConfigError(f"scheme {chosen.name} needs its samples in memory: take levenberg_marquardt")
     train, held = problem.split(held_out) if held_out else (problem, None)
     learned = [axis for form in bank.groups() if list(form.parameters()) for axis in form.axes]
     for part in (train, held):
@@ -117,11 +120,10 @@ def fit_damping(
             part.check_axes(learned)
     working = copy.deepcopy(bank)
     if not warm_start:
-        working.set_scales(*_scaling_data(train))
+        working.scale_to(*train.mean_squares())
     spread = train.spread() / working.output_scale.cpu().double()
     spread = torch.where(spread > 0, spread, 1.0)
-    samples = Samples.scaled(train, working)
-    task = Task(working, samples, held and Samples.scaled(held, working), spread, seed, warm_start)
+    task = Task(working, train.scaled(working), held and held.scaled(working), spread, seed, warm_start)
     described = {"scheme": chosen.name, **chosen.options()}
     store = None
     if checkpoint_folder is not None:
@@ -156,8 +158,8 @@ def fit_damping(
     errors, held_errors = chosen.errors()
     unit = spread * working.output_scale.cpu().double()
     bank.load_state_dict(result.state_dict())
-    bank.region = Region.of(train.nu[(train.weights > 0).any(-1)])
-    energy = tuple(energy_warnings(bank, train))
+    bank.region = train.region()
+    energy = tuple(energy_warnings(bank, train)) if isinstance(train, DampingProblem) else ()
     return Fit(
         history=history,
         iterations=iterations,
@@ -170,13 +172,6 @@ def fit_damping(
         scheme=described,
         energy=energy,
     )
-
-
-def _scaling_data(train: DampingProblem) -> tuple[Tensor, Tensor]:
-    """Return velocities and targets of which the root mean square counts usable samples alone."""
-    counted = (train.weights > 0).double()
-    share = counted.mean(0).clamp_min(1e-300).sqrt()
-    return train.nu, train.target * counted / share
 
 
 def _record(iteration: int, scheme: Scheme) -> Record:

@@ -33,15 +33,11 @@ class FormProblems:
         self._single = [type(form)((axis,), **form.options()).to(nu) for axis in form.axes]
         self._shapes = {name: tensor.shape[1:] for name, tensor in form.named_parameters()}
         self._buffers = {name: tensor.detach().to(nu) for name, tensor in form.named_buffers()}
-        self.inner_size = sum(shape.numel() for shape in self._shapes.values())
+        self.inner_size = size_of(form)
 
     def draw(self, generator: torch.Generator) -> Tensor:
         """Draw what the form itself draws."""
-        saved = {name: tensor.detach().clone() for name, tensor in self._form.state_dict().items()}
-        self._form.reset(generator)
-        theta = pack(self._form)
-        self._form.load_state_dict(saved)
-        return theta
+        return form_draw(self._form, generator)
 
     def _output(self, theta: Tensor, nu: Tensor, member: int) -> Tensor:
         state = {name: tensor[member : member + 1] for name, tensor in self._buffers.items()}
@@ -67,12 +63,16 @@ class FormProblems:
 
     def cost(self, theta: Tensor, beta: Tensor, member: Tensor) -> Tensor:
         """Return the weighted mean of the squared residual (B,)."""
+        return self.squares(theta, beta, member) / self.total[member]
+
+    def squares(self, theta: Tensor, beta: Tensor, member: Tensor) -> Tensor:
+        """Return the weighted sum of the squared residual (B,)."""
         total = theta.new_zeros(len(theta))
         for number, rows, part, y, w in self._parts(member):
             output = vmap(lambda t, n=number, p=part: self._output(t, self.nu[p], n))(theta[rows])
             square = (output - y).square()
             total[rows] += (square if w is None else square * w).sum(1)
-        return total / self.total[member]
+        return total
 
     def normal(self, theta: Tensor, beta: Tensor, member: Tensor) -> Normal:
         """Return the normal equations at theta."""
@@ -92,6 +92,20 @@ class FormProblems:
             slope[rows] += (weighted.mT @ residual[..., None])[..., 0]
         empty = theta.new_zeros(count, size, 0)
         return Normal(inner, empty, theta.new_zeros(count, 0, 0), slope, theta.new_zeros(count, 0))
+
+
+def size_of(form: DampingForm) -> int:
+    """Return the number of parameters for one degree of freedom."""
+    return sum(tensor.shape[1:].numel() for tensor in form.parameters())
+
+
+def form_draw(form: DampingForm, generator: torch.Generator) -> Tensor:
+    """Return the parameters (m, P) that a form itself would draw; it is left as it is."""
+    saved = {name: tensor.detach().clone() for name, tensor in form.state_dict().items()}
+    form.reset(generator)
+    theta = pack(form)
+    form.load_state_dict(saved)
+    return theta
 
 
 def pack(form: DampingForm) -> Tensor:

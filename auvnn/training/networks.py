@@ -9,7 +9,7 @@ g_k g_l with the 91 series x_i x_j, which all networks share, gives all blocks.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -17,6 +17,7 @@ import torch
 from torch import Tensor
 
 KEPT_BYTES = 64 * 1024**2
+RIDGE = 1e-10
 
 
 @dataclass
@@ -32,6 +33,10 @@ class Normal:
     def tensors(self) -> tuple[Tensor, ...]:
         """Return the five tensors in the order of the fields."""
         return self.inner, self.cross, self.outer, self.inner_slope, self.outer_slope
+
+    def __add__(self, other: Normal) -> Normal:
+        """Return the normal equations of the samples of both."""
+        return Normal(*(a + b for a, b in zip(self.tensors(), other.tensors(), strict=True)))
 
 
 class Problems(Protocol):
@@ -69,6 +74,7 @@ class NetworkProblems:
         hidden: tanh units of each network.
         zero_at_rest: the networks subtract their value at x = 0 and have no output bias.
         ridge: relative to the diagonal, keeps collinear hidden units from taking huge opposite weights.
+        first: number of the first sample, where these are some of many.
     """
 
     def __init__(
@@ -78,7 +84,8 @@ class NetworkProblems:
         weights: Tensor | None,
         hidden: int,
         zero_at_rest: bool = False,
-        ridge: float = 1e-10,
+        ridge: float = RIDGE,
+        first: int = 0,
     ) -> None:
         """Precompute the products of the inputs that all networks share."""
         samples, p = inputs.shape
@@ -86,7 +93,7 @@ class NetworkProblems:
         self.y, self.w = targets, weights
         self.total = targets.new_full((len(targets),), float(samples)) if weights is None else weights.sum(1)
         self.members, self.hidden, self.rest, self.ridge = len(targets), hidden, zero_at_rest, ridge
-        self.inner_size = hidden * (p + 1)
+        self.inner_size, self.first = hidden * (p + 1), first
         self.outer_size = hidden + (0 if zero_at_rest else 1)
         self._pairs = torch.triu_indices(p + 1, p + 1)
         self._pairs_of_units = torch.triu_indices(hidden, hidden)
@@ -100,16 +107,24 @@ class NetworkProblems:
         the data; the bias puts each unit's centre on a sample. (Nguyen and Widrow's idea, with the data's own
         spread in place of a box: on a manoeuvre the samples lie near a curve.)
         """
-        shape = (self.members, self.hidden)
-        weight = torch.randn((*shape, self.x.shape[1] - 1), generator=generator, dtype=torch.float64)
-        rows = torch.randint(len(self.x), shape, generator=generator)
         mean = self.x[:, :-1].mean(0)
+        covariance = self.scatter(mean) / len(self.x)
+        return draw_units(self.members, self.hidden, len(self.x), mean, covariance, self.inputs_at, generator)
+
+    def inputs_sum(self) -> Tensor:
+        """Return the sum of the inputs, (p,)."""
+        return self.x[:, :-1].sum(0)
+
+    def scatter(self, mean: Tensor) -> Tensor:
+        """Return the sum of products of the inputs about a mean, (p, p)."""
         centred = self.x[:, :-1] - mean
-        covariance = centred.T @ centred / len(self.x)
-        spread = ((weight @ covariance) * weight).sum(-1, keepdim=True).clamp_min(0).sqrt()
-        weight = 0.5 * weight / spread.clamp_min(1e-6)
-        bias = -(self.x[rows][..., :-1] * weight).sum(-1, keepdim=True)
-        return torch.cat([weight, bias], -1).reshape(self.members, self.inner_size)
+        return centred.T @ centred
+
+    def inputs_at(self, rows: Tensor) -> Tensor:
+        """Return the inputs of some samples by their numbers, (..., p); zeros for those that are not here."""
+        here = rows - self.first
+        known = (here >= 0) & (here < len(self.x))
+        return torch.where(known[..., None], self.x[here.clamp(0, len(self.x) - 1)][..., :-1], 0.0)
 
     def _chunks(self, problems: int) -> Iterator[slice]:
         # Blocks that stay in the cache: 3 times faster than whole columns for a few hundred networks.
@@ -145,34 +160,46 @@ class NetworkProblems:
 
     def solve_outer(self, theta: Tensor, member: Tensor) -> tuple[Tensor, Tensor]:
         """Return the best output layers (B, q) for given hidden layers, and the cost (B,)."""
+        keep = len(theta) * self.outer_size * len(self.x) * theta.element_size() <= KEPT_BYTES
+        kept: list[Tensor] = []
+        gram, right = self.gram(theta, member, kept if keep else None)
+        beta = output_layers(gram, right, self.ridge)
+        return beta, self._squares_of(theta, beta, member, kept) / self.total[member]
+
+    def gram(self, theta: Tensor, member: Tensor, kept: list[Tensor] | None = None) -> tuple[Tensor, Tensor]:
+        """Return the sums that decide on the output layers, (B, q, q) and (B, q, 1).
+
+        Args:
+            theta: (B, Q).
+            member: (B,).
+            kept: takes what the output layers multiply, for whoever needs it again.
+        """
         count, q = len(theta), self.outer_size
         gram, right = theta.new_zeros(count, q, q), theta.new_zeros(count, q, 1)
-        keep = count * q * len(self.x) * theta.element_size() <= KEPT_BYTES
-        kept: list[Tensor] = []
         for part in self._chunks(count):
             basis = self._basis(theta, part)
             weighted = self._weighted(basis, member, part)
             gram.baddbmm_(weighted, basis.mT)
             right.baddbmm_(weighted, self.y[member, part][..., None])
-            if keep:
+            if kept is not None:
                 kept.append(basis)
-        factor, _ = torch.linalg.cholesky_ex(gram + _ridge(gram, self.ridge))
-        beta = torch.cholesky_solve(right, factor)
-        # One step of refinement takes most of the ridge's bias away.
-        beta = (beta + torch.cholesky_solve(right - gram @ beta, factor))[..., 0]
-        return beta, self._cost(theta, beta, member, kept)
+        return gram, right
 
     def cost(self, theta: Tensor, beta: Tensor, member: Tensor) -> Tensor:
         """Return the weighted mean of the squared residual (B,)."""
-        return self._cost(theta, beta, member, [])
+        return self.squares(theta, beta, member) / self.total[member]
 
-    def _cost(self, theta: Tensor, beta: Tensor, member: Tensor, kept: list[Tensor]) -> Tensor:
+    def squares(self, theta: Tensor, beta: Tensor, member: Tensor) -> Tensor:
+        """Return the weighted sum of the squared residual (B,)."""
+        return self._squares_of(theta, beta, member, [])
+
+    def _squares_of(self, theta: Tensor, beta: Tensor, member: Tensor, kept: list[Tensor]) -> Tensor:
         total = theta.new_zeros(len(theta))
         for number, part in enumerate(self._chunks(len(theta))):
             basis = kept[number] if kept else self._basis(theta, part)
             residual = self._residual(basis, beta, member, part)
             total += (self._weighted(residual, member, part) @ residual.mT)[:, 0, 0]
-        return total / self.total[member]
+        return total
 
     def normal(self, theta: Tensor, beta: Tensor, member: Tensor) -> Normal:
         """Return the normal equations at (theta, beta); see the head of this file."""
@@ -213,6 +240,43 @@ class NetworkProblems:
             wide[..., h + 1].contiguous(),
             plain[:, :q, h + 1].contiguous(),
         )
+
+
+def draw_units(
+    members: int,
+    hidden: int,
+    samples: int,
+    mean: Tensor,
+    covariance: Tensor,
+    inputs_at: Callable[[Tensor], Tensor],
+    generator: torch.Generator,
+) -> Tensor:
+    """Return hidden layers (members, Q) as `NetworkProblems.draw` describes them.
+
+    Args:
+        members: networks.
+        hidden: units of each.
+        samples: how many there are.
+        mean: of the inputs, (p,).
+        covariance: of the inputs, (p, p).
+        inputs_at: gives the inputs of some samples.
+        generator: draws.
+    """
+    shape = (members, hidden)
+    weight = torch.randn((*shape, len(mean)), generator=generator, dtype=torch.float64)
+    rows = torch.randint(samples, shape, generator=generator)
+    spread = ((weight @ covariance) * weight).sum(-1, keepdim=True).clamp_min(0).sqrt()
+    weight = 0.5 * weight / spread.clamp_min(1e-6)
+    bias = -(inputs_at(rows) * weight).sum(-1, keepdim=True)
+    return torch.cat([weight, bias], -1).reshape(members, -1)
+
+
+def output_layers(gram: Tensor, right: Tensor, ridge: float) -> Tensor:
+    """Return the output layers (B, q) that solve the normal equations of (B, q, q) and (B, q, 1)."""
+    factor, _ = torch.linalg.cholesky_ex(gram + _ridge(gram, ridge))
+    beta = torch.cholesky_solve(right, factor)
+    # One step of refinement takes most of the ridge's bias away.
+    return (beta + torch.cholesky_solve(right - gram @ beta, factor))[..., 0]
 
 
 def _at_rest(inner: Tensor, cross: Tensor, plain: Tensor, slope: Tensor) -> tuple[Tensor, Tensor]:

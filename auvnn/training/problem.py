@@ -10,8 +10,12 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from auvnn.damping.bank import DampingBank
 from auvnn.damping.base import AXES
+from auvnn.damping.region import Region
 from auvnn.errors import ConfigError, InputError
+from auvnn.training.groups import column_sums
+from auvnn.training.samples import Samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,9 +108,24 @@ class DampingProblem:
 
     def spread(self) -> Tensor:
         """Return the weighted standard deviation of the target by degree of freedom (6,), N and N m."""
-        weight = self.weights / self.weights.sum(0).clamp_min(1e-300)
-        mean = (weight * self.target).sum(0)
-        return (weight * (self.target - mean).square()).sum(0).sqrt()
+        weight, total = self.weights, column_sums(self.weights).clamp_min(1e-300)
+        mean = column_sums(weight * self.target) / total
+        return (column_sums(weight * (self.target - mean).square()) / total).sqrt()
+
+    def mean_squares(self) -> tuple[Tensor, Tensor]:
+        """Return the mean squares (6,) of velocities and of targets, of these over the samples that count."""
+        counted = (self.weights > 0).double()
+        share = (column_sums(counted) / self.samples).clamp_min(1e-300).sqrt()
+        square = column_sums((self.target * counted / share).square())
+        return column_sums(self.nu.square()) / self.samples, square / self.samples
+
+    def region(self) -> Region | None:
+        """Return the velocities that the samples fill."""
+        return Region.of(self.nu)
+
+    def scaled(self, bank: DampingBank) -> Samples:
+        """Return the samples divided by a bank's scales."""
+        return Samples.scaled(self, bank)
 
     def select(self, rows: Tensor) -> DampingProblem:
         """Return the problem of some samples, given by a mask (N,)."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from auvnn.damping.bank import DampingBank
-from auvnn.logs import Log
+from auvnn.logs import Log, Run
 from auvnn.logs.derivatives import LocalPolynomial
 from auvnn.metrics.one_step import Derivative, accelerations, inertia_of, integrated
 from auvnn.models import GreyBox
@@ -39,18 +39,43 @@ def targets(model: GreyBox, log: Log, derivative: Derivative) -> tuple[Array, Ar
     Returns:
         nu (N, 6) through the water; target (N, 6), NaN where a sample is missing; run (N,).
     """
-    recorder = _Recorder()
-    bare = GreyBox(model.vehicle, model.copied_effects(), cast(DampingBank, recorder), model.actuation)
-    velocities, wrenches, numbers = [], [], []
-    for run in log.runs:
-        measured, predicted = accelerations(bare, run, derivative)
-        assert recorder.seen is not None
-        nu = recorder.seen.numpy()
+    each = Targets(model, derivative)
+    found = [each(run) for run in log.runs]
+    numbers = [np.full(run.samples, run.number) for run in log.runs]
+    return (
+        np.concatenate([nu for nu, _ in found]),
+        np.concatenate([d for _, d in found]),
+        np.concatenate(numbers),
+    )
+
+
+class Targets:
+    """Gives a run's velocities and targets, as `targets` does for all runs of a log.
+
+    Args:
+        model: the model.
+        derivative: how accelerations are obtained.
+    """
+
+    def __init__(self, model: GreyBox, derivative: Derivative) -> None:
+        """Take the model without its subnetworks."""
+        self.derivative, self._recorder = derivative, _Recorder()
+        bank = cast(DampingBank, self._recorder)
+        self.bare = GreyBox(model.vehicle, model.copied_effects(), bank, model.actuation)
+
+    def __call__(self, run: Run, opening: float | None = None) -> tuple[Array, Array]:
+        """Return nu and target, (N, 6) each.
+
+        Args:
+            run: measurements.
+            opening: time at which the run began that they are a part of, s; their own begin by default.
+        """
+        how = self.derivative
+        measured, predicted = accelerations(self.bare, run, how)
+        assert self._recorder.seen is not None
+        nu = self._recorder.seen.numpy()
         nu = np.where(run.valid[:, None], nu, np.nan)
-        if derivative.method != "measured":
+        if how.method != "measured":
             # The slope of its integral: what the same filter makes of a force that is linear in the velocity.
-            nu = LocalPolynomial(run.t, derivative.half_width, derivative.order)(integrated(run.t, nu))[1]
-        velocities.append(nu)
-        wrenches.append((predicted - measured) @ inertia_of(bare, run).T)
-        numbers.append(np.full(run.samples, run.number))
-    return np.concatenate(velocities), np.concatenate(wrenches), np.concatenate(numbers)
+            nu = LocalPolynomial(run.t, how.half_width, how.order)(integrated(run.t, nu))[1]
+        return nu, (predicted - measured) @ inertia_of(self.bare, run, opening).T

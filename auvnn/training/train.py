@@ -58,6 +58,7 @@ class Training(Answer):
     surfaces: list[dict[str, Any]] = field(default_factory=list)
     objective: dict[str, Any] = field(default_factory=lambda: {"objective": "one_step"})
     absorbed: Absorption | None = None
+    parts: dict[str, Any] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
@@ -80,6 +81,7 @@ class Training(Answer):
                 "model": self.name,
                 **{n: getattr(self, n) for n in names},
                 "absorbed": None if self.absorbed is None else self.absorbed.to_dict(),
+                **({} if self.parts is None else {"parts": self.parts}),
             }
         )
 
@@ -178,8 +180,8 @@ def train(
         warnings.append(f"held out, one step ahead, {', '.join(worse)} got worse by the training")
     absorbed = absorption(trained, fitted, how)
     warnings += [] if absorbed is None else absorbed.words()
-    metrics = _metrics(fit, before, after, len(nu), held_samples)
-    history, stopped = _history(fit), fit.stopped_because
+    metrics = metrics_of(fit, before, after, len(nu), held_samples)
+    history, stopped = history_of(fit), fit.stopped_because
     if refined.stopped:
         metrics |= _free_running({"before": model, "one_step": one_step_model, "after": trained}, test)
         history["rollout"] = {
@@ -233,7 +235,8 @@ def _free_running(models: Mapping[str, GreyBox], test: Log) -> dict[str, Any]:
     return found
 
 
-def _metrics(fit: Fit, before: dict, after: dict, samples: int, held: int) -> dict[str, Any]:
+def metrics_of(fit: Fit, before: dict, after: dict, samples: int, held: int) -> dict[str, Any]:
+    """Return `metrics` of the answer."""
     units = ("N", "N", "N", "N_m", "N_m", "N_m")
     found: dict[str, Any] = {
         "samples_fitted": samples,
@@ -252,7 +255,7 @@ def _metrics(fit: Fit, before: dict, after: dict, samples: int, held: int) -> di
     return found
 
 
-def _history(fit: Fit) -> dict[str, Any]:
+def history_of(fit: Fit) -> dict[str, Any]:
     """Return the root mean square over the learned degrees of freedom, one number an iteration."""
 
     def joined(rows: list) -> list[float]:

@@ -1,12 +1,15 @@
-"""How time and memory of the diagnosis in parts grow with the number of samples.
+"""How time and memory of what is done in parts grow with the number of samples.
 
-    python experiments/benchmarks/growth.py [sizes=1e4,1e5,1e6] [what=read,sums,diagnose] [folder=...] [workers=1]
+    python experiments/benchmarks/growth.py [sizes=1e4,1e5,1e6] [what=read,sums,train,diagnose] [folder=...] [workers=1]
 
 Makes logs of a remotely operated vehicle in a hidden current at 20 Hz (one simulated hour, repeated as runs with fresh
 noise), and measures in a process of its own for each size
 
     read      one pass through the file that finds all windows of free running,
     sums      that, and one pass over all windows: initial states settled, sums towards the uncertain coefficients,
+    train     `train_files` with its defaults, from a vehicle of which no damping is known: six networks until they have
+              converged or the held-out run says stop,
+    trainN    the same for N iterations of one starting point (train20), so that every size does the same per sample,
     diagnose  `diagnose_files` with its defaults (search on 240 windows, tests and fit on 1000) and six candidates.
 
 Processor time (user and system) is what grows; wall-clock time is printed beside it. Peak memory is the process's own
@@ -23,7 +26,9 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -89,7 +94,15 @@ def measure(what: str, path: Path, workers: int) -> dict[str, float]:
     model = auvnn.load("rov90", actuation="wrench")
     begin, cpu = time.perf_counter(), _cpu()
     windows = 0
-    if what == "diagnose":
+    if what.startswith("train"):
+        vehicle = replace(model.vehicle, linear_damping=None, quadratic_damping=None)
+        scheme: dict[str, Any] = {"scheme": "levenberg_marquardt"}
+        if what != "train":
+            count = int(what.removeprefix("train"))
+            scheme |= {"max_iterations": count, "restarts": 1, "tolerance": 0.0, "patience": 1000}
+        trained = auvnn.train_files(auvnn.GreyBox(vehicle, actuation="wrench"), path, scheme, workers=workers)
+        windows = trained.metrics["iterations"]
+    elif what == "diagnose":
         found = auvnn.diagnose_files(model, path, CANDIDATES, max_effects=1, advice=False, workers=workers)
         assert found.whole_log is not None
         windows = found.whole_log["looked_at"]
@@ -133,7 +146,7 @@ def main(arguments: list[str]) -> None:
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(options.get("folder", scratch))
         folder.mkdir(parents=True, exist_ok=True)
-        print("| what | samples | windows | processor, s | wall, s | peak memory, MB | slope |")
+        print("| what | samples | windows or iterations | processor, s | wall, s | peak memory, MB | slope |")
         print("|---|---|---|---|---|---|---|")
         before: dict[str, tuple[int, float]] = {}
         for size in sizes:

@@ -93,3 +93,25 @@ def test_a_cluster_of_two_goes_on_without_one(name, tmp_path, monkeypatch):
             list(cluster.run(refusing, None, [0, 1, 2, 3]))
     assert (tmp_path / "mark").exists()
     assert found == [1.0 / (1 + k) for k in range(8)]
+
+
+LATE = """
+import pathlib, sys, time
+mark = pathlib.Path({mark!r})
+if any("dashboard/agent.py" in word for word in sys.orig_argv) and not mark.exists():
+    mark.write_text("")
+    time.sleep(25)
+"""
+
+
+@pytest.mark.long
+def test_a_ray_node_that_does_not_come_up_in_time_is_tried_again(tmp_path, monkeypatch):
+    """Ray waits 15 s for its agent: the first one here sleeps longer, as it would on a machine that is busy."""
+    pytest.importorskip("ray")
+    mark = tmp_path / "late"
+    (tmp_path / "sitecustomize.py").write_text(LATE.format(mark=str(mark)))
+    here = str(Path(__file__).parent)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), here, *sys.path]))
+    with executor_for("ray", 2) as cluster:
+        assert [value for value, _ in cluster.run(power, 2.0, [1, 2, 3])] == [2.0, 4.0, 8.0]
+    assert mark.exists()

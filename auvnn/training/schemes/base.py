@@ -6,33 +6,13 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import torch
 from torch import Tensor
 
 from auvnn.damping.bank import DampingBank
 from auvnn.errors import ConfigError
-from auvnn.training.problem import DampingProblem
+from auvnn.training.samples import Samples, Sums
 
-
-@dataclass(frozen=True)
-class Samples:
-    """A problem in the bank's scaled numbers, (N, 6) each."""
-
-    nu: Tensor
-    target: Tensor
-    weight: Tensor
-
-    @classmethod
-    def scaled(cls, problem: DampingProblem, bank: DampingBank) -> Samples:
-        """Divide a problem by the bank's scales."""
-        inputs, outputs = bank.input_scale.cpu().double(), bank.output_scale.cpu().double()
-        return cls(problem.nu / inputs, problem.target / outputs, problem.weights)
-
-    def rows(self, axes: tuple[int, ...]) -> tuple[Tensor, Tensor | None]:
-        """Return targets and weights (m, N) of some axes; weights None where all samples count the same."""
-        weight = self.weight.T[list(axes)].contiguous()
-        same = bool((weight == weight[:, :1]).all()) and bool((weight > 0).all())
-        return self.target.T[list(axes)].contiguous(), None if same else weight
+__all__ = ["Samples", "Scheme", "State", "Sums", "Task", "positive", "relative_errors", "whole"]
 
 
 @dataclass(frozen=True)
@@ -49,8 +29,8 @@ class Task:
     """
 
     bank: DampingBank
-    train: Samples
-    held_out: Samples | None
+    train: Sums
+    held_out: Sums | None
     spread: Tensor
     seed: int
     warm: bool
@@ -60,9 +40,14 @@ State = tuple[dict[str, Tensor], dict[str, Any]]
 
 
 class Scheme:
-    """A way to find the parameters of a bank, one iteration at a time."""
+    """A way to find the parameters of a bank, one iteration at a time.
+
+    A scheme that asks of its samples sums alone, by the methods of `Samples`, says so by `parted`: it can then fit
+    logs larger than the memory, and many files.
+    """
 
     name: ClassVar[str]
+    parted: ClassVar[bool] = False
     warnings: list[str]
 
     def options(self) -> dict[str, Any]:
@@ -98,14 +83,10 @@ class Scheme:
         raise TypeError(f"training scheme '{type(self).__name__}' gives no answer")
 
 
-def relative_errors(bank: DampingBank, samples: Samples, spread: Tensor) -> Tensor:
+def relative_errors(bank: DampingBank, samples: Sums, spread: Tensor) -> Tensor:
     """Return the weighted root-mean-square error of the bank divided by the spread, (6,) float64."""
-    like = bank.input_scale
-    with torch.no_grad():
-        scaled = bank(samples.nu.to(like) * bank.input_scale) / bank.output_scale
-    residual = scaled.cpu().double() - samples.target
-    mean = (samples.weight * residual.square()).sum(0) / samples.weight.sum(0).clamp_min(1e-300)
-    return mean.sqrt() / spread
+    square, weight = samples.error_sums(bank)
+    return (square / weight.clamp_min(1e-300)).sqrt() / spread
 
 
 def whole(value: Any, what: str, *, least: int = 1) -> int:

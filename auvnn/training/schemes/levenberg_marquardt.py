@@ -12,11 +12,11 @@ from auvnn.damping.base import AXES, DampingForm
 from auvnn.damping.mlp import MLP
 from auvnn.damping.polynomial import Polynomial
 from auvnn.errors import ConfigError
-from auvnn.training.forms import FormProblems, pack, unpack
+from auvnn.training.forms import pack, unpack
 from auvnn.training.least_squares import REASONS, LeastSquares, Rules
-from auvnn.training.linear import solve_polynomial
-from auvnn.training.networks import NetworkProblems, Problems
-from auvnn.training.schemes.base import Samples, Scheme, State, Task, positive, relative_errors, whole
+from auvnn.training.linear import solve_triangles
+from auvnn.training.networks import Problems
+from auvnn.training.schemes.base import Scheme, State, Sums, Task, positive, relative_errors, whole
 
 MOST_HIDDEN = 200
 
@@ -40,6 +40,7 @@ class LevenbergMarquardt(Scheme):
     """
 
     name = "levenberg_marquardt"
+    parted = True
 
     def __init__(
         self,
@@ -80,8 +81,7 @@ class LevenbergMarquardt(Scheme):
             if not list(form.parameters()):
                 continue
             if type(form) is Polynomial:
-                targets, weights = task.train.rows(form.axes)
-                theta, doubts = solve_polynomial(form, task.train.nu, targets, weights)
+                theta, doubts = solve_triangles(form, task.train.triangles(form))
                 unpack(form, theta)
                 self.warnings += doubts
                 continue
@@ -155,16 +155,13 @@ class LevenbergMarquardt(Scheme):
         return self.task.bank
 
 
-def _problems(form: DampingForm, samples: Samples) -> Problems:
-    targets, weights = samples.rows(form.axes)
-    if type(form) is not MLP:
-        return FormProblems(form, samples.nu, targets, weights)
-    if form.hidden > MOST_HIDDEN:
+def _problems(form: DampingForm, samples: Sums) -> Problems:
+    if type(form) is MLP and form.hidden > MOST_HIDDEN:
         raise ConfigError(
             f"levenberg_marquardt takes networks of up to {MOST_HIDDEN} hidden units, not {form.hidden}: "
             "use scheme=adam, or fewer"
         )
-    return NetworkProblems(form.features(samples.nu), targets, weights, form.hidden, form.zero_at_rest)
+    return samples.problems(form)
 
 
 def _inner(form: DampingForm) -> Tensor:
