@@ -9,29 +9,10 @@ from auvnn.cli.folder import WORK
 from auvnn.cli.job import Answering, Job, Verb
 
 TAKEN = (
-    "effects",
-    "sizes",
-    "noises",
-    "excitations",
-    "vehicles",
-    "coefficients",
-    "repeats",
-    "seed",
-    "runs",
-    "duration",
-    "rate",
-    "workers",
-    "plants",
-    "accelerations",
-    "loops",
-    "pairs",
-    "triples",
-    "strangers",
-    "held_out",
-    "ties",
-    "candidates",
-    "only",
-)
+    "effects", "sizes", "noises", "excitations", "vehicles", "coefficients", "repeats", "seed", "runs", "duration",
+    "rate", "workers", "plants", "accelerations", "loops", "pairs", "triples", "strangers", "held_out", "ties",
+    "candidates", "only",
+)  # fmt: skip
 JOURNAL = "rows.jsonl"
 
 
