@@ -5,9 +5,9 @@ effect, moved by x, and the coefficients, moved by y within what is stated of th
 
     distance^2 = min over x, y of |S_h d - S_r x - S_n y|^2 + y' P y,
 
-every output in units of its noise, the initial state of each window free, and x within its bounds. Below two standard
-errors nobody can tell the two apart by this log, and a diagnosis that says so is right. A coefficient group that is
-hidden may, in the other explanation, still be off by what was stated of it.
+every output in units of its noise, the initial state of each window free, and x within its bounds. Below 3.3 standard
+errors nobody can tell the two apart by this log with 95 % confidence (`counting.TIED`), and a diagnosis that says so is
+right. A coefficient group that is hidden may, in the other explanation, still be off by what was stated of it.
 """
 
 from __future__ import annotations

@@ -52,6 +52,7 @@ RATES: dict[str, Callable[[Sequence[Row]], list[bool]]] = {
     "named_alone": _of(("effect",), counting.named_alone),
     "named_or_in_group": _of(("effect",), counting.in_group),
     "named_or_tied": _of(("effect",), counting.named_or_tied),
+    "named_or_tied_at_2": _of(("effect",), lambda row: counting.named_or_tied(row, counting.STRICT)),
     "all_named": _of(("several",), counting.all_named),
     "several_named_alone": _of(("several",), counting.named_alone),
     "adequate_with_nothing": _of(("nothing",), counting.right_verdict),
