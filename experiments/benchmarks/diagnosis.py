@@ -3,7 +3,7 @@
     python experiments/benchmarks/diagnosis.py [OUT.json] [minutes=10] [rate=20] [threads=0] [repeats=3]
 
 The log is of `rov95` under the multisine with realistic noise, in four runs, with nothing hidden or with a current. Wall
-clock and processor seconds are those of the call of `diagnose`, memory is the process's largest, imports and log included.
+clock and processor seconds are those of the call of `diagnose`, memory is the process's largest, imports and log in it.
 The peer is one fit of pysindy with a bootstrap ensemble of 100 (STLSQ, polynomials to second order in velocity,
 commanded wrench and direction of the vertical) to the residual accelerations of the same log; it gives no names.
 `threads=0` is one for each core.
