@@ -132,6 +132,9 @@ class Search:
             global_p = min(global_p, self.left.p_value)
         if self.nearest:
             current = first
+        # What was tried alone at first has other values beside what was found since.
+        for explanation in (*self.rivals, current):
+            fill(self.layout, table, explanation, first)
         return self._answer(model, log, first, current, steps, table, similar, global_p)
 
     def _settled(

@@ -67,6 +67,18 @@ def test_a_withdrawn_effect_is_told_and_not_counted_as_missing(model, two, monke
     assert not any(line.startswith(f"Missing: {plain.missing[0]}") for line in found.story)
 
 
+def test_the_values_told_are_those_of_the_fit_with_all_that_was_found(model, two):
+    found = diagnose(model, two, NAMES)
+    assert [s["verdict"] for s in found.steps][:2] == ["named", "named"], "one after the other, or this says nothing"
+    told = {c["effect"]: c["parameters"] for c in found.candidates}
+    final = found.explanation.fitted.model
+    for name in NAMES:
+        for p, value in final.effect(name).values().items():
+            assert told[name][p]["value"] == pytest.approx(value, rel=1e-12)
+    for name, p, truth in (("net_buoyancy", "force", 6.0), ("constant_force", "Y", 5.0)):
+        assert abs(told[name][p]["value"] - truth) < 4 * told[name][p]["std"] < 0.5
+
+
 def test_two_effects_that_do_as_badly_alone_are_named_together(model, two, monkeypatch):
     """As if neither were ahead of the other; alone they leave what both together explain."""
     monkeypatch.setattr(Chooser, "_told_apart", lambda self, best, other: False)
