@@ -64,9 +64,7 @@ def _dispatch(verb: str, rest: list[str]) -> int:
 
 
 def _prepare() -> None:
-    """Let SIGTERM end a run as Ctrl-C does, let no character be unprintable, and keep threads and libraries quiet."""
-    # Threads that wait by spinning cost a machine that others use many times what they gain; torch is not there yet.
-    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    """Let SIGTERM end a run as Ctrl-C does, let no character be unprintable, and keep libraries quiet."""
 
     def end(_signal: int, _frame: Any) -> None:
         raise Terminated
