@@ -96,6 +96,22 @@ def test_a_name_that_explains_a_part_is_the_nearest_and_not_the_cause(model):
     assert not any(line.startswith("Missing") for line in tell(found))
 
 
+@pytest.mark.parametrize(("p_value", "verdict"), [(0.005, "unknown"), (0.02, "named")])
+def test_a_name_is_refuted_on_weaker_grounds_than_adequacy(model, monkeypatch, p_value, verdict):
+    """As if half of the force were left after the name, with a p-value between the two levels, or above both."""
+    log = make_log(model.with_effects({"net_buoyancy": {"force": 6.0}}), runs=2, duration=12.0, noise=1.0)
+    p_values = np.array([p_value / 6, *np.ones(5)])
+
+    def half_left(explanation, windows, sigma):
+        energy = 1.0 if explanation.effects else 2.0
+        return Unnamed(np.zeros(6), p_values, np.array([energy, 0, 0, 0, 0, 0]), {"X": 1.0})
+
+    monkeypatch.setattr("auvnn.diagnosis.search.any_force", half_left)
+    found = diagnose(model, log, ["net_buoyancy"], advice=False, whiteness=False)
+    assert (found.verdict, found.unexplained) == (verdict, pytest.approx(0.5))
+    assert found.nearest == (["net_buoyancy"] if verdict == "unknown" else [])
+
+
 def test_a_withdrawn_name_is_not_among_the_nearest(model, monkeypatch):
     """A name that was taken first and withdrawn does not stand, whatever is left."""
     truth = pushed(model, 12.0).with_effects({"constant_force": {"X": 8.0}, "net_buoyancy": {"force": 6.0}})

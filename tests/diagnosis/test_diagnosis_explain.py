@@ -104,6 +104,24 @@ def test_what_one_run_or_one_window_alone_says_of_an_effect_counts(world, heard)
         assert by_run[heard].sum() < 0.2 * by_stretch[heard].sum()
 
 
+def test_a_window_that_alone_knows_a_parameter_is_not_foreseen_from_hearsay(world):
+    """Elsewhere the effect leaves a fiftieth of its trace: what is fitted to that is noise, several times its size."""
+    column = int(world.layout.columns["net_buoyancy"][0])
+    jacobian = world.jacobian.copy()
+    jacobian[..., column] *= 0.02
+    jacobian[50, :, column] = world.jacobian[50, :, column] * np.sqrt(60)
+    here, size = World(world.layout, jacobian, world.run), float(scales(world.layout, "net_buoyancy")[0])
+    without, plain, kept = 0.0, 0.0, 0.0
+    for seed in range(8):
+        errors = drawn(here, seed, net_buoyancy=size)
+        after = judged(here, errors, ["net_buoyancy"])
+        without += judged(here, errors, []).left_out[50]
+        kept += after.left_out[50]
+        plain += left_out(after.fitted.statistics, after.fitted.theta, after.fitted.priors, here.run)[50]
+    assert plain > 3 * without, "or these logs say nothing"
+    assert kept < 1.5 * without
+
+
 def test_nothing_to_fit_leaves_the_error_as_it_is(world):
     sums = world.statistics(drawn(world, 1)).columns([])
     empty = priors(world.layout, [])
