@@ -189,6 +189,15 @@ class Chooser:
                 )
         return taken, gone
 
+    def without(self, taken: Explanation, base: Sequence[str], names: Sequence[str]) -> Explanation:
+        """Return the explanation refitted without some of its effects."""
+        model = taken.fitted.model.rebuilt(taken.fitted.model.copied_effects())
+        for name in names:
+            set_parameters(model, [name], self.layout.means[name])
+        left = tuple(e for e in taken.effects if e not in names)
+        guess = replace(self.layout, model=model)
+        return explain(self.layout, self.windows, base, left, start=taken.fitted, guess=guess)
+
     def _told_apart(self, best: Explanation, other: Explanation) -> bool:
         """Whether the log decides between two explanations.
 

@@ -10,7 +10,7 @@ the correction here is Bonferroni's, which holds whatever the dependence.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,8 @@ from auvnn.training.prediction_error import Statistics, answers, reduce, set_par
 from auvnn.training.replay import Replayed
 
 Array = NDArray[np.float64]
+# Of an effect that is looked at more closely, starts around which that is done at a time: this bounds the memory.
+NEARER = 2
 
 
 def start_at(layout: Layout, windows: Windows, found: Explanation, base: Sequence[str], name: str) -> Layout:
@@ -171,10 +173,12 @@ class Probed:
     Attributes:
         layout: to be differentiated.
         starts: effect to its stand-ins' names and shapes.
+        counts: effect to the number of shapes from which the best was chosen, where that is not that of `starts`.
     """
 
     layout: Layout
     starts: dict[str, dict[str, dict[str, float]]]
+    counts: dict[str, int] = field(default_factory=dict)
 
     def score(
         self, statistics: Statistics, base: Sequence[str], name: str, free: Sequence[str]
@@ -212,13 +216,63 @@ class Probed:
         estimate[live], std[live] = best.estimate, best.std
         if not seen:
             return replace(best, effect=name, estimate=estimate, std=std)
-        p_value = min(1.0, len(seen) * min(s.p_value for s in seen))
-        evidence = float(logsumexp([s.evidence for s in seen]) - np.log(len(seen)))
+        count = self.counts.get(name, len(seen))
+        p_value = min(1.0, count * min(s.p_value for s in seen))
+        evidence = float(logsumexp([s.evidence for s in seen]) - np.log(count))
         return replace(best, effect=name, p_value=p_value, evidence=evidence, estimate=estimate, std=std)
 
 
-def probed(layout: Layout, names: Sequence[str], extent: Extent) -> Probed:
-    """Put stand-ins in the place of those of the named effects whose shape has to be asked for."""
+def nearer(layout: Layout, base: Sequence[str], name: str, extent: Extent) -> list[Probed]:
+    """Return the closer looks at an effect, each around some of its starts; an empty list where it has none.
+
+    Around all of them: which of the starts is best says little while what lies between them is what counts.
+
+    Args:
+        layout: at a fit.
+        base: effects that are free beside it; all others are left out.
+        name: the effect.
+        extent: of the log.
+    """
+    described = layout.model.effect(name).parameters_of
+    kind = effect_class(name)
+    closer = [kind.closer(described, extent, shape) for shape in kind.starts(described, extent)]
+    kept = [e for e in layout.model.copied_effects() if str(e.name) in (*base, name)]
+    at = narrowed(layout, layout.model.rebuilt(kept))
+    whole = {name: sum(map(len, closer))}
+    groups = [[s for some in closer[k : k + NEARER] for s in some] for k in range(0, len(closer), NEARER)]
+    return [replace(probed(at, [name], extent, {name: g}), counts=whole) for g in groups if g]
+
+
+def narrowed(layout: Layout, model: GreyBox) -> Layout:
+    """Return the layout of a model with some of the effects."""
+    columns, at = {}, 0
+    for effect in model.members:
+        columns[str(effect.name)] = np.arange(at, at + len(effect.parameters_of))
+        at += len(effect.parameters_of)
+    return replace(
+        layout,
+        model=model,
+        names=tuple(columns),
+        columns=columns,
+        nuisance=tuple(n for n in layout.nuisance if n in columns),
+        means={n: layout.means[n] for n in columns},
+    )
+
+
+def probed(
+    layout: Layout,
+    names: Sequence[str],
+    extent: Extent,
+    shapes_of: Mapping[str, list[dict[str, float]]] | None = None,
+) -> Probed:
+    """Put stand-ins in the place of those of the named effects whose shape has to be asked for.
+
+    Args:
+        layout: at a fit.
+        names: effects that are asked for.
+        extent: of the log.
+        shapes_of: effect to the shapes to ask for; the effect's own starts by default.
+    """
     model = layout.model
     starts: dict[str, dict[str, dict[str, float]]] = {}
     effects: list[Effect] = []
@@ -233,7 +287,7 @@ def probed(layout: Layout, names: Sequence[str], extent: Extent) -> Probed:
             at += len(described)
             continue
         kind = effect_class(name)
-        shapes = kind.starts(described, extent)
+        shapes = (shapes_of or {}).get(name) or kind.starts(described, extent)
         effects.append(StandIns(kind, model, shapes, name))
         size = sum(not p.shape for p in described)
         starts[name] = {f"{name}@{k}": shape for k, shape in enumerate(shapes)}

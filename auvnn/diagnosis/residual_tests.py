@@ -119,7 +119,8 @@ def residual_tests(explanation: Explanation, windows: Windows, draws: int = DRAW
         part = windows.pick(some_of_them)
         answer = respond(fitted.model, part, fitted.initial[some_of_them], (), ran=ran.pick(some_of_them))
         mask = part.mask * (weight > 0)
-        state = (answer.state * weight[:, None]).reshape(len(part), length * 18, 12)
+        state = torch.nn.functional.pad(answer.state, (0, 0, 0, 18 - answer.state.shape[-2]))
+        state = (state * weight[:, None]).reshape(len(part), length * 18, 12)
         q = torch.linalg.qr(torch.cat([state, loose.expand(len(part), 12, 12)], dim=1))[0][:, :-12]
         tau = wrench[begin : begin + CHUNK]
         measured.add((answer.error * weight).unsqueeze(-1), q, mask, tau)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from auvnn.diagnosis.advise import advise
 from auvnn.diagnosis.answer import Diagnosis
@@ -15,11 +16,12 @@ from auvnn.diagnosis.any_force import Unnamed, any_force, white
 from auvnn.diagnosis.choose import ALPHA, Chooser
 from auvnn.diagnosis.cut import HORIZON, WARMUP
 from auvnn.diagnosis.explain import Explanation, explain
+from auvnn.diagnosis.input_test import input_force
 from auvnn.diagnosis.left_over import slow
 from auvnn.diagnosis.nuisance import Layout, stated
-from auvnn.diagnosis.probes import Probed, extent_of, probed
+from auvnn.diagnosis.probes import Probed, extent_of, nearer, probed
 from auvnn.diagnosis.residual_tests import residual_tests
-from auvnn.diagnosis.score import similarity
+from auvnn.diagnosis.score import Score, similarity
 from auvnn.diagnosis.table import fill, tabulate
 from auvnn.diagnosis.unknown import depends_on
 from auvnn.logs import Log
@@ -98,6 +100,7 @@ class Search:
             base = [*self.base, *[c for c in chosen if c not in self.base]]
             asked_at = {n: asked.score(sums, base, n, chosen) for n in remaining}
             scores = {n: found for n, (found, _) in asked_at.items()}
+            scores |= self._closer(current, at, base, chosen, scores)
             p_value = together([s.p_value for s in scores.values() if s.degrees])
             if not table:
                 global_p = p_value
@@ -127,7 +130,8 @@ class Search:
                 withdrawn += gone
                 steps.append({"verdict": "withdrawn", "effects": gone, "p_value": p_value})
             chosen = list(current.effects)
-        steps = self._settled(steps, first, self.rivals[0] if self.rivals else current)
+        steps, last = self._settled(steps, first, self.rivals[0] if self.rivals else current)
+        current = current if self.rivals else last
         if self.left is not None:
             global_p = min(global_p, self.left.p_value)
         if self.nearest:
@@ -137,13 +141,58 @@ class Search:
             fill(self.layout, table, explanation, first)
         return self._answer(model, log, first, current, steps, table, similar, global_p)
 
+    def _closer(
+        self,
+        current: Explanation,
+        at: Layout,
+        base: list[str],
+        chosen: list[str],
+        scores: dict[str, Score],
+    ) -> dict[str, Score]:
+        """Return the scores of effects that were looked at more closely, by name.
+
+        An effect of many shapes is looked at at a few. Where one of them takes away more of the errors than any other
+        effect does, or than chance does where no effect is significant, what the shapes in between would take is worth
+        knowing: the errors that a wrong shape leaves count as noise in its test, and may hide it.
+        """
+        # A stated coefficient that is set free takes what was stated of it away too: its gain is another matter.
+        told = {n: s for n, s in scores.items() if s.degrees and n not in self.layout.nuisance}
+        if not told:
+            return {}
+        name = max(told, key=lambda n: told[n].gain - told[n].degrees)
+        nothing = len(told) * min(s.p_value for s in told.values()) >= ALPHA
+        found: dict[str, Score] = {}
+        for n in told if nothing else [name]:
+            promised = chi2.sf(told[n].gain, told[n].degrees)
+            asked = nearer(at, base, n, self.extent) if promised * len(told) < ALPHA else []
+            if not asked:
+                continue
+            self.say(f"looking at {n} more closely")
+            looks = [self._seen(current, each, base, n, chosen) for each in asked]
+            best = max(looks, key=lambda s: s.gain - s.degrees)
+            p_value = min(s.p_value for s in looks)
+            if p_value < told[n].p_value:
+                found[n] = replace(best, p_value=p_value)
+        return found
+
+    def _seen(
+        self, current: Explanation, asked: Probed, base: list[str], name: str, chosen: list[str]
+    ) -> Score:
+        """Return an effect's score at the best of some shapes."""
+        model = asked.layout.model
+        answered = answers(model, self.windows, current.fitted.initial, model.effect_names)
+        sums, _, _ = reduce(self.windows, answered, current.fitted.sigma)
+        return asked.score(sums, base, name, chosen)[0]
+
     def _settled(
         self, steps: list[dict[str, Any]], first: Explanation, last: Explanation
-    ) -> list[dict[str, Any]]:
-        """Return the steps as they stand once what nobody has named has been asked for.
+    ) -> tuple[list[dict[str, Any]], Explanation]:
+        """Return the steps as they stand once what nobody has named has been asked for, and the fit that they leave.
 
         Nothing is adequate, and no name the whole cause, while a force is left that is beyond doubt. Where the names
-        that were given leave much of it, they were the nearest that the catalogue has, and are not given as names.
+        that were given leave much of it, or none of them is needed beside the force of a measured input that is left,
+        they were the nearest that the catalogue has, and are not given as names. One of several that is not needed
+        beside that force is withdrawn.
 
         Args:
             steps: the search's.
@@ -156,19 +205,36 @@ class Search:
         # What was withdrawn is none of the names that stand.
         standing = {*last.effects, *(e for rival in self.rivals for e in rival.effects)}
         given = [e for s in steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"] if e in standing]
-        if given:
-            self.unexplained = left.left_of(any_force(first, self.windows, noise))
-        if given and self.unexplained > PARTIAL and left.p_value < ALPHA_LEFT:
-            own = white(first, self.floor)
-            self.left, self.nearest, self.rivals = any_force(first, self.windows, own), given, []
-            return [{"verdict": "unknown", "effects": [], "p_value": steps[0]["p_value"]}]
-        if left.p_value >= ALPHA_UNKNOWN:
-            return steps
-        self.left = left
+        if not given:
+            return (steps, last) if left.p_value >= ALPHA_UNKNOWN else (self._left(steps, left), last)
+        own = [e for e in given if e in last.effects]
+        self.unexplained = left.left_of(any_force(first, self.windows, noise))
+        self.say("asking whether a force of what is measured is left")
+        traced = input_force(last, self.layout, self.windows, noise, own, ALPHA_NEXT)
+        sure = traced.p_value < ALPHA_LEFT
+        needless = list(traced.needless) if sure else []
+        much = self.unexplained > PARTIAL and min(left.p_value, traced.p_value) < ALPHA_LEFT
+        if much or (own and len(needless) == len(own)):
+            noise = white(first, self.floor)
+            self.left, self.nearest, self.rivals = any_force(first, self.windows, noise), given, []
+            return [{"verdict": "unknown", "effects": [], "p_value": steps[0]["p_value"]}], last
+        p_value = min(left.p_value, traced.p_value)
+        if needless and not self.rivals:
+            last = self.chooser.without(last, self.base, needless)
+            gone = {"verdict": "withdrawn", "effects": needless, "p_value": traced.p_value}
+            return self._left([*steps[:-1], gone, steps[-1]], left, p_value), last
+        if p_value >= ALPHA_UNKNOWN:
+            return steps, last
+        return self._left(steps, left, p_value), last
+
+    def _left(
+        self, steps: list[dict[str, Any]], left: Unnamed, p_value: float | None = None
+    ) -> list[dict[str, Any]]:
+        """Return the steps with a last one that says that a force is left."""
+        self.left, p_value = left, left.p_value if p_value is None else p_value
         if steps[-1]["verdict"] == "ambiguous":
-            return [*steps, {"verdict": "unknown", "effects": [], "p_value": left.p_value}]
-        p_value = min(steps[-1]["p_value"], left.p_value)
-        return [*steps[:-1], {**steps[-1], "verdict": "unknown", "p_value": p_value}]
+            return [*steps, {"verdict": "unknown", "effects": [], "p_value": p_value}]
+        return [*steps[:-1], {**steps[-1], "verdict": "unknown", "p_value": min(steps[-1]["p_value"], p_value)}]
 
     def _rest(self, current: Explanation) -> str:
         """Return the verdict where no effect is asked for any more."""

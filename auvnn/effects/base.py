@@ -267,6 +267,17 @@ class Effect(nn.Module):
         """
         return [{}]
 
+    @classmethod
+    def closer(
+        cls, parameters: tuple[Parameter, ...], extent: Extent, start: dict[str, float]
+    ) -> list[dict[str, float]]:
+        """Return further starts near the best one, where an effect has more shapes than can always be asked for.
+
+        They are asked for where the best start promises much or nothing else does; an empty list, the default, says
+        that there are none.
+        """
+        return []
+
     def value(self, name: str) -> Tensor:
         """Return one parameter as a scalar tensor."""
         return self.theta[self._index[name]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import torch
@@ -49,6 +50,17 @@ class Payload(Effect):
     def starts(cls, parameters: tuple[Parameter, ...], extent: Extent) -> list[dict[str, float]]:
         """Return eight times, evenly over the log."""
         return [{"time": extent.begin + (k + 0.5) / 8 * extent.duration} for k in range(8)]
+
+    @classmethod
+    def closer(
+        cls, parameters: tuple[Parameter, ...], extent: Extent, start: dict[str, float]
+    ) -> list[dict[str, float]]:
+        """Return eight places at the time found: what a load turns shows more than what it lifts."""
+        half = {p.name: 0.5 * p.scale for p in parameters if p.name in PLACES}
+        corners = itertools.product((-1.0, 1.0), repeat=3)
+        return [
+            {**start, **{n: sign * half[n] for n, sign in zip(PLACES, signs, strict=True)}} for signs in corners
+        ]
 
     def settle(self, vehicle: Any, actuation: str) -> None:
         """Keep gravity and the duration of the grasp."""

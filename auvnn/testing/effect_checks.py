@@ -62,12 +62,18 @@ def describes_itself(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "t
         require(all(p.low <= x <= p.high for x in p.probes), f"{where}: a probe is out of bounds")
     require(not all(p.shape for p in described), f"{name}: every parameter is a shape, none says how much")
     shapes = {p.name for p in described if p.shape}
-    for start in kind.starts(described, Extent(0.0, 60.0, 60.0, (3.0, 8.0))):
+    for start in _all_starts(kind, described, Extent(0.0, 60.0, 60.0, (3.0, 8.0))):
         require(set(start) <= shapes, f"{name}: starts name {sorted(start)}, shapes are {sorted(shapes)}")
     built = kind.build(vehicle, actuation)
     require(built.values() == {p.name: p.null for p in described}, f"{name} does not start at its null")
     values = typical_values(kind, vehicle, actuation)
     require(kind.build(vehicle, actuation, values).values() == values, f"{name} does not keep its values")
+
+
+def _all_starts(kind: Kind, described: tuple[Any, ...], extent: Extent) -> list[dict[str, float]]:
+    """Return an effect's starts, a closer one than the first before the others where there are such."""
+    starts = kind.starts(described, extent)
+    return [*kind.closer(described, extent, starts[0])[:1], *starts]
 
 
 def refuses(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
@@ -98,7 +104,7 @@ def vanishes(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters
     scene = make_scene(vehicle, actuation)
     plain = Predictor(GreyBox(vehicle, actuation=actuation))
     described = kind.describe(vehicle, actuation)
-    shapes = [{}, *kind.starts(described, Extent(0.0, 1.0, 1.0, (3.0, 5.0)))[:4]]
+    shapes = [{}, *_all_starts(kind, described, Extent(0.0, 1.0, 1.0, (3.0, 5.0)))[:5]]
     shapes.append({p.name: v for p in described if p.shape for v in (p.probes or (p.null + 0.3 * p.scale,))})
     with torch.no_grad():
         expected = plain(scene)

@@ -234,11 +234,13 @@ def reduce(windows: Windows, responses: Iterable[Response], sigma: Array) -> tup
     weight = _weights(sigma)
     loose = torch.diag(torch.as_tensor(1.0 / LOOSE))
     # Channels that were not measured would only be multiplied by nought.
-    live = torch.nonzero(weight).flatten().tolist()
+    weighed = torch.nonzero(weight).flatten().tolist()
     parts: list[list[Array]] = []
     begin, hessian = 0, np.zeros((len(windows), 0, 0))
     for answer in responses:
-        count, length, _, size = answer.parameters.shape
+        count, length, told, size = answer.parameters.shape
+        # Nor does a channel count that nobody measured, whatever noise it would have had.
+        live = [k for k in weighed if k < told]
         here = slice(begin, begin + count)
         mask = windows.mask[here] * (weight > 0)
         begin += count
@@ -257,7 +259,8 @@ def reduce(windows: Windows, responses: Iterable[Response], sigma: Array) -> tup
         sums = (both.mT @ both).sub_(along.mT @ along)
         hessian[here] = sums[:, 1:, 1:].numpy()
         solved = torch.linalg.solve_triangular(r, along, upper=True)
-        remaining = answer.error - (answer.state @ solved[:, None, :, :1]).squeeze(-1)
+        remaining = answer.error.clone()
+        remaining[..., :told] -= (answer.state @ solved[:, None, :, :1]).squeeze(-1)
         remaining = torch.where(mask > 0, remaining, torch.zeros_like(remaining))
         pair = mask[:, 1:] * mask[:, :-1]
         step = (remaining[:, 1:] - remaining[:, :-1]) * pair

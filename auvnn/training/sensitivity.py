@@ -42,10 +42,13 @@ from auvnn.training.replay import Added, Replayed, given, joined, noted, nought
 class Response:
     """What the windows answer.
 
+    Channels are those of `metrics.windows.CHANNELS`; the C of which there are derivatives are the first 12, or all 18
+    where accelerations were measured: nothing is kept of channels that say nothing.
+
     Attributes:
-        error: measured minus predicted, in the channels of `metrics.windows.CHANNELS`, (B, L, 18).
-        state: change of the prediction with the initial state, (B, L, 18, 12).
-        parameters: change of the prediction with the parameters, (B, L, 18, P).
+        error: measured minus predicted, (B, L, 18).
+        state: change of the prediction with the initial state, (B, L, C, 12).
+        parameters: change of the prediction with the parameters, (B, L, C, P).
     """
 
     error: Tensor
@@ -223,7 +226,7 @@ def respond_by(
         part = slice(begin, begin + size)
         sensitivity = _propagate(along[0][part], along[1][part], points[1][part], points[2][part], steps[part])
         state, parameters = _outputs(seen, part, sensitivity)
-        mask = windows.mask[part].unsqueeze(-1)
+        mask = windows.mask[part, :, : state.shape[-2]].unsqueeze(-1)
         yield Response(ran.error[part], state.mul_(mask), parameters.mul_(mask))
 
 
@@ -430,16 +433,12 @@ def _reports(
 
 
 def _outputs(seen: _Reports, part: slice, sensitivity: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the change of the 18 outputs with initial state, (B, L, 18, 12), and parameters, (B, L, 18, P)."""
+    """Return the change of the first C outputs with initial state, (B, L, C, 12), and parameters, (B, L, C, P)."""
     if seen.state is None:
-        full = torch.nn.functional.pad(sensitivity, (0, 0, 0, 6))
-        return full[..., :12], full[..., 12:]
-    by_state = seen.state[part]
-    full = sensitivity.new_zeros(*sensitivity.shape[:2], 18, sensitivity.shape[-1])
-    outputs = full[:, :, : by_state.shape[-2]]
-    outputs.copy_(by_state @ sensitivity)
+        return sensitivity[..., :12].clone(), sensitivity[..., 12:].contiguous()
+    outputs = seen.state[part] @ sensitivity
     for at, slope in seen.parts:
         outputs[..., at : at + slope.shape[-1]] += slope[part]
     if seen.thrust is not None:
         outputs[..., seen.thrust[0]] += seen.thrust[1][part]
-    return full[..., :12], full[..., 12:]
+    return outputs[..., :12], outputs[..., 12:]

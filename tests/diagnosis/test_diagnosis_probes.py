@@ -7,8 +7,9 @@ import pytest
 import torch
 
 from auvnn.diagnosis.cut import windows_for
+from auvnn.diagnosis.explain import explain
 from auvnn.diagnosis.nuisance import lay_out
-from auvnn.diagnosis.probes import extent_of, probed
+from auvnn.diagnosis.probes import extent_of, nearer, probed
 from auvnn.diagnosis.score import score
 from auvnn.effects import EFFECTS, Extent
 from auvnn.metrics.free_run import initial_states
@@ -118,3 +119,34 @@ def test_what_is_absent_is_left_out_and_predicts_the_same(model, windows):
     torch.testing.assert_close(a.parameters, b.parameters, rtol=1e-9, atol=1e-11)
     set_parameters(whole, ["velocity_scale"], np.array([1.01]))
     assert "velocity_scale" in whole.without_absent().effect_names
+
+
+def test_a_load_off_the_centre_is_seen_at_the_places_around_it(model):
+    """What it turns is no slope at the centre, and as noise it hid what it lifts; the choice is paid for."""
+    load_ = {"time": 8.0, "mass": 0.0, "x": 0.15, "y": -0.2, "z": 0.0, "buoyancy": -0.6}
+    made = simulate(
+        model, "multisine", "realistic", {"payload": load_}, seed=3, runs=4, duration=20.0, rate=10.0, max_step=0.05
+    )
+    windows, layout = windows_for(model, made.log), lay_out(model, ["payload"])
+    base = list(layout.nuisance)
+    fit = explain(layout, windows, base, ())
+
+    def found(asked):
+        names = asked.layout.model.effect_names
+        sums, _, _ = reduce(windows, answers(asked.layout.model, windows, fit.fitted.initial, names), fit.fitted.sigma)
+        return *asked.score(sums, base, "payload", []), asked, sums
+
+    extent = extent_of(windows)
+    far = found(probed(layout, ["payload"], extent))[0]
+    looks = [found(asked) for asked in nearer(layout, base, "payload", extent)]
+    near, label, asked, sums = max(looks, key=lambda look: look[0].gain)
+    assert near.gain > 2.0 * far.gain and near.evidence > far.evidence + 20.0 and near.p_value < far.p_value
+    names = [p.name for p in layout.model.effect("payload").parameters_of]
+    place = dict(zip(names, near.estimate, strict=True))
+    # Twice the load at half of the arm is the same moment: what counts are the signs. Weight and buoyancy are one.
+    assert 9.81 * place["mass"] - place["buoyancy"] > 0 and place["y"] < 0 < place["x"]
+    assert abs(place["time"] - 8.0) < 1.0
+    # Eight places at each of eight times.
+    assert sum(len(look[2].starts["payload"]) for look in looks) == 64
+    assert near.p_value == pytest.approx(64 * score(sums, asked.layout, base, label, []).p_value)
+    assert nearer(lay_out(model, ["waves"]), [], "waves", extent) == []

@@ -1,0 +1,200 @@
+"""What names leave, asked of every measured input: a force that goes with one refutes a name that stood in for it.
+
+`any_force` assumes nothing of a force's course and pays for that with power. A force that is a function of one measured
+input needs three or four parameters in a degree of freedom, and shows where a name has explained nine tenths of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from auvnn.diagnosis.explain import Explanation
+from auvnn.diagnosis.input_forces import AXES, InputForces
+from auvnn.diagnosis.nuisance import Layout, shapes
+from auvnn.diagnosis.score import inflation
+from auvnn.metrics.windows import Windows
+from auvnn.models import GreyBox
+from auvnn.training.prediction_error import Statistics, answers, reduce
+
+Array = NDArray[np.float64]
+# Directions of a force of which the log says less than this, beside the best known one, are not asked for.
+SEEN = 1e-6
+
+
+@dataclass(frozen=True)
+class InputForce:
+    """The force of one measured input that what is left looks most like.
+
+    Attributes:
+        axis: degree of freedom, "X" to "N".
+        input: name, as `depends_on` has it.
+        p_value: of there being no such force, corrected for all inputs and degrees of freedom; at most one.
+        needless: names that explain nothing beyond chance once this force is in the model.
+    """
+
+    axis: str
+    input: str
+    p_value: float
+    needless: tuple[str, ...]
+
+
+def input_force(
+    explanation: Explanation,
+    layout: Layout,
+    windows: Windows,
+    sigma: Array,
+    names: Sequence[str],
+    alpha: float,
+) -> InputForce:
+    """Ask of every measured input and degree of freedom whether a force of it is left, and who is needed beside it.
+
+    A score test for each (Rao, 1948), with all that was fitted as nuisance and the variance that the windows' own scores
+    show; then, with the force that is most significant in the model, Wald's test for each name.
+
+    Args:
+        explanation: the fit with the names.
+        layout: stated values.
+        windows: those it was fitted to.
+        sigma: (18,) standard deviations of the noise, infinite for channels that do not count; see `any_force.white`.
+        names: effects that were given as names.
+        alpha: significance that a name must reach to be needed.
+    """
+    fitted = explanation.fitted
+    probe = InputForces(fitted.model, windows)
+    known, scale = len(fitted.theta), np.array([p.scale for p in probe.parameters_of])
+    blocks = {(a, n): known + probe.columns(i, n) for i, a in enumerate(AXES) for n in probe.inputs}
+    sums = _Sums(explanation, blocks)
+    for part, statistics in _by_part(explanation, probe, windows, sigma):
+        sums.add(part, statistics)
+    p_values = {key: _tested(sums, key, scale[own - known]) for key, own in blocks.items()}
+    best = min(p_values, key=lambda key: p_values[key])
+    own = blocks[best]
+    needless = tuple(n for n in names if _need(sums, layout, own, scale[own - known], n) > alpha)
+    return InputForce(*best, min(1.0, p_values[best] * len(blocks)), needless)
+
+
+def _by_part(
+    explanation: Explanation, probe: InputForces, windows: Windows, sigma: Array
+) -> Iterator[tuple[Windows, Statistics]]:
+    """Yield some windows at a time and their statistics, what was fitted first and the probe's columns after it."""
+    fitted = explanation.fitted
+    model = fitted.model
+    asked = GreyBox(model.vehicle, [*model.copied_effects(), probe], model.damping, model.actuation)
+    begin = 0
+    for answer in answers(asked, windows, fitted.initial, [*explanation.names, str(probe.name)]):
+        part = windows.pick(slice(begin, begin + len(answer.error)))
+        begin += len(answer.error)
+        yield part, reduce(part, [answer], sigma)[0]
+
+
+class _Sums:
+    """What the tests need of all windows' products; all of every window's would be a hundred times as many.
+
+    Args:
+        explanation: the fit, K parameters of which can move.
+        blocks: columns of each force.
+    """
+
+    def __init__(self, explanation: Explanation, blocks: dict[tuple[str, str], NDArray[np.int64]]) -> None:
+        """Begin with nothing."""
+        self.explanation, self.blocks = explanation, blocks
+        fitted = explanation.fitted
+        self.inside = np.flatnonzero(fitted.priors.inside(fitted.theta))
+        self.precision = fitted.priors.precision[self.inside]
+        self.away = (fitted.theta - fitted.priors.mean)[self.inside]
+        self.total: Array | float = 0.0
+        self._slopes: list[Array] = []
+        self._across: list[Array] = []
+        self._own: dict[tuple[str, str], list[Array]] = {key: [] for key in blocks}
+        self._runs: list[NDArray[np.int64]] = []
+
+    def add(self, part: Windows, statistics: Statistics) -> None:
+        """Take in some windows."""
+        self.total = self.total + statistics.total
+        self._slopes.append(statistics.slope)
+        self._across.append(statistics.hessian[:, self.inside])
+        for key, own in self.blocks.items():
+            self._own[key].append(statistics.hessian[:, own[:, None], own])
+        self._runs.append(statistics.run)
+
+    def products(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> Array:
+        """Return some of J^T J of all windows."""
+        return np.asarray(self.total)[np.ix_(rows, columns)]
+
+    @cached_property
+    def slope(self) -> Array:
+        """J^T e of each window, (W, P)."""
+        return np.concatenate(self._slopes)
+
+    @cached_property
+    def across(self) -> Array:
+        """J^T J of each window between what can move and all, (W, K, P)."""
+        return np.concatenate(self._across)
+
+    @cached_property
+    def run(self) -> NDArray[np.int64]:
+        """Run of each window, (W,)."""
+        return np.concatenate(self._runs)
+
+    def own(self, key: tuple[str, str]) -> Array:
+        """Return J^T J of each window within a force's columns, (W, k, k)."""
+        return np.concatenate(self._own[key])
+
+
+def _tested(sums: _Sums, key: tuple[str, str], scale: Array) -> float:
+    """Return the p-value of one force, what was fitted taking its share first."""
+    own, inside = sums.blocks[key], sums.inside
+    inner = sums.products(inside, inside) + np.diag(sums.precision)
+    carry = np.linalg.lstsq(inner, sums.products(inside, own), rcond=1e-12)[0].T
+    whole = sums.slope.sum(0)
+    gradient = (whole[own] - carry @ (whole[inside] - sums.precision * sums.away)) * scale
+    information = (sums.products(own, own) - carry @ sums.products(inside, own)) * scale[:, None] * scale
+    information = 0.5 * (information + information.T)
+    values, vectors = np.linalg.eigh(information)
+    seen = values > SEEN * max(float(values.max()), 1.0)
+    if not seen.any():
+        return 1.0
+    along = (vectors.T @ gradient)[seen] / values[seen]
+    # A force that shows in few windows makes their scores differ; that is no noise, and is taken out first.
+    step = scale * (vectors[:, seen] @ along)
+    follow = -carry.T @ step
+    across = sums.across
+    moved_own = sums.own(key) @ step + np.einsum("wij,i->wj", across[:, :, own], follow)
+    moved_inside = across[:, :, own] @ step + across[:, :, inside] @ follow
+    by_window = sums.slope[:, own] - moved_own - (sums.slope[:, inside] - moved_inside) @ carry.T
+    degrees = int(seen.sum())
+    factor = inflation(by_window * scale, information, sums.run, 1 + degrees)
+    return float(chi2.sf(float((along**2 * values[seen]).sum()) / factor, degrees))
+
+
+def _need(sums: _Sums, layout: Layout, own: NDArray[np.int64], scale: Array, name: str) -> float:
+    """Return the p-value of a name's parameters being at their null, with a force of some columns in the model."""
+    explanation, inside = sums.explanation, sums.inside
+    before = explanation.names[: explanation.names.index(name)]
+    begin = sum(len(layout.columns[n]) for n in before)
+    live = np.flatnonzero(~shapes(layout, name))
+    wanted, null = begin + live, layout.means[name][live]
+    kept = np.isin(wanted, inside)
+    if not kept.any():
+        return 0.0
+    wanted, null = wanted[kept], null[kept]
+    free = np.concatenate([inside, own])
+    # Of the force as little is assumed as keeps what the log does not see at nought.
+    precision = np.concatenate([sums.precision, 1e-4 * scale**-2.0])
+    inner = sums.products(free, free) + np.diag(precision)
+    unit = 1.0 / np.sqrt(np.maximum(np.diag(inner), 1e-300))
+    covariance = np.linalg.pinv(inner * unit[:, None] * unit, hermitian=True) * unit[:, None] * unit
+    away = np.concatenate([sums.away, np.zeros(len(own))])
+    step = covariance @ (sums.slope.sum(0)[free] - precision * away)
+    at = np.searchsorted(inside, wanted)
+    moved = explanation.fitted.theta[wanted] + step[at] - null
+    spread = covariance[np.ix_(at, at)]
+    size = np.sqrt(np.maximum(np.diag(spread), 1e-300))
+    inverse = np.linalg.pinv(spread / size[:, None] / size, hermitian=True)
+    return float(chi2.sf(float(moved / size @ inverse @ (moved / size)), len(wanted)))
