@@ -21,6 +21,7 @@ from auvnn.diagnosis.score import inflation
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 from auvnn.training.prediction_error import Statistics, answers, reduce
+from auvnn.training.sensitivity import Response
 
 Array = NDArray[np.float64]
 # Directions of a force of which the log says less than this, beside the best known one, are not asked for.
@@ -67,56 +68,68 @@ def input_force(
     """
     fitted = explanation.fitted
     probe = InputForces(fitted.model, windows)
-    known, scale = len(fitted.theta), np.array([p.scale for p in probe.parameters_of])
-    blocks = {(a, n): known + probe.columns(i, n) for i, a in enumerate(AXES) for n in probe.inputs}
-    sums = _Sums(explanation, blocks)
-    for part, statistics in _by_part(explanation, probe, windows, sigma):
-        sums.add(part, statistics)
-    p_values = {key: _tested(sums, key, scale[own - known]) for key, own in blocks.items()}
-    best = min(p_values, key=lambda key: p_values[key])
-    own = blocks[best]
-    needless = tuple(n for n in names if _need(sums, layout, own, scale[own - known], n) > alpha)
-    return InputForce(*best, min(1.0, p_values[best] * len(blocks)), needless)
+    known, per_axis = len(fitted.theta), len(probe.parameters_of) // 6
+    # A degree of freedom has its columns behind those of what was fitted.
+    blocks = {n: known + probe.columns(0, n) for n in probe.inputs}
+    by_axis = [_Sums(explanation, blocks) for _ in AXES]
+    for part in _by_part(explanation, probe, windows, sigma):
+        for sums, statistics in zip(by_axis, part, strict=True):
+            sums.add(statistics)
+    scale = np.array([p.scale for p in probe.parameters_of]).reshape(6, per_axis)
+    p_values = {
+        (i, n): _tested(sums, n, scale[i, own - known])
+        for i, sums in enumerate(by_axis)
+        for n, own in blocks.items()
+    }
+    i, best = min(p_values, key=lambda key: p_values[key])
+    size = scale[i, blocks[best] - known]
+    needless = tuple(n for n in names if _need(by_axis[i], layout, blocks[best], size, n) > alpha)
+    return InputForce(AXES[i], best, min(1.0, p_values[i, best] * len(p_values)), needless)
 
 
 def _by_part(
     explanation: Explanation, probe: InputForces, windows: Windows, sigma: Array
-) -> Iterator[tuple[Windows, Statistics]]:
-    """Yield some windows at a time and their statistics, what was fitted first and the probe's columns after it."""
+) -> Iterator[list[Statistics]]:
+    """Yield for some windows at a time the statistics of each degree of freedom, what was fitted first.
+
+    The products of one degree of freedom's columns with another's are not asked for, and would be most of the work.
+    """
     fitted = explanation.fitted
-    model = fitted.model
+    model, known = fitted.model, len(fitted.theta)
     asked = GreyBox(model.vehicle, [*model.copied_effects(), probe], model.damping, model.actuation)
+    columns = [np.concatenate([np.arange(known), known + probe.columns(i)]) for i in range(6)]
     begin = 0
     for answer in answers(asked, windows, fitted.initial, [*explanation.names, str(probe.name)]):
         part = windows.pick(slice(begin, begin + len(answer.error)))
         begin += len(answer.error)
-        yield part, reduce(part, [answer], sigma)[0]
+        each = [Response(answer.error, answer.state, answer.parameters[..., c]) for c in columns]
+        yield [reduce(part, [one], sigma)[0] for one in each]
 
 
 class _Sums:
-    """What the tests need of all windows' products; all of every window's would be a hundred times as many.
+    """What the tests of one degree of freedom need of all windows' products.
 
     Args:
         explanation: the fit, K parameters of which can move.
-        blocks: columns of each force.
+        blocks: columns of each input's force.
     """
 
-    def __init__(self, explanation: Explanation, blocks: dict[tuple[str, str], NDArray[np.int64]]) -> None:
+    def __init__(self, explanation: Explanation, blocks: dict[str, NDArray[np.int64]]) -> None:
         """Begin with nothing."""
         self.explanation, self.blocks = explanation, blocks
         fitted = explanation.fitted
         self.inside = np.flatnonzero(fitted.priors.inside(fitted.theta))
         self.precision = fitted.priors.precision[self.inside]
         self.away = (fitted.theta - fitted.priors.mean)[self.inside]
-        self.total: Array | float = 0.0
+        self.total = np.zeros((0, 0))
         self._slopes: list[Array] = []
         self._across: list[Array] = []
-        self._own: dict[tuple[str, str], list[Array]] = {key: [] for key in blocks}
+        self._own: dict[str, list[Array]] = {key: [] for key in blocks}
         self._runs: list[NDArray[np.int64]] = []
 
-    def add(self, part: Windows, statistics: Statistics) -> None:
+    def add(self, statistics: Statistics) -> None:
         """Take in some windows."""
-        self.total = self.total + statistics.total
+        self.total = statistics.total + self.total if self.total.size else statistics.total
         self._slopes.append(statistics.slope)
         self._across.append(statistics.hessian[:, self.inside])
         for key, own in self.blocks.items():
@@ -125,7 +138,7 @@ class _Sums:
 
     def products(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> Array:
         """Return some of J^T J of all windows."""
-        return np.asarray(self.total)[np.ix_(rows, columns)]
+        return self.total[np.ix_(rows, columns)]
 
     @cached_property
     def slope(self) -> Array:
@@ -142,12 +155,12 @@ class _Sums:
         """Run of each window, (W,)."""
         return np.concatenate(self._runs)
 
-    def own(self, key: tuple[str, str]) -> Array:
+    def own(self, key: str) -> Array:
         """Return J^T J of each window within a force's columns, (W, k, k)."""
         return np.concatenate(self._own[key])
 
 
-def _tested(sums: _Sums, key: tuple[str, str], scale: Array) -> float:
+def _tested(sums: _Sums, key: str, scale: Array) -> float:
     """Return the p-value of one force, what was fitted taking its share first."""
     own, inside = sums.blocks[key], sums.inside
     inner = sums.products(inside, inside) + np.diag(sums.precision)

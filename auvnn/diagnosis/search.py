@@ -68,6 +68,8 @@ class Search:
         self.unexplained = 1.0
         # The fit of what is uncertain alone, once it has been made.
         self.first: Explanation | None = None
+        # How much the effects that were asked for first look like one another.
+        self.similar: tuple[list[str], Array] = ([], np.eye(0))
 
     def statistics(self, found: Explanation, remaining: list[str]) -> tuple[Statistics, Layout, Probed]:
         """Linearise towards every parameter at a fit, those of the remaining effects at several shapes."""
@@ -91,21 +93,16 @@ class Search:
         # What turned out to have stood in for something else is not asked for again.
         withdrawn: list[str] = []
         table: dict[str, dict[str, Any]] = {}
-        similar: tuple[list[str], Array] = ([], np.eye(0))
         global_p = 1.0
         while True:
             remaining = [n for n in self.usable if n not in chosen and n not in withdrawn]
             self.say(f"testing {len(remaining)} effects at the null")
-            sums, at, asked = self.statistics(current, remaining)
             base = [*self.base, *[c for c in chosen if c not in self.base]]
-            asked_at = {n: asked.score(sums, base, n, chosen) for n in remaining}
-            scores = {n: found for n, (found, _) in asked_at.items()}
-            scores |= self._closer(current, at, base, chosen, scores)
+            scores, at = self._tested(current, remaining, base, chosen)
             p_value = together([s.p_value for s in scores.values() if s.degrees])
             if not table:
                 global_p = p_value
-                similar = (remaining, similarity(sums, asked.layout, base, [k for _, k in asked_at.values()]))
-                table = tabulate(self.layout, scores, current, similar, needs)
+                table = tabulate(self.layout, scores, current, self.similar, needs)
                 self.silent = [n for n in remaining if not scores[n].degrees]
             if p_value >= (ALPHA_NEXT if chosen else ALPHA) or not remaining or len(chosen) >= most:
                 steps.append({"verdict": self._rest(current), "effects": [], "p_value": p_value})
@@ -139,7 +136,22 @@ class Search:
         # What was tried alone at first has other values beside what was found since.
         for explanation in (*self.rivals, current):
             fill(self.layout, table, explanation, first)
-        return self._answer(model, log, first, current, steps, table, similar, global_p)
+        return self._answer(model, log, first, current, steps, table, global_p)
+
+    def _tested(
+        self, current: Explanation, remaining: list[str], base: list[str], chosen: list[str]
+    ) -> tuple[dict[str, Score], Layout]:
+        """Return the tests of the effects that remain, and the layout at the fit.
+
+        The sums over all effects, the largest thing in a diagnosis, are gone when this returns.
+        """
+        sums, at, asked = self.statistics(current, remaining)
+        asked_at = {n: asked.score(sums, base, n, chosen) for n in remaining}
+        scores = {n: found for n, (found, _) in asked_at.items()}
+        if not self.similar[0]:
+            self.similar = (remaining, similarity(sums, asked.layout, base, [k for _, k in asked_at.values()]))
+        del sums
+        return scores | self._closer(current, at, base, chosen, scores), at
 
     def _closer(
         self,
@@ -248,7 +260,6 @@ class Search:
         last: Explanation,
         steps: list[dict[str, Any]],
         table: dict[str, dict[str, Any]],
-        similar: tuple[list[str], Array],
         global_p: float,
     ) -> Diagnosis:
         gone = {e for s in steps if s["verdict"] == "withdrawn" for e in s["effects"]}
@@ -278,7 +289,7 @@ class Search:
                 "bandwidth_hz": None,
             },
             global_p,
-            similar,
+            self.similar,
             last,
             self._tests(first, last),
             acts_in={} if self.left is None else self.left.shares,
