@@ -23,7 +23,8 @@ from auvnn.diagnosis.locate import AXES
 from auvnn.metrics.windows import VELOCITY, Windows
 from auvnn.models import GreyBox
 from auvnn.training.prediction_error import LOOSE
-from auvnn.training.sensitivity import respond, run
+from auvnn.training.ran import run
+from auvnn.training.sensitivity import respond
 
 Array = NDArray[np.float64]
 NAMES = ("u", "v", "w", "p", "q", "r")

@@ -22,7 +22,8 @@ from torch import Tensor
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.training.sensitivity import Response, respond_by, run
+from auvnn.training.ran import run
+from auvnn.training.sensitivity import Response, respond_by
 
 Array = NDArray[np.float64]
 

@@ -17,25 +17,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import torch
-from torch import Tensor, nn
-from torch.func import functional_call, jacrev, vmap
-from torch.utils._pytree import register_pytree_node
+from torch import Tensor
 
-from auvnn.effects import Sensed
-from auvnn.metrics.free_run import MAX_STEP, predict
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox, Inputs
-from auvnn.models.rollout import steps_per_interval
-from auvnn.physics.attitude import (
-    quat_conjugate,
-    quat_multiply,
-    quat_to_matrix,
-    quat_to_rotvec,
-    rotvec_to_quat,
-    skew,
-)
-from auvnn.training.few_inputs import slopes
-from auvnn.training.replay import Added, Replayed, given, joined, noted, nought
+from auvnn.physics.attitude import quat_to_matrix, skew
+from auvnn.training.point_slopes import Point, differentiate
+from auvnn.training.ran import Ran, run
 
 
 @dataclass(frozen=True)
@@ -54,103 +42,6 @@ class Response:
     error: Tensor
     state: Tensor
     parameters: Tensor
-
-
-class _Point(nn.Module):
-    """The acceleration and the sensors' report at one moment, as functions of small changes."""
-
-    def __init__(self, model: GreyBox) -> None:
-        super().__init__()
-        self.model = model
-
-    def forward(
-        self,
-        what: str,
-        position: Tensor,
-        quaternion: Tensor,
-        turn: Tensor,
-        nu: Tensor,
-        thrust: Tensor,
-        time: Tensor,
-        inputs: Inputs,
-    ) -> Tensor:
-        rotation = quat_to_matrix(quaternion)
-        # First order in `turn` is all that a derivative at zero needs.
-        rotation = rotation + rotation @ skew(turn)
-        if what == "rate":
-            return self.model.nu_dot(position, rotation, nu, thrust, inputs, time)
-        rate = None
-        if what == "sense and rate":
-            rate = self.model.nu_dot(position, rotation, nu, thrust, inputs, time)
-        turned = quat_multiply(quaternion, rotvec_to_quat(turn))
-        seen = self.model.sense(Sensed(position, turned, nu, rate))
-        angle = quat_to_rotvec(quat_multiply(quat_conjugate(quaternion), seen.quaternion))
-        parts = [seen.position, angle, seen.nu]
-        return torch.cat(parts if seen.nu_dot is None else [*parts, seen.nu_dot], dim=-1)
-
-
-class _Thrust(nn.Module):
-    """Mean thrust of every interval, and the thrust as it begins, as functions of the effects' parameters."""
-
-    def __init__(self, model: GreyBox) -> None:
-        super().__init__()
-        self.model = model
-
-    def forward(self, windows: Windows, substeps: int) -> tuple[Tensor, Tensor]:
-        model = self.model
-        drive = model.actuators.drive(
-            windows.inputs.command,
-            windows.times,
-            model.before_thrust,
-            substeps,
-            windows.warmup,
-        )
-        mean = torch.stack([sum(parts[1:], parts[0]) / len(parts) for parts in drive.mean], dim=-2)
-        return mean, torch.stack(drive.start, dim=-2)
-
-
-def _flat(inputs: Inputs) -> tuple[Inputs, Inputs]:
-    """Return inputs with (B, L) joined, and the axes over which `vmap` runs."""
-    fields = (inputs.command, inputs.fins, inputs.voltage, inputs.altitude)
-    flat = [None if x is None else x.flatten(0, 1) for x in fields[1:]]
-    joined = Inputs(inputs.command.flatten(0, 1), *flat)
-    return joined, Inputs(*(None if x is None else 0 for x in fields))  # type: ignore[arg-type]
-
-
-def output_error(model: GreyBox, windows: Windows, initial: Tensor) -> Tensor:
-    """Return measured minus predicted outputs, (B, L, 18); zero where nothing was measured."""
-    with torch.no_grad():
-        eta, nu = predict(model, windows, initial)
-        return window_error(model, windows, eta, nu)
-
-
-def window_error(model: GreyBox, windows: Windows, eta: Tensor, nu: Tensor) -> Tensor:
-    """Return measured minus predicted outputs of runs (B, L, 7) and (B, L, 6), (B, L, 18); differentiable."""
-    rate = None
-    if windows.nu_dot is not None:
-        _, thrust = _Thrust(model)(windows, _substeps(windows))
-        rate = model.nu_dot(
-            eta[..., :3],
-            quat_to_matrix(eta[..., 3:]),
-            nu,
-            thrust,
-            windows.inputs.rows(windows.warmup),
-            windows.times[:, windows.warmup :],
-        )
-    seen = model.sense(Sensed(eta[..., :3], eta[..., 3:], nu, rate))
-    angle = quat_to_rotvec(quat_multiply(quat_conjugate(seen.quaternion), windows.eta[..., 3:]))
-    parts = [windows.eta[..., :3] - seen.position, angle, windows.nu - seen.nu]
-    parts.append(
-        torch.zeros_like(nu)
-        if seen.nu_dot is None or windows.nu_dot is None
-        else windows.nu_dot - seen.nu_dot
-    )
-    error = torch.cat(parts, dim=-1)
-    return torch.where(windows.mask > 0, error, torch.zeros_like(error))
-
-
-def _substeps(windows: Windows) -> int:
-    return steps_per_interval(windows.times, MAX_STEP)
 
 
 def respond(
@@ -215,7 +106,7 @@ def respond_by(
         times[:, :-1] + 0.5 * steps,
         inputs.rows(0, length - 1),
     )
-    rate = _differentiate(_Point(model), "rate", points, thetas, chunk)
+    rate = differentiate(Point(model), "rate", points, thetas, chunk)
     jac_state = torch.cat(rate[:3], dim=-1)
     jac_theta = torch.cat(rate[4:], dim=-1) if total else jac_state.new_zeros(*jac_state.shape[:-1], 0)
     if len(ran.columns):
@@ -228,128 +119,6 @@ def respond_by(
         state, parameters = _outputs(seen, part, sensitivity)
         mask = windows.mask[part, :, : state.shape[-2]].unsqueeze(-1)
         yield Response(ran.error[part], state.mul_(mask), parameters.mul_(mask))
-
-
-@dataclass(frozen=True)
-class Ran:
-    """Windows run free once, and what their thrusts depend on: what all chunks of a response share.
-
-    Attributes:
-        eta: (B, L, 7).
-        nu: (B, L, 6).
-        error: measured minus predicted outputs, (B, L, 18).
-        mean: mean thrust of every interval, (B, L, n).
-        start: thrust as it begins, (B, L, n).
-        columns: which of the P parameters the thrusts depend on, (Q,).
-        mean_slope: change of `mean` with those, (B, L, n, Q).
-        start_slope: change of `start` with those, (B, L, n, Q).
-    """
-
-    eta: Tensor
-    nu: Tensor
-    error: Tensor
-    mean: Tensor
-    start: Tensor
-    columns: list[int]
-    mean_slope: Tensor
-    start_slope: Tensor
-
-    def pick(self, part: slice) -> Ran:
-        """Return some of the windows."""
-        return Ran(
-            self.eta[part],
-            self.nu[part],
-            self.error[part],
-            self.mean[part],
-            self.start[part],
-            self.columns,
-            self.mean_slope[part],
-            self.start_slope[part],
-        )
-
-
-def run(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str]) -> Ran:
-    """Run windows free, and differentiate their thrusts by the parameters of the named effects.
-
-    Both go step by step through time, which costs the same for few windows as for many.
-    """
-    module, substeps = _Thrust(model), _substeps(windows)
-    with torch.no_grad():
-        # What is not there yet is differentiated elsewhere; the run itself is the same without it.
-        there = model.without_absent()
-        # Many runs follow: compiling pays, and the same bits must come each time.
-        eta, nu = predict(there, windows, initial, engine="firm")
-        error = window_error(there, windows, eta, nu)
-        mean, start = module(windows, substeps)
-    acting = {id(e) for e in model.before_thrust}
-    keys, columns, at = {}, [], 0
-    for name in names:
-        k = model.effect_names.index(name)
-        size = model.members[k].theta.numel()
-        if id(model.members[k]) in acting:
-            keys[f"model.effects.{k}.theta"] = model.members[k].theta.detach()
-            columns += range(at, at + size)
-        at += size
-    if not keys:
-        none = mean.new_zeros(*mean.shape, 0)
-        return Ran(eta, nu, error, mean, start, [], none, none)
-    sizes = [theta.numel() for theta in keys.values()]
-
-    def thrusts(values: Tensor) -> tuple[Tensor, Tensor]:
-        some = dict(zip(keys, values.split(sizes), strict=True))
-        return functional_call(module, some, (windows, substeps))
-
-    joined = [x.detach() for x in slopes(thrusts, torch.cat(list(keys.values())))]
-    return Ran(eta, nu, error, mean, start, columns, joined[0], joined[1])
-
-
-def _differentiate(
-    module: _Point, what: str, points: tuple, thetas: dict[str, Tensor], chunk: int
-) -> list[Tensor]:
-    """Return derivatives of a function of a point by position, turn, velocity, thrust and each theta, (N, out, in)."""
-    members = {f"model.effects.{k}.theta": e for k, e in enumerate(module.model.members)}
-    replayed = {key: e for key, e in members.items() if key in thetas and isinstance(e, Replayed)}
-    others = {key: theta for key, theta in thetas.items() if key not in replayed}
-    effects, turn = list(replayed.values()), points[2].new_zeros(3)
-
-    def note(p: Tensor, q: Tensor, v: Tensor, f: Tensor, t: Tensor, extra: Inputs) -> list[Added]:
-        return noted(effects, lambda: module(what, p, q, turn, v, f, t, extra))
-
-    def one(
-        p: Tensor,
-        turn: Tensor,
-        v: Tensor,
-        f: Tensor,
-        theta: dict[str, Tensor],
-        parts: list[Added],
-        q: Tensor,
-        t: Tensor,
-        extra: Inputs,
-    ) -> Tensor:
-        return given(effects, parts, lambda: functional_call(module, theta, (what, p, q, turn, v, f, t, extra)))
-
-    position, quaternion, nu, thrust, time = (x.flatten(0, 1) for x in points[:5])
-    inputs, axes = _flat(points[5])
-    slope = jacrev(one, argnums=(0, 1, 2, 3, 4, 5))
-    many = vmap(slope, in_dims=(0, None, 0, 0, None, None, 0, 0, axes))
-    found: list[list[Tensor]] = []
-    for begin in range(0, len(nu), chunk):
-        p, q, v, f, t = (x[begin : begin + chunk] for x in (position, quaternion, nu, thrust, time))
-        extra = inputs.rows(begin, begin + chunk)
-        of = vmap(note, in_dims=(0, 0, 0, 0, 0, axes))(p, q, v, f, t, extra) if effects else []
-        by = many(p, turn, v, f, others, nought(of), q, t, extra)
-        through = {key: joined(by[5][k], of[k]) for k, key in enumerate(replayed)}
-        by_theta = (through[key] if key in through else by[4][key].flatten(2) for key in thetas)
-        found.append([x.detach() for x in (*by[:4], *by_theta)])
-    return [torch.cat(parts) for parts in zip(*found, strict=True)]
-
-
-def _flatten_inputs(i: Inputs) -> tuple[list, None]:
-    return [i.command, i.fins, i.voltage, i.altitude], None
-
-
-# `vmap` must see the tensors inside.
-register_pytree_node(Inputs, _flatten_inputs, lambda children, _: Inputs(*children))
 
 
 def _propagate(jac_state: Tensor, jac_theta: Tensor, quaternion: Tensor, nu: Tensor, steps: Tensor) -> Tensor:
@@ -421,7 +190,7 @@ def _reports(
         reporting = {id(e) for e in model.using("sense")}
         acting = {k: t for k, t in thetas.items() if id(model.members[int(k.split(".")[2])]) in reporting}
     points = (ran.eta[..., :3], ran.eta[..., 3:], ran.nu, ran.start, times, inputs)
-    by = [x.unflatten(0, ran.nu.shape[:2]) for x in _differentiate(_Point(model), what, points, acting, chunk)]
+    by = [x.unflatten(0, ran.nu.shape[:2]) for x in differentiate(Point(model), what, points, acting, chunk)]
     found = dict(zip(acting, by[4:], strict=True))
     parts, at = [], 12
     for key, theta in thetas.items():

@@ -23,7 +23,8 @@ from auvnn.training.objectives.differentiable import common_times
 from auvnn.training.objectives.shooting import Shooting
 from auvnn.training.objectives.weights import get_weights, set_weights
 from auvnn.training.objectives.windows import Shots, training_windows
-from auvnn.training.sensitivity import output_error, respond
+from auvnn.training.ran import output_error
+from auvnn.training.sensitivity import respond
 
 VEHICLE = small_vehicle()
 BARE = replace(VEHICLE, linear_damping=None, quadratic_damping=None)
@@ -65,7 +66,7 @@ def test_slopes_of_free_running_by_the_weights_are_those_of_differences():
         for sign in (1, -1):
             set_weights(model, weights + sign * step)
             errors.append(output_error(model, windows, initial))
-        slope = (errors[1] - errors[0]) / 2e-4
+        slope = ((errors[1] - errors[0]) / 2e-4)[..., :12]
         # Exact up to the square of the time step, as for the effects' parameters.
         assert float((answer.parameters[..., k] - slope).norm()) < 0.07 * float(slope.norm())
 

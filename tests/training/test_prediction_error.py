@@ -27,7 +27,8 @@ from auvnn.training.prediction_error import (
     set_parameters,
     spread,
 )
-from auvnn.training.sensitivity import Response, output_error
+from auvnn.training.ran import output_error
+from auvnn.training.sensitivity import Response
 
 HIDDEN = {
     "ocean_current": {"v_north": 0.12, "v_east": -0.08, "v_down": 0.03},

@@ -15,7 +15,8 @@ from auvnn.models import GreyBox, Inputs
 from auvnn.testing import example_vehicle
 from auvnn.testing.scene import typical_values
 from auvnn.training.prediction_error import parameters_of, set_parameters
-from auvnn.training.sensitivity import output_error, respond
+from auvnn.training.ran import output_error
+from auvnn.training.sensitivity import respond
 
 # A smaller perturbation loses digits, a larger one bends: in units of the parameters' plausible departures.
 STEP = 1e-4

@@ -22,8 +22,8 @@ from auvnn.training.objectives.base import Objective, Refined, Tell
 from auvnn.training.objectives.starting import best_start, sound_shots, start_option
 from auvnn.training.objectives.weights import get_weights, set_weights
 from auvnn.training.objectives.windows import Shots
+from auvnn.training.ran import window_error
 from auvnn.training.schemes.base import positive, whole
-from auvnn.training.sensitivity import window_error
 
 # Share of a step by which the windows' spacing in time may differ before they have no common time axis.
 SAME_TIMES = 1e-3

@@ -16,7 +16,8 @@ from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import ACCELERATION, POSITION, Windows, cut_windows
 from auvnn.models import GreyBox
 from auvnn.training.prediction_error import CHUNK, LOOSE, TRUST, motion
-from auvnn.training.sensitivity import Response, output_error, respond
+from auvnn.training.ran import output_error
+from auvnn.training.sensitivity import Response, respond
 
 Array = NDArray[np.float64]
 # History from which the state of lagging actuators is worked out, s.
