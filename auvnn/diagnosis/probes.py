@@ -35,18 +35,17 @@ NEARER = 2
 
 
 def start_at(layout: Layout, windows: Windows, found: Explanation, base: Sequence[str], name: str) -> Layout:
-    """Return the layout at a fit, with an effect that is still absent set to the best of its shapes."""
+    """Return the layout at a fit, with an effect that is still absent set to the best of its shapes.
+
+    Whoever asks for one effect by name is answered by a closer look where there is one.
+    """
     model = layout.model.rebuilt(layout.model.copied_effects())
     set_parameters(model, found.names, found.fitted.theta)
-    at = replace(layout, model=model)
-    asked = probed(at, [name], extent_of(windows))
+    at, extent = replace(layout, model=model), extent_of(windows)
     held = [*base, *(e for e in found.effects if e not in base)]
-    sums, _, _ = reduce(
-        windows,
-        answers(asked.layout.model, windows, found.fitted.initial, asked.layout.model.effect_names),
-        found.fitted.sigma,
-    )
-    best, _ = asked.score(sums, held, name, found.effects)
+    looks = [probed(at, [name], extent), *nearer(at, held, name, extent)]
+    scores = [asked.seen(windows, found, held, name, found.effects) for asked in looks]
+    best = max(scores, key=lambda s: s.gain - s.degrees)
     set_parameters(model, [name], best.estimate)
     return at
 
@@ -199,6 +198,15 @@ class Probed:
         # The best shape is the likeliest; its own scores' variance says how sure it is, not which it is.
         best = max(found, key=lambda s: (found[s].degrees > 0, found[s].gain - found[s].degrees))
         return self._whole(name, found[best], self.starts[name][best], list(found.values())), best
+
+    def seen(
+        self, windows: Windows, at: Explanation, base: Sequence[str], name: str, free: Sequence[str]
+    ) -> Score:
+        """Return an effect's score at a fit, at the best of its shapes here."""
+        model = self.layout.model
+        answered = answers(model, windows, at.fitted.initial, model.effect_names)
+        sums, _, _ = reduce(windows, answered, at.fitted.sigma)
+        return self.score(sums, base, name, free)[0]
 
     def labels(self, name: str) -> list[str]:
         """Return under which names the layout knows an effect: its own, or those of its stand-ins."""

@@ -180,21 +180,12 @@ class Search:
             if not asked:
                 continue
             self.say(f"looking at {n} more closely")
-            looks = [self._seen(current, each, base, n, chosen) for each in asked]
+            looks = [each.seen(self.windows, current, base, n, chosen) for each in asked]
             best = max(looks, key=lambda s: s.gain - s.degrees)
             p_value = min(s.p_value for s in looks)
             if p_value < told[n].p_value:
                 found[n] = replace(best, p_value=p_value)
         return found
-
-    def _seen(
-        self, current: Explanation, asked: Probed, base: list[str], name: str, chosen: list[str]
-    ) -> Score:
-        """Return an effect's score at the best of some shapes."""
-        model = asked.layout.model
-        answered = answers(model, self.windows, current.fitted.initial, model.effect_names)
-        sums, _, _ = reduce(self.windows, answered, current.fitted.sigma)
-        return asked.score(sums, base, name, chosen)[0]
 
     def _settled(
         self, steps: list[dict[str, Any]], first: Explanation, last: Explanation

@@ -9,7 +9,7 @@ import torch
 from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.explain import explain
 from auvnn.diagnosis.nuisance import lay_out
-from auvnn.diagnosis.probes import extent_of, nearer, probed
+from auvnn.diagnosis.probes import extent_of, nearer, probed, start_at
 from auvnn.diagnosis.score import score
 from auvnn.effects import EFFECTS, Extent
 from auvnn.metrics.free_run import initial_states
@@ -150,3 +150,7 @@ def test_a_load_off_the_centre_is_seen_at_the_places_around_it(model):
     assert sum(len(look[2].starts["payload"]) for look in looks) == 64
     assert near.p_value == pytest.approx(64 * score(sums, asked.layout, base, label, []).p_value)
     assert nearer(lay_out(model, ["waves"]), [], "waves", extent) == []
+    # Whoever asks for a load starts from there.
+    values = start_at(layout, windows, fit, base, "payload").model.effect("payload").values()
+    shape = ("time", "x", "y", "z")
+    assert [values[n] for n in shape] == pytest.approx([place[n] for n in shape]) and values["mass"] != 0
