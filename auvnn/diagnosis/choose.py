@@ -37,7 +37,7 @@ class Choice:
         verdict: named, ambiguous or unknown.
         best: the explanation that is taken; None where none pays.
         tried: all that were refitted.
-        rivals: where ambiguous, the explanations between which the log cannot decide.
+        rivals: where ambiguous, the explanations between which the log cannot decide; the first is the one taken.
     """
 
     verdict: str
@@ -101,18 +101,66 @@ class Chooser:
                 return Choice("named", both, tried, [])
             plainer = effect_class(best.effects[-1]).plainer
             group = sorted([best, *rivals], key=lambda e: e.effects[-1] not in plainer)
-            names = tuple(e.effects[-1] for e in group)
-            return Choice("ambiguous", replace(best, effects=(*chosen, *names)), tried, group)
-        # The weights follow the errors that the winner leaves.
-        final = explain(
+            # The first stands for all of them while more is asked for.
+            final = self._settled(group[0], at, base)
+            return Choice("ambiguous", final, tried, [final, *group[1:]])
+        final = self._settled(best, at, base)
+        return Choice("named", final, [final, *tried[1:]] if tried[0] is best else [final, *tried], [])
+
+    def _settled(self, best: Explanation, at: Layout, base: list[str]) -> Explanation:
+        """Return an explanation refitted with the weights that follow from the errors that it leaves."""
+        guess = replace(at, model=best.fitted.model)
+        return explain(self.layout, self.windows, base, best.effects, start=best.fitted, guess=guess)
+
+    def _instead(
+        self, taken: Explanation, base: Sequence[str], name: str, other: Explanation
+    ) -> Explanation:
+        """Return an explanation refitted with the last effect of another one in the place of one of its own."""
+        member = other.effects[-1]
+        model = taken.fitted.model.rebuilt(taken.fitted.model.copied_effects())
+        set_parameters(model, [name], self.layout.means[name])
+        set_parameters(model, [member], parameters_of(other.fitted.model, [member]))
+        return explain(
             self.layout,
             self.windows,
             base,
-            best.effects,
-            start=best.fitted,
-            guess=replace(at, model=best.fitted.model),
+            (*(e for e in taken.effects if e != name), member),
+            start=taken.fitted,
+            guess=replace(self.layout, model=model),
+            sigma=taken.fitted.sigma,
+            iterations=6,
         )
-        return Choice("named", final, [final, *tried[1:]] if tried[0] is best else [final, *tried], [])
+
+    def regrouped(
+        self, taken: Explanation, base: Sequence[str], group: Sequence[Explanation]
+    ) -> list[Explanation]:
+        """Return a group between whose members the log still cannot decide, with all in it that was found after it.
+
+        Args:
+            taken: the explanation with the group's first and what came after it.
+            base: effects that are free whatever is chosen.
+            group: as it was found.
+
+        Returns:
+            explanations with the member in question last, the one to be taken first; one alone where the others are
+            told apart from it now.
+        """
+        name = group[0].effects[-1]
+        others = tuple(e for e in taken.effects if e != name)
+        first = replace(taken, effects=(*others, name))
+        members = [first, *(self._instead(taken, base, name, e) for e in group[1:])]
+        factor = min(self._factor(e) for e in members)
+        best, *more = sorted((weigh(self.layout, e, factor) for e in members), key=lambda e: -e.evidence)
+        left = [best, *(e for e in more if not self._told_apart(best, e))]
+        plainer = effect_class(best.effects[-1]).plainer
+        left.sort(key=lambda e: e.effects[-1] not in plainer)
+        if left[0].effects[-1] == name:
+            return left
+        guess = replace(self.layout, model=left[0].fitted.model)
+        return [
+            explain(self.layout, self.windows, base, left[0].effects, start=left[0].fitted, guess=guess),
+            *left[1:],
+        ]
 
     def _joined(
         self, best: Explanation, other: Explanation, at: Layout, base: list[str], factor: float

@@ -56,8 +56,8 @@ class Search:
         self.layout, self.windows, self.usable, self.say = layout, windows, usable, say
         self.advice, self.whiteness = advice, whiteness
         self.chooser = Chooser(layout, windows, say)
-        # The explanations between which the log cannot decide.
-        self.rivals: list[Explanation] = []
+        # Explanations between which the log cannot decide; the first of each group stands for it in what follows.
+        self.groups: list[list[Explanation]] = []
         self.base = [n for n in layout.names if n not in usable or n in layout.nuisance]
         self.floor = TRUST * motion(windows) + 1e-9
         self.silent: list[str] = []
@@ -95,7 +95,7 @@ class Search:
         table: dict[str, dict[str, Any]] = {}
         global_p = 1.0
         while True:
-            remaining = [n for n in self.usable if n not in chosen and n not in withdrawn]
+            remaining = [n for n in self.usable if n not in {*chosen, *withdrawn, *self._in_groups()}]
             self.say(f"testing {len(remaining)} effects at the null")
             base = [*self.base, *[c for c in chosen if c not in self.base]]
             scores, at = self._tested(current, remaining, base, chosen)
@@ -116,27 +116,60 @@ class Search:
                 steps.append({"verdict": verdict, "effects": [], "p_value": p_value})
                 break
             new = [e for e in choice.best.effects if e not in chosen]
-            steps.append({"verdict": choice.verdict, "effects": new, "p_value": p_value})
             if choice.verdict == "ambiguous":
-                self.rivals = choice.rivals
-                break
+                new = [e.effects[-1] for e in choice.rivals]
+                self.groups.append(choice.rivals)
+            steps.append({"verdict": choice.verdict, "effects": new, "p_value": p_value})
             current, gone = choice.best, []
             if chosen:
                 current, gone = self.chooser.withdrawn(choice.best, self.base)
             if gone:
+                gone = self._dropped(gone)
                 withdrawn += gone
                 steps.append({"verdict": "withdrawn", "effects": gone, "p_value": p_value})
             chosen = list(current.effects)
-        steps, last = self._settled(steps, first, self.rivals[0] if self.rivals else current)
-        current = current if self.rivals else last
+        current = self._regrouped(steps, current)
+        steps, current = self._settled(steps, first, current)
         if self.left is not None:
             global_p = min(global_p, self.left.p_value)
-        if self.nearest:
-            current = first
         # What was tried alone at first has other values beside what was found since.
-        for explanation in (*self.rivals, current):
+        for explanation in (*(e for group in self.groups for e in group), current):
             fill(self.layout, table, explanation, first)
         return self._answer(model, log, first, current, steps, table, global_p)
+
+    def _in_groups(self) -> list[str]:
+        """Return the members of all groups between which the log cannot decide."""
+        return [e.effects[-1] for group in self.groups for e in group]
+
+    def _dropped(self, names: list[str]) -> list[str]:
+        """Forget the groups for which some names stand; return these names with all members."""
+        out = list(names)
+        for group in [g for g in self.groups if g[0].effects[-1] in names]:
+            self.groups.remove(group)
+            out += [e.effects[-1] for e in group[1:]]
+        return out
+
+    def _regrouped(self, steps: list[dict[str, Any]], last: Explanation) -> Explanation:
+        """Look at each group again beside what was found after it; return the fit with what is taken then.
+
+        The errors of what had not been found yet may have hidden the difference.
+        """
+        for k, group in enumerate(list(self.groups)):
+            names = [e.effects[-1] for e in group]
+            if {*last.effects} == {*group[0].effects}:
+                continue
+            self.say(f"asking again which of {', '.join(names)} it is")
+            left = self.chooser.regrouped(last, self.base, group)
+            last, self.groups[k] = left[0], left
+            if last.effects[-1] != names[0]:
+                # What stopped the search was said of another member.
+                steps[-1]["verdict"] = self._rest(last)
+            step = next(s for s in steps if s["effects"] == names)
+            step["effects"] = [e.effects[-1] for e in left]
+            if len(left) == 1:
+                step["verdict"] = "named"
+        self.groups = [group for group in self.groups if len(group) > 1]
+        return last
 
     def _tested(
         self, current: Explanation, remaining: list[str], base: list[str], chosen: list[str]
@@ -206,7 +239,7 @@ class Search:
         noise = white(last, self.floor)
         left = any_force(last, self.windows, noise)
         # What was withdrawn is none of the names that stand.
-        standing = {*last.effects, *(e for rival in self.rivals for e in rival.effects)}
+        standing = {*last.effects, *self._in_groups()}
         given = [e for s in steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"] if e in standing]
         if not given:
             return (steps, last) if left.p_value >= ALPHA_UNKNOWN else (self._left(steps, left), last)
@@ -219,12 +252,12 @@ class Search:
         much = self.unexplained > PARTIAL and min(left.p_value, traced.p_value) < ALPHA_LEFT
         if much or (own and len(needless) == len(own)):
             noise = white(first, self.floor)
-            self.left, self.nearest, self.rivals = any_force(first, self.windows, noise), given, []
-            return [{"verdict": "unknown", "effects": [], "p_value": steps[0]["p_value"]}], last
+            self.left, self.nearest, self.groups = any_force(first, self.windows, noise), given, []
+            return [{"verdict": "unknown", "effects": [], "p_value": steps[0]["p_value"]}], first
         p_value = min(left.p_value, traced.p_value)
-        if needless and not self.rivals:
+        if needless:
             last = self.chooser.without(last, self.base, needless)
-            gone = {"verdict": "withdrawn", "effects": needless, "p_value": traced.p_value}
+            gone = {"verdict": "withdrawn", "effects": self._dropped(needless), "p_value": traced.p_value}
             return self._left([*steps[:-1], gone, steps[-1]], left, p_value), last
         if p_value >= ALPHA_UNKNOWN:
             return steps, last
@@ -235,8 +268,6 @@ class Search:
     ) -> list[dict[str, Any]]:
         """Return the steps with a last one that says that a force is left."""
         self.left, p_value = left, left.p_value if p_value is None else p_value
-        if steps[-1]["verdict"] == "ambiguous":
-            return [*steps, {"verdict": "unknown", "effects": [], "p_value": p_value}]
         return [*steps[:-1], {**steps[-1], "verdict": "unknown", "p_value": min(steps[-1]["p_value"], p_value)}]
 
     def _rest(self, current: Explanation) -> str:
@@ -254,12 +285,16 @@ class Search:
         global_p: float,
     ) -> Diagnosis:
         gone = {e for s in steps if s["verdict"] == "withdrawn" for e in s["effects"]}
-        missing = [e for s in steps for e in s["effects"] if e not in gone]
+        given = [e for s in steps for e in s["effects"] if e not in gone]
         order = sorted(
             table.values(),
-            key=lambda c: (missing.index(c["effect"]) if c["effect"] in missing else 99, -c.pop("_order")),
+            key=lambda c: (given.index(c["effect"]) if c["effect"] in given else 99, -c.pop("_order")),
         )
-        verdict = steps[0]["verdict"]
+        standing = [s for s in steps if s["verdict"] != "withdrawn" and not {*s["effects"]} <= gone]
+        leading = standing[0] if standing else steps[-1]
+        verdict = leading["verdict"]
+        # Of a leading group one member is to be added; what was found after it stands in the steps.
+        missing = leading["effects"] if verdict == "ambiguous" else given
         depends = {}
         if verdict == "unknown" or steps[-1]["verdict"] == "unknown":
             self.say("tracing what is left to the measured inputs")
@@ -297,9 +332,9 @@ class Search:
         return {"before": before, "after": after}
 
     def _next(self, model: GreyBox) -> dict[str, Any] | None:
-        if not (self.advice and len(self.rivals) > 1):
+        if not (self.advice and self.groups):
             return None
-        return advise(model, self.layout, self.rivals, (HORIZON, WARMUP), self.say).to_dict()
+        return advise(model, self.layout, self.groups[0], (HORIZON, WARMUP), self.say).to_dict()
 
     def _length(self) -> float:
         times = self.windows.times[:, self.windows.warmup :]

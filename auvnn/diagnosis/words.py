@@ -36,7 +36,8 @@ def parameters(candidate: dict[str, Any]) -> str:
 def tell(diagnosis: Diagnosis) -> list[str]:
     """Return the diagnosis as a few sentences."""
     by_name = {c["effect"]: c for c in diagnosis.candidates}
-    lines = []
+    lines: list[str] = []
+    gone = {e for step in diagnosis.steps if step["verdict"] == "withdrawn" for e in step["effects"]}
     if diagnosis.verdict == "adequate":
         return [
             f"Nothing is missing that this log can show: the model is adequate within its stated "
@@ -44,7 +45,7 @@ def tell(diagnosis: Diagnosis) -> list[str]:
         ]
     for step in diagnosis.steps:
         if step["verdict"] == "named":
-            for name in [e for e in step["effects"] if e in diagnosis.missing]:
+            for name in [e for e in step["effects"] if e not in gone]:
                 lines.append(f"Missing: {name} ({EFFECTS.get(name).cause}): {parameters(by_name[name])}.")
         elif step["verdict"] == "ambiguous":
             lines.append(

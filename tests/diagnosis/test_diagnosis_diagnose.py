@@ -13,7 +13,7 @@ from strange_effects import BottomPull, ClockForce, HeadingForce, HeavePush, lis
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.input_forces import InputForces
-from auvnn.effects import EFFECTS
+from auvnn.effects import EFFECTS, effect_class
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run
 from auvnn.models import GreyBox
@@ -163,13 +163,40 @@ def test_two_names_for_the_same_thing_are_given_as_a_group(level):
     model, log = level
     found = diagnose(model, log, ["net_buoyancy", "heave_push", "thruster_lag"], advice=False)
     assert found.verdict == "ambiguous" and set(found.missing) == {"net_buoyancy", "heave_push"}
-    assert [(s["verdict"], set(s["effects"])) for s in found.steps] == [("ambiguous", {"net_buoyancy", "heave_push"})]
+    assert [(s["verdict"], set(s["effects"])) for s in found.steps] == [
+        ("ambiguous", {"net_buoyancy", "heave_push"}), ("adequate", set())]
     twins = by_name(found)
     for a, b in (("net_buoyancy", "heave_push"), ("heave_push", "net_buoyancy")):
         assert {"effect": b, "similarity": pytest.approx(1, abs=0.01)} in twins[a]["confusable_with"]
     assert twins["net_buoyancy"]["parameters"]["force"]["value"] == pytest.approx(6.0, rel=0.1)
     assert twins["heave_push"]["parameters"]["force"]["value"] == pytest.approx(-6.0, rel=0.1)
     assert any("cannot tell which" in line for line in found.story)
+
+
+@pytest.mark.parametrize("lift", [1.5, 9.0])
+def test_a_group_does_not_end_the_search_and_is_looked_at_again_beside_what_came_after(level, monkeypatch, lift):
+    """Once the second effect is in the model, 9 N tell the vertical of the body from that of the world; 1.5 N do not."""
+    model, _ = level
+    listed(monkeypatch, HeavePush, HeadingForce)
+    t = np.arange(0, 10.05, 0.1)
+    truth = [effect_class(n).build(model.vehicle, "wrench", {"force": f})
+             for n, f in (("net_buoyancy", lift), ("heading_force", 3.0))]
+    log = make_log(model.rebuilt(truth), runs=3, duration=10.0, noise=1.0,
+                   command=sines(t, 6, 3) * [0, 0, 15.0, 0, 0, 6.0], stir=0.0)
+    group, verdict = {"net_buoyancy", "heave_push"}, "named" if lift > 5.0 else "ambiguous"
+    if verdict == "named":
+        group.discard("heave_push")
+    found = diagnose(model, log, ["net_buoyancy", "heave_push", "heading_force"], advice=False, whiteness=False)
+    assert [(s["verdict"], set(s["effects"])) for s in found.steps] == [
+        (verdict, group), ("named", {"heading_force"}), ("adequate", set())]
+    # The contract: of a leading group the members, of names all of them.
+    assert found.verdict == verdict and set(found.missing) == group | ({"heading_force"} if lift > 5.0 else set())
+    assert any(line.startswith("Missing: heading_force") for line in found.story)
+    told = {n: c["parameters"]["force"] for n, c in by_name(found).items() if n in {*group, "heading_force"}}
+    for name, force in (("net_buoyancy", lift), ("heading_force", 3.0)):
+        assert abs(told[name]["value"] - force) < 4 * told[name]["std"] < 1.0
+    if verdict == "ambiguous":
+        assert abs(told["heave_push"]["value"] + lift) < 0.3
 
 
 def test_the_same_two_names_are_told_apart_once_the_vehicle_tilts(monkeypatch, model):

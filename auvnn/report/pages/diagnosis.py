@@ -51,6 +51,10 @@ class DiagnosisPage(Page):
         if verdict in ("named", "ambiguous"):
             out += [_candidate_words(c) for c in leading[:3]]
             out += _rival_words(candidates, missing)
+        further = _further(view, missing)
+        if further:
+            out.append(f"Besides, it lacks {listing(further)}.")
+            out += [_candidate_words(by_name[m]) for m in further[:3] if m in by_name]
         if left is not None and left < 0.01 and verdict != "adequate":
             out.append("Next to nothing of the residual is left unexplained.")
         elif left is not None and verdict != "adequate":
@@ -229,6 +233,16 @@ def _first_sentence(verdict: str, missing: list[str]) -> str:
         "adequate": "Nothing is missing that this log could show: what the model does not explain looks "
         "like noise.",
     }.get(verdict, f"The verdict is '{verdict}'" + (f": {listing(missing)}" if several else "") + ".")
+
+
+def _further(view: View, missing: list[str]) -> list[str]:
+    """Return what was named beside an ambiguous group, and not withdrawn again."""
+    if view.text("verdict") != "ambiguous":
+        return []
+    steps = view.items("steps")
+    gone = {e for s in steps if s.get("verdict") == "withdrawn" for e in View(s).texts("effects")}
+    named = [e for s in steps if s.get("verdict") == "named" for e in View(s).texts("effects")]
+    return [e for e in named if e not in gone and e not in missing]
 
 
 def _candidate_words(candidate: Mapping[str, Any]) -> str:
