@@ -30,8 +30,9 @@ from auvnn.diagnosis.answer import Diagnosis
 from auvnn.diagnosis.cut import HORIZON, WARMUP, check_window
 from auvnn.diagnosis.diagnose import searched
 from auvnn.diagnosis.nuisance import Layout, lay_out
+from auvnn.diagnosis.null_tests import together
 from auvnn.diagnosis.passes import Passes, Point
-from auvnn.diagnosis.search import Search, together
+from auvnn.diagnosis.search import Search
 from auvnn.diagnosis.whole import Look, Refit, look, refit
 from auvnn.errors import ConfigError, InputError
 from auvnn.executors import Executor, executor_for

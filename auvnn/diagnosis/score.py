@@ -251,7 +251,7 @@ def _prior_variance(layout: Layout, effect: str, vectors: Array) -> Array | None
     return vectors.T @ (variance[:, None] * vectors)
 
 
-def similarity(statistics: Statistics, layout: Layout, base: list[str], names: list[str]) -> Array:
+def similarity(statistics: Statistics, layout: Layout, base: Sequence[str], names: Sequence[str]) -> Array:
     """Return how much of each effect's trace in the log another one can imitate, (n, n), row by column.
 
     Entry (a, b) is the share of the squared sensitivity to a's parameters, each at its plausible scale, that

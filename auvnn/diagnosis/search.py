@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from auvnn.diagnosis.advise import advise
 from auvnn.diagnosis.answer import Diagnosis
@@ -19,15 +17,14 @@ from auvnn.diagnosis.explain import Explanation, explain
 from auvnn.diagnosis.input_test import input_force
 from auvnn.diagnosis.left_over import slow
 from auvnn.diagnosis.nuisance import Layout, stated
-from auvnn.diagnosis.probes import Probed, extent_of, nearer, probed
+from auvnn.diagnosis.null_tests import NullTests
 from auvnn.diagnosis.residual_tests import residual_tests
-from auvnn.diagnosis.score import Score, similarity
 from auvnn.diagnosis.table import fill, tabulate
 from auvnn.diagnosis.unknown import depends_on
 from auvnn.logs import Log
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import TRUST, Statistics, answers, motion, reduce, set_parameters
+from auvnn.training.prediction_error import TRUST, motion
 
 Array = NDArray[np.float64]
 # Once something is in the model the question is asked again, and each time chance gets another turn.
@@ -61,7 +58,8 @@ class Search:
         self.base = [n for n in layout.names if n not in usable or n in layout.nuisance]
         self.floor = TRUST * motion(windows) + 1e-9
         self.silent: list[str] = []
-        self.extent = extent_of(windows)
+        self.tests = NullTests(layout, windows, say)
+        self.extent = self.tests.extent
         # The force that is left, where one is; and names that explain a part of it only.
         self.left: Unnamed | None = None
         self.nearest: list[str] = []
@@ -70,19 +68,6 @@ class Search:
         self.first: Explanation | None = None
         # How much the effects that were asked for first look like one another.
         self.similar: tuple[list[str], Array] = ([], np.eye(0))
-
-    def statistics(self, found: Explanation, remaining: list[str]) -> tuple[Statistics, Layout, Probed]:
-        """Linearise towards every parameter at a fit, those of the remaining effects at several shapes."""
-        model = self.layout.model.rebuilt(self.layout.model.copied_effects())
-        set_parameters(model, found.names, found.fitted.theta)
-        at = replace(self.layout, model=model)
-        asked = probed(at, remaining, self.extent)
-        sums, _, _ = reduce(
-            self.windows,
-            answers(asked.layout.model, self.windows, found.fitted.initial, asked.layout.model.effect_names),
-            found.fitted.sigma,
-        )
-        return sums, at, asked
 
     def run(self, model: GreyBox, log: Log, needs: dict[str, list[str]], most: int) -> Diagnosis:
         """Search for one effect after the other."""
@@ -98,16 +83,17 @@ class Search:
             remaining = [n for n in self.usable if n not in {*chosen, *withdrawn, *self._in_groups()}]
             self.say(f"testing {len(remaining)} effects at the null")
             base = [*self.base, *[c for c in chosen if c not in self.base]]
-            scores, at = self._tested(current, remaining, base, chosen)
-            p_value = together([s.p_value for s in scores.values() if s.degrees])
+            tested = self.tests(current, remaining, base, chosen, alike=not table)
+            p_value = tested.p_value
             if not table:
                 global_p = p_value
-                table = tabulate(self.layout, scores, current, self.similar, needs)
-                self.silent = [n for n in remaining if not scores[n].degrees]
+                self.similar = (remaining, tested.alike)
+                table = tabulate(self.layout, tested.scores, current, self.similar, needs)
+                self.silent = [n for n in remaining if not tested.scores[n].degrees]
             if p_value >= (ALPHA_NEXT if chosen else ALPHA) or not remaining or len(chosen) >= most:
                 steps.append({"verdict": self._rest(current), "effects": [], "p_value": p_value})
                 break
-            choice = self.chooser.choose(scores, at, base, chosen, current)
+            choice = self.chooser.choose(tested.scores, tested.at, base, chosen, current)
             for explanation in choice.tried:
                 if not chosen:
                     fill(self.layout, table, explanation, first)
@@ -170,55 +156,6 @@ class Search:
                 step["verdict"] = "named"
         self.groups = [group for group in self.groups if len(group) > 1]
         return last
-
-    def _tested(
-        self, current: Explanation, remaining: list[str], base: list[str], chosen: list[str]
-    ) -> tuple[dict[str, Score], Layout]:
-        """Return the tests of the effects that remain, and the layout at the fit.
-
-        The sums over all effects, the largest thing in a diagnosis, are gone when this returns.
-        """
-        sums, at, asked = self.statistics(current, remaining)
-        asked_at = {n: asked.score(sums, base, n, chosen) for n in remaining}
-        scores = {n: found for n, (found, _) in asked_at.items()}
-        if not self.similar[0]:
-            self.similar = (remaining, similarity(sums, asked.layout, base, [k for _, k in asked_at.values()]))
-        del sums
-        return scores | self._closer(current, at, base, chosen, scores), at
-
-    def _closer(
-        self,
-        current: Explanation,
-        at: Layout,
-        base: list[str],
-        chosen: list[str],
-        scores: dict[str, Score],
-    ) -> dict[str, Score]:
-        """Return the scores of effects that were looked at more closely, by name.
-
-        An effect of many shapes is looked at at a few. Where one of them takes away more of the errors than any other
-        effect does, or than chance does where no effect is significant, what the shapes in between would take is worth
-        knowing: the errors that a wrong shape leaves count as noise in its test, and may hide it.
-        """
-        # A stated coefficient that is set free takes what was stated of it away too: its gain is another matter.
-        told = {n: s for n, s in scores.items() if s.degrees and n not in self.layout.nuisance}
-        if not told:
-            return {}
-        name = max(told, key=lambda n: told[n].gain - told[n].degrees)
-        nothing = len(told) * min(s.p_value for s in told.values()) >= ALPHA
-        found: dict[str, Score] = {}
-        for n in told if nothing else [name]:
-            promised = chi2.sf(told[n].gain, told[n].degrees)
-            asked = nearer(at, base, n, self.extent) if promised * len(told) < ALPHA else []
-            if not asked:
-                continue
-            self.say(f"looking at {n} more closely")
-            looks = [each.seen(self.windows, current, base, n, chosen) for each in asked]
-            best = max(looks, key=lambda s: s.gain - s.degrees)
-            p_value = min(s.p_value for s in looks)
-            if p_value < told[n].p_value:
-                found[n] = replace(best, p_value=p_value)
-        return found
 
     def _settled(
         self, steps: list[dict[str, Any]], first: Explanation, last: Explanation
@@ -352,8 +289,3 @@ class Search:
         if not stated(model):
             found.append("no coefficient of the model is uncertain: any error of theirs will be given a name")
         return found
-
-
-def together(p_values: list[float]) -> float:
-    """Return one p-value for many dependent tests: Bonferroni's, which holds whatever the dependence."""
-    return float(min(1.0, len(p_values) * min(p_values))) if p_values else 1.0

@@ -16,7 +16,7 @@ from auvnn.diagnosis.choose import Chooser
 from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.explain import explain
 from auvnn.diagnosis.nuisance import lay_out
-from auvnn.diagnosis.search import together
+from auvnn.diagnosis.null_tests import together
 from auvnn.diagnosis.words import tell
 from auvnn.models import GreyBox
 
@@ -134,12 +134,12 @@ def test_a_further_effect_takes_a_clearer_test_than_the_first(model, monkeypatch
         asked_for.append(together(p_values))
         return asked_for[0] if len(asked_for) == 1 else 0.03
 
-    monkeypatch.setattr("auvnn.diagnosis.search.together", doubtful)
+    monkeypatch.setattr("auvnn.diagnosis.null_tests.together", doubtful)
     found = diagnose(model, log, ["net_buoyancy", "constant_force"], advice=False)
     assert [s["verdict"] for s in found.steps] == ["named", "adequate"] and len(asked_for) == 2
     assert found.steps[1]["p_value"] == 0.03
     # The first is asked at 0.05.
-    monkeypatch.setattr("auvnn.diagnosis.search.together", lambda p_values: 0.03)
+    monkeypatch.setattr("auvnn.diagnosis.null_tests.together", lambda p_values: 0.03)
     tried: list[int] = []
     choose = Chooser.choose
     monkeypatch.setattr(Chooser, "choose", lambda *a, **k: tried.append(1) or choose(*a, **k))
