@@ -14,6 +14,7 @@ from auvnn.studies.benchmark.counting import (
     STRICT,
     TIED,
     all_named,
+    all_shown_named,
     false_names,
     given_names,
     named_alone,
@@ -83,6 +84,18 @@ def test_several_are_found_when_each_of_them_is():
     assert not found(*GROUP)
 
 
+def test_what_the_log_cannot_show_need_not_be_named():
+    def found(*answer: tuple[str, list[str]], hidden: str = "a+b", **distance: float) -> bool:
+        told = {e: {"nothing": d} for e, d in distance.items()}
+        return all_shown_named(row(hidden, *answer, kind="several", imitation=told))
+
+    assert found(*named("a"), a=20.0, b=1.0) and not found(*named("a"), a=20.0, b=5.0)
+    # What is not known to be hidden from the log must be named; and what was named is right however small.
+    assert not found(*named("a"), a=20.0) and found(*named("a", "b"), a=20.0, b=1.0)
+    assert found(("adequate", []), a=1.0, b=2.0) and not found(("unknown", []), a=1.0, b=2.0)
+    assert not found(*named("c"), a=1.0, b=2.0)
+
+
 def test_members_of_a_later_group_are_no_false_names():
     assert false_names(row("a", ("named", ["a"]), ("ambiguous", ["b", "c"]))) == []
     assert false_names(row("a", *named("a", "b"))) == ["b"]
@@ -130,7 +143,7 @@ def test_each_rate_counts_its_own_kind():
     assert found == {
         "named_first": (1, 3), "named_alone": (1, 3), "named_or_in_group": (2, 3), "named_or_tied": (2, 3),
         "named_or_tied_at_2": (2, 3),
-        "all_named": (1, 1), "several_named_alone": (1, 1), "adequate_with_nothing": (1, 2),
+        "all_named": (1, 1), "all_shown_named": (1, 1), "several_named_alone": (1, 1), "adequate_with_nothing": (1, 2),
         "unknown_with_stranger": (1, 2), "axis_of_stranger": (1, 2),
         # Given: a; b; a and b; c. Wrong: b and c.
         "false_names": (2, 5), "exact_ties": (1, 2), "unseen": (0, 2), "faults": (2, 9), "not_made": (1, 9),

@@ -19,6 +19,7 @@ WORDS = {
     "named_or_tied": "named first or in a group that nobody can tell apart",
     "named_or_tied_at_2": "the same, where even the best guess errs one time in six",
     "all_named": "several effects, all named",
+    "all_shown_named": "several effects, all named that the log can show",
     "several_named_alone": "several effects, all named and nothing else",
     "adequate_with_nothing": "nothing hidden, adequate",
     "unknown_with_stranger": "not in the catalogue, unknown",

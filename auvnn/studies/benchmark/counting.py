@@ -115,6 +115,15 @@ def all_named(row: Row) -> bool:
     return bool(effects_of(row)) and all(effect_named(row, effect) for effect in effects_of(row))
 
 
+def all_shown_named(row: Row) -> bool:
+    """Whether the same holds of every hidden effect that the log can show at all: see `unseen`.
+
+    Where it can show none of them, `adequate` is right.
+    """
+    shown = [e for e in effects_of(row) if not tied(row, e, [UNSEEN])]
+    return all(effect_named(row, e) for e in shown) if shown else row["verdict"] == "adequate"
+
+
 def given_names(row: Row) -> list[str]:
     """Return the names that the answer gives; members of a declared group, and what it withdrew, are none."""
     return [n for step in _standing(row) if step["verdict"] == "named" for n in step["effects"]]

@@ -54,6 +54,7 @@ RATES: dict[str, Callable[[Sequence[Row]], list[bool]]] = {
     "named_or_tied": _of(("effect",), counting.named_or_tied),
     "named_or_tied_at_2": _of(("effect",), lambda row: counting.named_or_tied(row, counting.STRICT)),
     "all_named": _of(("several",), counting.all_named),
+    "all_shown_named": _of(("several",), counting.all_shown_named),
     "several_named_alone": _of(("several",), counting.named_alone),
     "adequate_with_nothing": _of(("nothing",), counting.right_verdict),
     "unknown_with_stranger": _of(("stranger",), counting.right_verdict),
