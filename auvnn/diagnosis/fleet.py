@@ -19,6 +19,7 @@ from auvnn.diagnosis.left_over import slow
 from auvnn.diagnosis.many import SEARCH
 from auvnn.diagnosis.nuisance import Layout, lay_out
 from auvnn.diagnosis.probes import start_at
+from auvnn.diagnosis.told import told
 from auvnn.diagnosis.trend import Trend, trend
 from auvnn.effects import effect_class
 from auvnn.errors import AuvnnError, ConfigError, InputError, one_line
@@ -227,13 +228,11 @@ def _log(question: Question, path: Path) -> Log:
 def _values(layout: Layout, found: Explanation, wanted: Sequence[str]) -> dict[str, Any]:
     out, at = {}, 0
     for name in found.names:
-        described = layout.model.effect(name).parameters_of
-        columns = np.arange(at, at + len(described))
-        at += len(described)
+        effect = layout.model.effect(name)
+        columns = np.arange(at, at + len(effect.parameters_of))
+        at += len(columns)
         if name in wanted:
-            std, _ = standard_errors(found, columns)
-            rows = zip(described, found.fitted.theta[columns], std, strict=True)
-            out[name] = {p.name: {"value": v, "std": s, "unit": p.unit} for p, v, s in rows}
+            out[name] = told(effect, found.fitted.theta[columns], standard_errors(found, columns)[0])
     return out
 
 

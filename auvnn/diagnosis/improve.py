@@ -19,6 +19,7 @@ from auvnn.diagnosis.explain import Explanation, determined, explain, standard_e
 from auvnn.diagnosis.nuisance import Layout, lay_out
 from auvnn.diagnosis.one_step_fit import explain_one_step, left_out_gain
 from auvnn.diagnosis.probes import start_at
+from auvnn.diagnosis.told import told
 from auvnn.effects import effect_class
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log
@@ -331,12 +332,7 @@ def _values(layout: Any, found: Explanation, names: Sequence[str]) -> dict[str, 
         if name not in names:
             continue
         std, _ = standard_errors(found, columns)
-        out[name] = {
-            p.name: {"value": v, "std": s, "unit": p.unit}
-            for p, v, s in zip(
-                layout.model.effect(name).parameters_of, found.fitted.theta[columns], std, strict=True
-            )
-        }
+        out[name] = told(layout.model.effect(name), found.fitted.theta[columns], std)
     return out
 
 

@@ -33,6 +33,7 @@ from auvnn.diagnosis.nuisance import Layout, lay_out
 from auvnn.diagnosis.null_tests import together
 from auvnn.diagnosis.passes import Passes, Point
 from auvnn.diagnosis.search import Search
+from auvnn.diagnosis.told import told as parameters_told
 from auvnn.diagnosis.whole import Look, Refit, look, refit
 from auvnn.errors import ConfigError, InputError
 from auvnn.executors import Executor, executor_for
@@ -220,14 +221,12 @@ def _told(
     """Return what all of the log says, as the answer holds it."""
     rows = []
     for name, score in looked.scores.items():
-        described = layout.model.effect(name).parameters_of
-        values = zip(described, score.estimate, score.std, strict=True)
         rows.append({
             "effect": name,
             "p_value": score.p_value,
             "evidence": score.evidence,
             "inflation": score.inflation,
-            "parameters": {p.name: {"value": v, "std": s, "unit": p.unit} for p, v, s in values},
+            "parameters": parameters_told(layout.model.effect(name), score.estimate, score.std),
         })  # fmt: skip
     tests = [s.p_value for s in looked.scores.values() if s.degrees]
     effects = found.explanation.effects if found.explanation is not None else ()

@@ -12,6 +12,7 @@ from auvnn.diagnosis.explain import Explanation, standard_errors
 from auvnn.diagnosis.left_over import excess
 from auvnn.diagnosis.nuisance import Layout
 from auvnn.diagnosis.score import Score
+from auvnn.diagnosis.told import told
 
 Array = NDArray[np.float64]
 
@@ -51,16 +52,12 @@ def tabulate(
         if found is not None:
             row = names.index(name)
             near = sorted(((matrix[row, j], names[j]) for j in range(len(names)) if j != row), reverse=True)
-            described = layout.model.effect(name).parameters_of
             entry.update(
                 p_value=found.p_value,
                 explained=float(np.clip(found.gain / whole, 0.0, 1.0)),
                 cv_before=current.cv,
                 cv_after=promised(current, found),
-                parameters={
-                    p.name: {"value": v, "std": s, "unit": p.unit}
-                    for p, v, s in zip(described, found.estimate, found.std, strict=True)
-                },
+                parameters=told(layout.model.effect(name), found.estimate, found.std),
                 confusable_with=[{"effect": n, "similarity": float(v)} for v, n in near if v >= 0.5],
                 _order=found.evidence,
             )
@@ -75,15 +72,10 @@ def fill(
     for name in explanation.effects:
         columns = _columns(layout, explanation.names, name)
         std, _ = standard_errors(explanation, columns)
-        described = layout.model.effect(name).parameters_of
-        values = explanation.fitted.theta[columns]
         table[name].update(
             cv_before=before.cv,
             cv_after=float(np.sqrt(_scaled_left_out(explanation, before) / before.left_out_count.sum())),
-            parameters={
-                p.name: {"value": v, "std": s, "unit": p.unit}
-                for p, v, s in zip(described, values, std, strict=True)
-            },
+            parameters=told(layout.model.effect(name), explanation.fitted.theta[columns], std),
         )
 
 

@@ -15,6 +15,7 @@ from auvnn.diagnosis.nuisance import DETERMINED, Layout
 from auvnn.diagnosis.passes import Passes, Point
 from auvnn.diagnosis.probes import Probed
 from auvnn.diagnosis.score import Score, following, judged, projection, ratio
+from auvnn.diagnosis.told import told
 from auvnn.effects import Extent
 from auvnn.metrics.parts import Cut
 from auvnn.training.prediction_error import (
@@ -128,12 +129,11 @@ class Refit:
         out: dict[str, dict[str, dict[str, Any]]] = {}
         at = 0
         for name in self.names:
-            described = layout.model.effect(name).parameters_of
-            here = slice(at, at + len(described))
-            at += len(described)
+            effect = layout.model.effect(name)
+            here = slice(at, at + len(effect.parameters_of))
+            at = here.stop
             if name in wanted:
-                rows = zip(described, self.theta[here], self.std[here], strict=True)
-                out[name] = {p.name: {"value": v, "std": s, "unit": p.unit} for p, v, s in rows}
+                out[name] = told(effect, self.theta[here], self.std[here])
         return out
 
 

@@ -278,6 +278,14 @@ class Effect(nn.Module):
         """
         return []
 
+    @classmethod
+    def told(cls, values: dict[str, float]) -> dict[str, float]:
+        """Return the values by which people would state the same effect; the ones given, by default.
+
+        For effects that are the same at several values: an angle that has gone round, a sign that another one undoes.
+        """
+        return dict(values)
+
     def value(self, name: str) -> Tensor:
         """Return one parameter as a scalar tensor."""
         return self.theta[self._index[name]]

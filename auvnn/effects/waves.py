@@ -55,6 +55,14 @@ class Waves(Effect):
             for turn in range(3)
         ]
 
+    @classmethod
+    def told(cls, values: dict[str, float]) -> dict[str, float]:
+        """Return the wave with an amplitude above zero and angles within half a turn: it is the same wave."""
+        out = dict(values)
+        if out["amplitude"] < 0:
+            out["amplitude"], out["phase"] = -out["amplitude"], out["phase"] + math.pi
+        return out | {n: math.remainder(out[n], 2 * math.pi) for n in ("phase", "direction")}
+
     def settle(self, vehicle: Any, actuation: str) -> None:
         """Keep gravity."""
         self.keep("gravity", vehicle.gravity)

@@ -71,3 +71,13 @@ def test_a_fixed_body_feels_displaced_and_added_mass(plain, vector, still):
     # Munk's moments turn it, but the force on a body that does not move also holds -C_A(nu_r) nu_r = 0 in front.
     expected = (50 + torch.tensor([20.0, 30, 40], dtype=torch.float64)) * acceleration
     torch.testing.assert_close(change, expected, rtol=1e-4, atol=1e-4)
+
+
+def test_a_wave_is_told_with_a_height_above_zero_and_angles_within_half_a_turn():
+    """The same water moves, whatever of the many values that mean one wave a fit has ended at."""
+    found = {**VALUES, "amplitude": -0.4, "phase": 0.7 - math.pi + 4 * math.pi, "direction": 2.0 - 2 * math.pi}
+    stated = Waves.told(found)
+    assert stated == pytest.approx(VALUES) and Waves.told(stated) == stated
+    at, time = torch.tensor([3.0, -2.0, 1.0], dtype=torch.float64), torch.tensor(1.3, dtype=torch.float64)
+    for a, b in zip(water(at, time, found), water(at, time, stated), strict=True):
+        torch.testing.assert_close(a, b, rtol=1e-12, atol=1e-14)

@@ -180,8 +180,9 @@ def errors_of(
     no distance from its null and so no relative error.
     """
     out: dict[str, dict[str, float | None]] = {}
-    for effect, values in truth.items():
-        described = EFFECTS.get(effect).describe(*_described(case.vehicle))
+    for effect, hidden in truth.items():
+        kind = EFFECTS.get(effect)
+        described, values = kind.describe(*_described(case.vehicle)), kind.told(dict(hidden))
         null = {p.name: p.null for p in described if not p.shape}
         size = max(np.sqrt(sum((values[n] - v) ** 2 for n, v in null.items())), 1e-300)
         answered = parameters if case.kind == "effect" else parameters.get(effect, {})
