@@ -260,8 +260,7 @@ def reduce(windows: Windows, responses: Iterable[Response], sigma: Array) -> tup
         sums = (both.mT @ both).sub_(along.mT @ along)
         hessian[here] = sums[:, 1:, 1:].numpy()
         solved = torch.linalg.solve_triangular(r, along, upper=True)
-        remaining = answer.error.clone()
-        remaining[..., :told] -= (answer.state @ solved[:, None, :, :1]).squeeze(-1)
+        remaining = answer.left(solved[..., 0])
         remaining = torch.where(mask > 0, remaining, torch.zeros_like(remaining))
         pair = mask[:, 1:] * mask[:, :-1]
         step = (remaining[:, 1:] - remaining[:, :-1]) * pair

@@ -43,6 +43,13 @@ class Response:
     state: Tensor
     parameters: Tensor
 
+    def left(self, change: Tensor) -> Tensor:
+        """Return the errors once the initial states have moved, (B, L, 18), to first order; change is (B, 12)."""
+        told = self.state.shape[-2]
+        out = self.error.clone()
+        out[..., :told] -= (self.state @ change[:, None, :, None]).squeeze(-1)
+        return out
+
 
 def respond(
     model: GreyBox,

@@ -181,7 +181,7 @@ def _projected(answer: Response, used: NDArray[np.int64], scale: Tensor) -> tupl
     total = flat.mT @ flat - projected.mT @ projected
     cost = both[..., 0].square().sum(1) - along[..., 0].square().sum(1)
     solved = torch.linalg.solve_triangular(r, along, upper=True)
-    remaining = answer.error - (answer.state @ solved[:, None, :, :1]).squeeze(-1)
+    remaining = answer.left(solved[..., 0])
     remaining = torch.where(answer.error != 0, remaining, torch.zeros_like(remaining))[..., used]
     return (
         total[1:, 1:].numpy(),
