@@ -11,8 +11,11 @@ from small_logs import make_log, sines, small_vehicle
 from strange_effects import BottomPull, ClockForce, HeadingForce, HeavePush, listed
 
 from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.choose import Chooser
 from auvnn.diagnosis.cut import windows_for
+from auvnn.diagnosis.explain import explain
 from auvnn.diagnosis.input_forces import InputForces
+from auvnn.diagnosis.input_test import InputForce
 from auvnn.effects import EFFECTS, effect_class
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run
@@ -197,6 +200,31 @@ def test_a_group_does_not_end_the_search_and_is_looked_at_again_beside_what_came
         assert abs(told[name]["value"] - force) < 4 * told[name]["std"] < 1.0
     if verdict == "ambiguous":
         assert abs(told["heave_push"]["value"] + lift) < 0.3
+
+
+def test_a_group_that_had_stood_in_is_withdrawn_with_all_its_members(level, monkeypatch):
+    """As if the group were not needed once the second effect is there: what leads then is that effect."""
+    model, _ = level
+    listed(monkeypatch, HeavePush, HeadingForce)
+    t = np.arange(0, 10.05, 0.1)
+    truth = [effect_class(n).build(model.vehicle, "wrench", {"force": f})
+             for n, f in (("net_buoyancy", 9.0), ("heading_force", 3.0))]
+    log = make_log(model.rebuilt(truth), runs=3, duration=10.0, noise=1.0,
+                   command=sines(t, 6, 3) * [0, 0, 15.0, 0, 0, 6.0], stir=0.0)
+
+    def gone(self, taken, base):
+        return explain(self.layout, self.windows, base, taken.effects[1:]), [taken.effects[0]]
+
+    monkeypatch.setattr(Chooser, "withdrawn", gone)
+    # What is left without the group is no stand-in here, but the purpose.
+    monkeypatch.setattr("auvnn.diagnosis.search.PARTIAL", 2.0)
+    monkeypatch.setattr("auvnn.diagnosis.search.input_force", lambda *_: InputForce("X", "u", 1.0, ()))
+    names = ["net_buoyancy", "heave_push", "heading_force"]
+    found = diagnose(model, log, names, advice=False, whiteness=False)
+    assert [s["verdict"] for s in found.steps][:3] == ["ambiguous", "named", "withdrawn"]
+    assert set(found.steps[2]["effects"]) == {"net_buoyancy", "heave_push"}
+    assert (found.verdict, found.missing) == ("named", ["heading_force"])
+    assert found.explanation.effects == ("heading_force",)
 
 
 def test_the_same_two_names_are_told_apart_once_the_vehicle_tilts(monkeypatch, model):

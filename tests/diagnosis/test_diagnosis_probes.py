@@ -9,6 +9,7 @@ import torch
 from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.explain import explain
 from auvnn.diagnosis.nuisance import lay_out
+from auvnn.diagnosis.null_tests import NullTests
 from auvnn.diagnosis.probes import extent_of, nearer, probed, start_at
 from auvnn.diagnosis.score import score
 from auvnn.effects import EFFECTS, Extent
@@ -150,6 +151,9 @@ def test_a_load_off_the_centre_is_seen_at_the_places_around_it(model):
     assert sum(len(look[2].starts["payload"]) for look in looks) == 64
     assert near.p_value == pytest.approx(64 * score(sums, asked.layout, base, label, []).p_value)
     assert nearer(lay_out(model, ["waves"]), [], "waves", extent) == []
+    # A search looks there as well, where the first look promises more than chance.
+    asked_for = NullTests(layout, windows, lambda words: None)(fit, ["payload"], base, [])
+    assert asked_for.scores["payload"].gain > 2.0 * far.gain
     # Whoever asks for a load starts from there.
     values = start_at(layout, windows, fit, base, "payload").model.effect("payload").values()
     shape = ("time", "x", "y", "z")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from auvnn.diagnosis.told import told
 from auvnn.effects import Moment
 from auvnn.effects.waves import Waves
 from auvnn.testing import plain_vehicle
@@ -81,3 +82,10 @@ def test_a_wave_is_told_with_a_height_above_zero_and_angles_within_half_a_turn()
     at, time = torch.tensor([3.0, -2.0, 1.0], dtype=torch.float64), torch.tensor(1.3, dtype=torch.float64)
     for a, b in zip(water(at, time, found), water(at, time, stated), strict=True):
         torch.testing.assert_close(a, b, rtol=1e-12, atol=1e-14)
+
+
+def test_answers_tell_the_wave_so_with_the_standard_errors_of_the_fit(plain):
+    effect = plain({"waves": {**VALUES, "amplitude": -0.4}}).effect("waves")
+    found = told(effect, effect.theta.detach().numpy(), np.array([0.1, 0.2, 0.3, 0.4]))
+    assert found["amplitude"] == {"value": pytest.approx(0.4), "std": 0.1, "unit": "m"}
+    assert found["phase"]["value"] == pytest.approx(0.7 - math.pi) and found["direction"]["std"] == 0.4
