@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from auvnn.diagnosis.explain import Explanation, by_stretches, explain, weigh
 from auvnn.diagnosis.nuisance import Layout
@@ -25,6 +26,10 @@ LEADERS, REACH, REACH_SHARE = 5, 30.0, 0.5
 # Odds of a hundred to one: below that two explanations are not told apart. Several of them compete in every log, and
 # at twenty to one a wrong one wins now and then by chance.
 ODDS = float(np.log(100.0))
+# How unlikely it must be that an explanation is right and the better fit of one with more parameters chance; and from
+# where on the first is needed beside the second. Evidence weighs how large parameters might have been, which is a
+# guess: it must not give a name to what the data refute.
+ALPHA_REFUTED, ALPHA_NEEDED = 0.001, 0.01
 # Share of the information on an effect from which a run is the only one that counts.
 ONE_RUN = 0.6
 
@@ -76,6 +81,7 @@ class Chooser:
         leading = sorted(significant, key=lambda s: -s.evidence)[:LEADERS]
         top = leading[0].evidence if leading else 0.0
         leading = [s for s in leading if s.evidence > min(top - REACH, REACH_SHARE * top)]
+        leading += self._promising(significant, leading)
         # Evidence counts an effect of many parameters low while it is small; a test that is clear even among
         # all the others lets it be judged by what it does on runs left out.
         clear = {s.effect for s in significant if s.p_value < ALPHA / len(scores)}
@@ -93,8 +99,8 @@ class Chooser:
         ]
         if not paying:
             return Choice("unknown", None, tried, [])
-        best = paying[0]
-        rivals = [e for e in paying[1:] if not self._told_apart(best, e)]
+        best, standing = self._standing(paying, at, base, factor)
+        rivals = [e for e in standing if not self._told_apart(best, e)]
         if rivals:
             both = self._joined(best, rivals[0], at, base, factor)
             if both is not None:
@@ -106,6 +112,52 @@ class Chooser:
             return Choice("ambiguous", final, tried, [final, *group[1:]])
         final = self._settled(best, at, base)
         return Choice("named", final, [final, *tried[1:]] if tried[0] is best else [final, *tried], [])
+
+    @staticmethod
+    def _promising(significant: list[Score], leading: list[Score]) -> list[Score]:
+        """Return the test, if any, of the effect that might refute those in the lead by its better fit."""
+        if not leading:
+            return []
+        most = leading[0].gain
+        more = [s for s in significant if s not in leading and s.gain - most > chi2.isf(ALPHA_NEEDED, s.degrees)]
+        return sorted(more, key=lambda s: s.degrees - s.gain)[:1]
+
+    def _standing(
+        self, paying: list[Explanation], at: Layout, base: list[str], factor: float
+    ) -> tuple[Explanation, list[Explanation]]:
+        """Return the explanation to take, and the others that it does not refute.
+
+        Args:
+            paying: by falling evidence.
+            at: the layout at the fit without any of them.
+            base: effects that are free anyway.
+            factor: as in `weigh`.
+        """
+        best, refuted = paying[0], []
+        for other in paying[1:]:
+            if self._refutes(other, best, at, base, factor):
+                refuted.append(best)
+                best = other
+        standing = [e for e in paying if e is not best and not any(e is r for r in refuted)]
+        # Those that are far behind by evidence are told apart anyway.
+        near = [e for e in standing if best.evidence - e.evidence < ODDS]
+        refuted += [e for e in near if self._refutes(best, e, at, base, factor)]
+        return best, [e for e in standing if not any(e is r for r in refuted)]
+
+    def _refutes(
+        self, other: Explanation, best: Explanation, at: Layout, base: list[str], factor: float
+    ) -> bool:
+        """Whether one explanation fits better than chance allows if another one were right, and needs no help of it.
+
+        Were the other one right, the parameters of the first would gain what chi-squared allows beside it, and less
+        alone. Where each is needed beside the other, neither is the whole cause, and evidence says which comes first.
+        """
+        extra = len(self.layout.columns[other.effects[-1]])
+        if best.misfit - other.misfit <= chi2.isf(ALPHA_REFUTED, extra):
+            return False
+        both = weigh(self.layout, self._together(other, best, at, base), factor)
+        own = len(self.layout.columns[best.effects[-1]])
+        return other.misfit - both.misfit < chi2.isf(ALPHA_NEEDED, own)
 
     def _settled(self, best: Explanation, at: Layout, base: list[str]) -> Explanation:
         """Return an explanation refitted with the weights that follow from the errors that it leaves."""
@@ -169,22 +221,7 @@ class Chooser:
 
         Of two effects that are both missing, one alone may do as badly as the other.
         """
-        names = (*best.effects, other.effects[-1])
-        self.say(f"fitting {best.effects[-1]} and {other.effects[-1]} together")
-        guess = at.model.rebuilt(at.model.copied_effects())
-        for each in (best, other):
-            name = each.effects[-1]
-            set_parameters(guess, [name], parameters_of(each.fitted.model, [name]))
-        both = explain(
-            self.layout,
-            self.windows,
-            base,
-            names,
-            start=best.fitted,
-            guess=replace(at, model=guess),
-            sigma=best.fitted.sigma,
-            iterations=6,
-        )
+        both = self._together(best, other, at, base)
         gain = weigh(self.layout, both, factor).evidence - best.evidence
         if gain < ODDS or not pays(both, best):
             return None
@@ -192,9 +229,27 @@ class Chooser:
             self.layout,
             self.windows,
             base,
-            names,
+            both.effects,
             start=both.fitted,
             guess=replace(at, model=both.fitted.model),
+        )
+
+    def _together(self, best: Explanation, other: Explanation, at: Layout, base: list[str]) -> Explanation:
+        """Return the fit of two explanations as one, the errors weighed as in the first's."""
+        self.say(f"fitting {best.effects[-1]} and {other.effects[-1]} together")
+        guess = at.model.rebuilt(at.model.copied_effects())
+        for each in (best, other):
+            name = each.effects[-1]
+            set_parameters(guess, [name], parameters_of(each.fitted.model, [name]))
+        return explain(
+            self.layout,
+            self.windows,
+            base,
+            (*best.effects, other.effects[-1]),
+            start=best.fitted,
+            guess=replace(at, model=guess),
+            sigma=best.fitted.sigma,
+            iterations=6,
         )
 
     def withdrawn(self, taken: Explanation, base: Sequence[str]) -> tuple[Explanation, list[str]]:

@@ -7,7 +7,7 @@ import torch
 
 from auvnn.diagnosis import actuators, unseen_current
 from auvnn.logs import Log
-from auvnn.metrics.free_run import MAX_STEP
+from auvnn.metrics.windows import MAX_STEP
 from auvnn.models import GreyBox
 from auvnn.models.stiffness import fastest_rate, followed, slow_log, words
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from auvnn.diagnosis.any_force import Unnamed, any_force, white
 from auvnn.diagnosis.choose import ALPHA, Chooser
 from auvnn.diagnosis.cut import HORIZON, WARMUP
 from auvnn.diagnosis.explain import Explanation, explain
+from auvnn.diagnosis.finer import finer
 from auvnn.diagnosis.input_test import input_force
 from auvnn.diagnosis.left_over import slow
 from auvnn.diagnosis.nuisance import Layout, stated
@@ -72,8 +74,7 @@ class Search:
     def run(self, model: GreyBox, log: Log, needs: dict[str, list[str]], most: int) -> Diagnosis:
         """Search for one effect after the other."""
         self.say("fitting the uncertain coefficients")
-        current = explain(self.layout, self.windows, self.base, ())
-        self.first = first = current
+        self.first = first = current = self._finer(explain(self.layout, self.windows, self.base, ()))
         chosen, steps = [], []
         # What turned out to have stood in for something else is not asked for again.
         withdrawn: list[str] = []
@@ -114,6 +115,7 @@ class Search:
                 withdrawn += gone
                 steps.append({"verdict": "withdrawn", "effects": gone, "p_value": p_value})
             chosen = list(current.effects)
+            current = self._finer(current)
         current = self._regrouped(steps, current)
         steps, current = self._settled(steps, first, current)
         if self.left is not None:
@@ -122,6 +124,18 @@ class Search:
         for explanation in (*(e for group in self.groups for e in group), current):
             fill(self.layout, table, explanation, first)
         return self._answer(model, log, first, current, steps, table, global_p)
+
+    def _finer(self, found: Explanation) -> Explanation:
+        """Return a fit with steps so short that what the integrator gets wrong has no say in what follows."""
+        windows = finer(found.fitted.model, self.windows, found.fitted.initial, found.fitted.sigma)
+        if windows is self.windows:
+            return found
+        self.say("fitting again with shorter steps")
+        self.windows = windows
+        self.chooser = replace(self.chooser, windows=windows)
+        self.tests = NullTests(self.layout, windows, self.say)
+        guess = replace(self.layout, model=found.fitted.model)
+        return explain(self.layout, windows, self.base, found.effects, start=found.fitted, guess=guess)
 
     def _in_groups(self) -> list[str]:
         """Return the members of all groups between which the log cannot decide."""

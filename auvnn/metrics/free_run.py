@@ -11,11 +11,9 @@ from auvnn.models import GreyBox
 from auvnn.models.rollout import rollout
 from auvnn.physics.attitude import quat_multiply, rotvec_to_quat
 
-MAX_STEP = 0.05
-
 
 def predict(
-    model: GreyBox, windows: Windows, initial: Tensor, max_step: float = MAX_STEP, engine: str = "torch"
+    model: GreyBox, windows: Windows, initial: Tensor, max_step: float | None = None, engine: str = "torch"
 ) -> tuple[Tensor, Tensor]:
     """Run every window free from its initial state.
 
@@ -23,7 +21,7 @@ def predict(
         model: the model.
         windows: B windows of L samples.
         initial: (B, 13): position, quaternion, velocity.
-        max_step: longest step of the solver, s.
+        max_step: longest step of the solver, s; the windows' own by default.
         engine: see `rollout`. Plain torch by default: a training that goes on after it was killed must end with the
             same bits, whatever has been compiled meanwhile.
 
@@ -36,7 +34,7 @@ def predict(
         initial[:, 7:],
         windows.inputs,
         windows.times,
-        max_step=max_step,
+        max_step=windows.max_step if max_step is None else max_step,
         warmup=windows.warmup,
         check=False,
         engine=engine,

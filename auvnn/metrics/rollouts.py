@@ -12,8 +12,8 @@ from auvnn.effects import Sensed
 from auvnn.errors import InputError
 from auvnn.logs import Log
 from auvnn.logs.noise import noise_std
-from auvnn.metrics.free_run import MAX_STEP, initial_states, predict
-from auvnn.metrics.windows import VELOCITY, Windows, cut_windows
+from auvnn.metrics.free_run import initial_states, predict
+from auvnn.metrics.windows import MAX_STEP, VELOCITY, Windows, cut_windows
 from auvnn.models import GreyBox
 from auvnn.models.rollout import LIMIT
 from auvnn.models.stiffness import fastest_rate, followed

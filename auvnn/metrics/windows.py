@@ -34,6 +34,8 @@ CHANNELS = (
     "dr",
 )
 POSITION, ATTITUDE, VELOCITY, ACCELERATION = slice(0, 3), slice(3, 6), slice(6, 12), slice(12, 18)
+# Longest step of an integrator, s, where nothing asks for a shorter one.
+MAX_STEP = 0.05
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,7 @@ class Windows:
         mask: (B, L, 18), 1 where a channel of `CHANNELS` was measured, else 0.
         length: (B,) samples before the padding.
         warmup: rows of history.
+        max_step: longest step with which an integrator may run them, s.
     """
 
     run: np.ndarray
@@ -65,6 +68,7 @@ class Windows:
     mask: Tensor
     length: np.ndarray
     warmup: int
+    max_step: float = MAX_STEP
 
     def __len__(self) -> int:
         """Return the number of windows."""

@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from torch.func import functional_call
 
 from auvnn.effects import Sensed
-from auvnn.metrics.free_run import MAX_STEP, predict
+from auvnn.metrics.free_run import predict
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 from auvnn.models.rollout import steps_per_interval
@@ -73,7 +73,7 @@ def window_error(model: GreyBox, windows: Windows, eta: Tensor, nu: Tensor) -> T
 
 def substeps_of(windows: Windows) -> int:
     """Return into how many steps the integrator divides an interval."""
-    return steps_per_interval(windows.times, MAX_STEP)
+    return steps_per_interval(windows.times, windows.max_step)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from small_logs import make_log, small_vehicle
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.choose import Chooser
 from auvnn.diagnosis.cut import windows_for
-from auvnn.diagnosis.explain import explain
+from auvnn.diagnosis.explain import explain, weigh
 from auvnn.diagnosis.nuisance import lay_out
 from auvnn.models import GreyBox
 
@@ -85,3 +85,32 @@ def test_two_effects_that_do_as_badly_alone_are_named_together(model, two, monke
     found = diagnose(model, two, NAMES)
     assert found.steps[0]["verdict"] == "named" and set(found.steps[0]["effects"]) == set(NAMES)
     assert set(found.missing) == set(NAMES)
+
+
+# Six forces of which none alone is much, so that what they might have been counts against them.
+SPREAD = {"X": 2.7, "Y": -2.7, "Z": 5.4, "K": 0.27, "M": -0.27, "N": 0.54}
+
+
+def standing(model, log):
+    """Return who asks, all explanations by falling evidence, the one to take, and those that it does not refute."""
+    layout, windows = lay_out(model, NAMES), windows_for(model, log)
+    base = [n for n in layout.names if n not in NAMES]
+    chooser = Chooser(layout, windows, lambda words: None)
+    each = [weigh(layout, explain(layout, windows, base, [n]), 1.0) for n in NAMES]
+    each.sort(key=lambda e: -e.evidence)
+    return each, *chooser._standing(each, layout, base, 1.0)
+
+
+def test_evidence_gives_no_name_to_what_the_data_refute(model):
+    log = logged(model, {"constant_force": SPREAD})
+    each, best, others = standing(model, log)
+    assert each[0].effects == ("net_buoyancy",), "the plainer one leads by evidence, or this says nothing"
+    assert best.effects == ("constant_force",) and others == []
+    assert diagnose(model, log, NAMES).missing == ["constant_force"]
+
+
+def test_a_better_fit_by_more_parameters_refutes_nothing_that_is_needed_beside_it(model, two):
+    each, best, others = standing(model, two)
+    assert best is each[0] and len(others) == 1
+    each, best, others = standing(model, logged(model, LIGHT))
+    assert best.effects == ("net_buoyancy",) and [e.effects for e in others] == [("constant_force",)]
