@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from auvnn.diagnosis.explain import Explanation, by_stretches, explain, weigh
+from auvnn.diagnosis.explain import Explanation, explain, weigh
 from auvnn.diagnosis.nuisance import Layout
+from auvnn.diagnosis.pays import pays
+from auvnn.diagnosis.rivals import ALPHA_NEEDED, ODDS, Rivals
 from auvnn.diagnosis.score import Score, inflation
 from auvnn.effects import effect_class
 from auvnn.metrics.windows import Windows
@@ -23,15 +25,6 @@ Array = NDArray[np.float64]
 ALPHA = 0.05
 # Explanations are refitted in full, nonlinearly, as long as their one-step evidence is within reach of the best.
 LEADERS, REACH, REACH_SHARE = 5, 30.0, 0.5
-# Odds of a hundred to one: below that two explanations are not told apart. Several of them compete in every log, and
-# at twenty to one a wrong one wins now and then by chance.
-ODDS = float(np.log(100.0))
-# How unlikely it must be that an explanation is right and the better fit of one with more parameters chance; and from
-# where on the first is needed beside the second. Evidence weighs how large parameters might have been, which is a
-# guess: it must not give a name to what the data refute.
-ALPHA_REFUTED, ALPHA_NEEDED = 0.001, 0.01
-# Share of the information on an effect from which a run is the only one that counts.
-ONE_RUN = 0.6
 
 
 @dataclass(frozen=True)
@@ -64,6 +57,11 @@ class Chooser:
     layout: Layout
     windows: Windows
     say: Callable[[str], None]
+
+    @property
+    def rivals(self) -> Rivals:
+        """Who compares explanations."""
+        return Rivals(self.layout, self.windows, self.say)
 
     def choose(
         self, scores: dict[str, Score], at: Layout, base: list[str], chosen: list[str], current: Explanation
@@ -99,8 +97,8 @@ class Chooser:
         ]
         if not paying:
             return Choice("unknown", None, tried, [])
-        best, standing = self._standing(paying, at, base, factor)
-        rivals = [e for e in standing if not self._told_apart(best, e)]
+        best, standing = self.rivals.standing(paying, at, base, factor)
+        rivals = [e for e in standing if not self.rivals.told_apart(best, e)]
         if rivals:
             both = self._joined(best, rivals[0], at, base, factor)
             if both is not None:
@@ -121,43 +119,6 @@ class Chooser:
         most = leading[0].gain
         more = [s for s in significant if s not in leading and s.gain - most > chi2.isf(ALPHA_NEEDED, s.degrees)]
         return sorted(more, key=lambda s: s.degrees - s.gain)[:1]
-
-    def _standing(
-        self, paying: list[Explanation], at: Layout, base: list[str], factor: float
-    ) -> tuple[Explanation, list[Explanation]]:
-        """Return the explanation to take, and the others that it does not refute.
-
-        Args:
-            paying: by falling evidence.
-            at: the layout at the fit without any of them.
-            base: effects that are free anyway.
-            factor: as in `weigh`.
-        """
-        best, refuted = paying[0], []
-        for other in paying[1:]:
-            if self._refutes(other, best, at, base, factor):
-                refuted.append(best)
-                best = other
-        standing = [e for e in paying if e is not best and not any(e is r for r in refuted)]
-        # Those that are far behind by evidence are told apart anyway.
-        near = [e for e in standing if best.evidence - e.evidence < ODDS]
-        refuted += [e for e in near if self._refutes(best, e, at, base, factor)]
-        return best, [e for e in standing if not any(e is r for r in refuted)]
-
-    def _refutes(
-        self, other: Explanation, best: Explanation, at: Layout, base: list[str], factor: float
-    ) -> bool:
-        """Whether one explanation fits better than chance allows if another one were right, and needs no help of it.
-
-        Were the other one right, the parameters of the first would gain what chi-squared allows beside it, and less
-        alone. Where each is needed beside the other, neither is the whole cause, and evidence says which comes first.
-        """
-        extra = len(self.layout.columns[other.effects[-1]])
-        if best.misfit - other.misfit <= chi2.isf(ALPHA_REFUTED, extra):
-            return False
-        both = weigh(self.layout, self._together(other, best, at, base), factor)
-        own = len(self.layout.columns[best.effects[-1]])
-        return other.misfit - both.misfit < chi2.isf(ALPHA_NEEDED, own)
 
     def _settled(self, best: Explanation, at: Layout, base: list[str]) -> Explanation:
         """Return an explanation refitted with the weights that follow from the errors that it leaves."""
@@ -203,7 +164,7 @@ class Chooser:
         members = [first, *(self._instead(taken, base, name, e) for e in group[1:])]
         factor = min(self._factor(e) for e in members)
         best, *more = sorted((weigh(self.layout, e, factor) for e in members), key=lambda e: -e.evidence)
-        left = [best, *(e for e in more if not self._told_apart(best, e))]
+        left = [best, *(e for e in more if not self.rivals.told_apart(best, e))]
         plainer = effect_class(best.effects[-1]).plainer
         left.sort(key=lambda e: e.effects[-1] not in plainer)
         if left[0].effects[-1] == name:
@@ -221,7 +182,7 @@ class Chooser:
 
         Of two effects that are both missing, one alone may do as badly as the other.
         """
-        both = self._together(best, other, at, base)
+        both = self.rivals.together(best, other, at, base)
         gain = weigh(self.layout, both, factor).evidence - best.evidence
         if gain < ODDS or not pays(both, best):
             return None
@@ -232,24 +193,6 @@ class Chooser:
             both.effects,
             start=both.fitted,
             guess=replace(at, model=both.fitted.model),
-        )
-
-    def _together(self, best: Explanation, other: Explanation, at: Layout, base: list[str]) -> Explanation:
-        """Return the fit of two explanations as one, the errors weighed as in the first's."""
-        self.say(f"fitting {best.effects[-1]} and {other.effects[-1]} together")
-        guess = at.model.rebuilt(at.model.copied_effects())
-        for each in (best, other):
-            name = each.effects[-1]
-            set_parameters(guess, [name], parameters_of(each.fitted.model, [name]))
-        return explain(
-            self.layout,
-            self.windows,
-            base,
-            (*best.effects, other.effects[-1]),
-            start=best.fitted,
-            guess=replace(at, model=guess),
-            sigma=best.fitted.sigma,
-            iterations=6,
         )
 
     def withdrawn(self, taken: Explanation, base: Sequence[str]) -> tuple[Explanation, list[str]]:
@@ -301,20 +244,6 @@ class Chooser:
         guess = replace(self.layout, model=model)
         return explain(self.layout, self.windows, base, left, start=taken.fitted, guess=guess)
 
-    def _told_apart(self, best: Explanation, other: Explanation) -> bool:
-        """Whether the log decides between two explanations.
-
-        The evidence also counts how many parameters there are and how large they might have been. Where the fit
-        is the same, that settles it only against the one with more parameters, and not where it is the plainer.
-        """
-        if best.evidence - other.evidence < ODDS:
-            return False
-        if 0.5 * (other.misfit - best.misfit) >= ODDS:
-            return True
-        mine, theirs = best.effects[-1], other.effects[-1]
-        size = {n: len(self.layout.columns[n]) for n in (mine, theirs)}
-        return size[theirs] > size[mine] and theirs not in effect_class(mine).plainer
-
     def _refitted(
         self, candidate: Score, at: Layout, base: list[str], chosen: list[str], current: Explanation
     ) -> Explanation:
@@ -356,31 +285,3 @@ class Chooser:
     def _factor(explanation: Explanation) -> float:
         sums = explanation.fitted.statistics
         return inflation(sums.slope, sums.total, sums.run)
-
-
-def pays(after: Explanation, before: Explanation) -> bool:
-    """Whether the error on what was left out falls by more than its own uncertainty.
-
-    Runs are left out. What shows in one run alone cannot be foreseen from the others: where most of what the log says
-    of the newest effect is in one run, stretches of all runs may be left out instead.
-    """
-    if _falls(after.left_out, before.left_out):
-        return True
-    return in_one_run(after) and _falls(by_stretches(after), by_stretches(before))
-
-
-def _falls(after: Array, before: Array) -> bool:
-    gain = before - after
-    return float(gain.sum()) > float(np.sqrt(len(gain)) * gain.std(ddof=1))
-
-
-def in_one_run(explanation: Explanation) -> bool:
-    """Whether one run of several holds most of the information on the newest effect."""
-    fitted, newest = explanation.fitted, explanation.effects[-1]
-    sizes = [fitted.model.effect(n).theta.numel() for n in explanation.names]
-    begin = sum(sizes[: explanation.names.index(newest)])
-    described = fitted.model.effect(newest).parameters_of
-    scale = np.array([p.scale for p in described])
-    own = np.diagonal(fitted.statistics.hessian, axis1=1, axis2=2)[:, begin : begin + len(scale)] @ scale**2
-    by_run = np.array([own[fitted.statistics.run == run].sum() for run in np.unique(fitted.statistics.run)])
-    return len(by_run) > 1 and bool(by_run.max() > ONE_RUN * by_run.sum())

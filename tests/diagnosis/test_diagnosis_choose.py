@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from small_logs import make_log, small_vehicle
 
@@ -10,6 +11,8 @@ from auvnn.diagnosis.choose import Chooser
 from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.explain import explain, weigh
 from auvnn.diagnosis.nuisance import lay_out
+from auvnn.diagnosis.rivals import Rivals
+from auvnn.diagnosis.score import Score
 from auvnn.models import GreyBox
 
 LIGHT, PUSH = {"net_buoyancy": {"force": 6.0}}, {"constant_force": {"Y": 5.0}}
@@ -81,7 +84,7 @@ def test_the_values_told_are_those_of_the_fit_with_all_that_was_found(model, two
 
 def test_two_effects_that_do_as_badly_alone_are_named_together(model, two, monkeypatch):
     """As if neither were ahead of the other; alone they leave what both together explain."""
-    monkeypatch.setattr(Chooser, "_told_apart", lambda self, best, other: False)
+    monkeypatch.setattr(Rivals, "told_apart", lambda self, best, other: False)
     found = diagnose(model, two, NAMES)
     assert found.steps[0]["verdict"] == "named" and set(found.steps[0]["effects"]) == set(NAMES)
     assert set(found.missing) == set(NAMES)
@@ -98,7 +101,7 @@ def standing(model, log):
     chooser = Chooser(layout, windows, lambda words: None)
     each = [weigh(layout, explain(layout, windows, base, [n]), 1.0) for n in NAMES]
     each.sort(key=lambda e: -e.evidence)
-    return each, *chooser._standing(each, layout, base, 1.0)
+    return each, *chooser.rivals.standing(each, layout, base, 1.0)
 
 
 def test_evidence_gives_no_name_to_what_the_data_refute(model):
@@ -114,3 +117,17 @@ def test_a_better_fit_by_more_parameters_refutes_nothing_that_is_needed_beside_i
     assert best is each[0] and len(others) == 1
     each, best, others = standing(model, logged(model, LIGHT))
     assert best.effects == ("net_buoyancy",) and [e.effects for e in others] == [("constant_force",)]
+
+
+def scored(name, gain, degrees):
+    nothing = np.zeros(degrees)
+    return Score(name, 1e-4, gain, degrees, 1.0, nothing, nothing, -20.0, gain)
+
+
+def test_what_might_fit_better_than_the_one_in_the_lead_is_tried_however_many_parameters_it_has():
+    leader = scored("net_buoyancy", 14.0, 1)
+    clear, chance, more = scored("thruster_gain", 44.0, 8), scored("constant_force", 28.0, 6), scored("payload", 42.0, 8)
+    promising = Chooser._promising
+    assert promising([leader, clear, chance, more], [leader]) == [clear]
+    assert promising([leader, chance], [leader]) == [], "14 more by six parameters are chance in three of a hundred"
+    assert promising([leader, clear], [leader, clear]) == [] == promising([clear], [])

@@ -11,7 +11,6 @@ from linear_world import STATED, World, layout
 from scipy.stats import multivariate_normal
 from small_logs import make_log, small_vehicle
 
-from auvnn.diagnosis.choose import in_one_run, pays
 from auvnn.diagnosis.explain import (
     FOLDS,
     Explanation,
@@ -25,6 +24,7 @@ from auvnn.diagnosis.explain import (
     weigh,
 )
 from auvnn.diagnosis.nuisance import lay_out, priors, scales, stated
+from auvnn.diagnosis.pays import in_one_run, pays
 from auvnn.logs import Log, Run
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
