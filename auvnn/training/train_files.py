@@ -36,7 +36,8 @@ from auvnn.training.groups import GROUP
 from auvnn.training.held_out import score
 from auvnn.training.history import Record
 from auvnn.training.objectives.base import build_objective
-from auvnn.training.parted import PartedProblem, Source
+from auvnn.training.parted import PartedProblem
+from auvnn.training.scratch import Source
 from auvnn.training.shares import Say, Shares, named, paths_of, planned, refuse_leakage, shared_out
 from auvnn.training.train import Training, history_of, metrics_of
 

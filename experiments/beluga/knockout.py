@@ -29,7 +29,7 @@ from auvnn.logs import Log
 from auvnn.models import GreyBox, load
 from auvnn.models.saving import remove
 
-MOST = 2  # names one after the other: the first decides, the second tells whether it comes back at all
+MOST = 4  # names one after the other: the first decides, the others tell whether it comes back at all
 SHOWN = 6  # of the ranking
 
 
@@ -80,6 +80,7 @@ def case(model: GreyBox, log: Log, removed: str | None) -> dict:
         "steps": steps,
         "named_first": removed is not None and head[:1] == [removed] and found.verdict == "named",
         "in_first_group": removed in head,
+        "nearest": list(found.nearest),
         "named_later": any(removed in s["effects"] for s in found.steps[1:]),
         "rank_by_evidence": [c["effect"] for c in found.candidates].index(removed) + 1 if removed else None,
         "rank_by_p_value": [c["effect"] for c in by_p].index(removed) + 1 if entry and entry in by_p else None,
@@ -113,6 +114,7 @@ def main() -> None:
             told = ", ".join(f"{r['effect']} {r['gain']:.3f} +- {r['std']:.3f}" for r in found["ranking"][:3])
         else:
             told = " then ".join(f"{s['verdict']} {' or '.join(s['effects'])}".strip() for s in found["steps"])
+            told += f"; nearest {', '.join(found['nearest'])}" if found["nearest"] else ""
         print(f"without {name}: {told} ({found['seconds']} s)", flush=True)
         back = sum(bool(c["named_first"] or c.get("in_first_group")) for c in cases)
         of = sum(c["removed"] is not None for c in cases)

@@ -28,7 +28,8 @@ from auvnn.models import GreyBox
 from auvnn.training import groups, train, train_files
 from auvnn.training import train_files as module_function
 from auvnn.training.held_out import score
-from auvnn.training.parted import PartedProblem, Source
+from auvnn.training.parted import PartedProblem
+from auvnn.training.scratch import Source
 from auvnn.training.targets import targets
 
 files = sys.modules["auvnn.training.train_files"]
