@@ -186,12 +186,10 @@ class Beside:
         more about that part than about the candidates once the part is left out.
         """
         held = priors(layout, names, free=[asked])
-        precision, at = held.precision.copy(), 0
-        for name in names:
-            size = len(layout.columns[name])
+        precision = held.precision.copy()
+        for name, own in layout.places(names).items():
             if name in self.model.effect_names and name not in layout.spreads and name != asked:
-                precision[at : at + size] = scales(layout, name) ** -2.0
-            at += size
+                precision[own] = scales(layout, name) ** -2.0
         return Priors(held.mean, precision, held.reach)
 
     def _settled(

@@ -74,10 +74,8 @@ def plausible(layout: Layout, names: Sequence[str], effects: Sequence[str], held
     What is left out may be all that says anything of a parameter. It is then not foreseen anywhere, but where the
     evidence looks for it too; a shape near where it was found.
     """
-    mean, precision, at = held.mean.copy(), held.precision.copy(), 0
-    for name in names:
-        own = slice(at, at + len(layout.columns[name]))
-        at = own.stop
+    mean, precision = held.mean.copy(), held.precision.copy()
+    for name, own in layout.places(names).items():
         if name in effects:
             precision[own] = np.maximum(precision[own], scales(layout, name) ** -2.0)
             mean[own] = np.where(shapes(layout, name), theta[own], mean[own])

@@ -13,13 +13,13 @@ import numpy as np
 
 from auvnn.answers import Answer, plain
 from auvnn.diagnosis.cut import HORIZON, WARMUP, candidates_for, check_window, windows_for
-from auvnn.diagnosis.explain import Explanation, explain, standard_errors
+from auvnn.diagnosis.explain import explain
 from auvnn.diagnosis.learned_drag import reduced
 from auvnn.diagnosis.left_over import slow
 from auvnn.diagnosis.many import SEARCH
-from auvnn.diagnosis.nuisance import Layout, lay_out
+from auvnn.diagnosis.nuisance import lay_out
 from auvnn.diagnosis.probes import start_at
-from auvnn.diagnosis.told import told
+from auvnn.diagnosis.table import values
 from auvnn.diagnosis.trend import Trend, trend
 from auvnn.effects import effect_class
 from auvnn.errors import AuvnnError, ConfigError, InputError, one_line
@@ -211,8 +211,8 @@ def _fitted(question: Question, path: Path) -> dict[str, Any]:
         "verdict": "unknown" if slow(found, TRUST * motion(windows) + 1e-9) else "adequate",
         "cv": found.cv,
         "settled": found.fitted.converged,
-        "parameters": _values(layout, found, names),
-        "coefficients": _values(layout, found, [n for n in layout.nuisance if n not in names]),
+        "parameters": values(layout, found, names),
+        "coefficients": values(layout, found, [n for n in layout.nuisance if n not in names]),
     }
 
 
@@ -223,17 +223,6 @@ def _log(question: Question, path: Path) -> Log:
     horizon = HORIZON if question.window is None else float(question.window)
     cut = Cut(horizon, WARMUP, question.model.actuation, question.mapping)
     return Log.from_runs(runs_of(plan_file(cut, path).spread(question.windows), cut), path.stem)
-
-
-def _values(layout: Layout, found: Explanation, wanted: Sequence[str]) -> dict[str, Any]:
-    out, at = {}, 0
-    for name in found.names:
-        effect = layout.model.effect(name)
-        columns = np.arange(at, at + len(effect.parameters_of))
-        at += len(columns)
-        if name in wanted:
-            out[name] = told(effect, found.fitted.theta[columns], standard_errors(found, columns)[0])
-    return out
 
 
 def _named(path: Path) -> float | None:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from auvnn.answers import Answer, plain
@@ -15,24 +14,23 @@ from auvnn.catalogue import unknown_name
 from auvnn.diagnosis.bake import baked
 from auvnn.diagnosis.compare import stitch
 from auvnn.diagnosis.cut import windows_for
-from auvnn.diagnosis.explain import Explanation, determined, explain, standard_errors
+from auvnn.diagnosis.explain import Explanation, determined, explain
+from auvnn.diagnosis.gains import noise_floor, paired_gain
 from auvnn.diagnosis.nuisance import Layout, lay_out
 from auvnn.diagnosis.one_step_fit import explain_one_step, left_out_gain
 from auvnn.diagnosis.probes import start_at
-from auvnn.diagnosis.told import told
+from auvnn.diagnosis.table import values
 from auvnn.effects import effect_class
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log
 from auvnn.logs.overlap import leakage
-from auvnn.metrics.noise import attitude_noise, white
 from auvnn.metrics.one_step import choose_derivative, one_step, scores
-from auvnn.metrics.rollouts import HORIZONS, Rolled, Scale, scale_of, table
+from auvnn.metrics.rollouts import HORIZONS, scale_of, table
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
 # Layout, effects that are free anyway, effects asked for, the fit to start from.
 Fit = Callable[[Layout, Sequence[str], Sequence[str], Explanation | None], Explanation]
-BLOCKS = 20
 OBJECTIVES = ("rollout", "one_step")
 
 
@@ -194,8 +192,8 @@ def add(
         results[last],
         {"value": gain, "std": std},
         waterfall,
-        _values(layout, best, names),
-        _values(layout, best, [n for n in layout.nuisance if n not in names]),
+        values(layout, best, names),
+        values(layout, best, [n for n in layout.nuisance if n not in names]),
         held_out,
         final,
         models[1][1],
@@ -272,78 +270,12 @@ def _check(model: GreyBox, names: list[str]) -> None:
             raise ConfigError(f"the model has {name} already: remove it first, or name another effect")
 
 
-def paired_gain(before: Rolled, after: Rolled, scale: Scale) -> tuple[float, float]:
-    """Return by how much the total error falls, and its standard error by leaving out blocks of windows.
-
-    Blocks of neighbouring windows hold the correlation within them (Kuensch 1989, Annals of Statistics 17(3)).
-    """
-    value = before.total(scale) - after.total(scale)
-    count = len(before.windows)
-    block = np.arange(count) * min(BLOCKS, count) // max(count, 1)
-    without = [before.total(scale, block != b) - after.total(scale, block != b) for b in np.unique(block)]
-    n = len(without)
-    if n < 2:
-        return value, float("inf")
-    return value, float(np.sqrt((n - 1) / n * np.sum((np.array(without) - np.mean(without)) ** 2)))
-
-
-def noise_floor(model: GreyBox, rolled: Rolled, log: Log, scale: Scale, seed: int = 0) -> float:
-    """Return the free-running error that a perfect model would show: noise of the outputs and of the start.
-
-    The model's own predictions stand for the truth; they are started again from states with noise as large
-    as the log's and compared with noisy copies of themselves.
-    """
-    from auvnn.metrics.free_run import initial_states, moved, predict
-
-    noise_nu = np.mean([white(r, r.nu) for r in log.runs], axis=0)
-    angle = np.mean([attitude_noise(r) for r in log.runs], axis=0)
-    rng = np.random.default_rng(seed)
-    windows = rolled.windows
-    states = initial_states(model, windows)
-    kick = np.concatenate(
-        [
-            np.zeros((len(windows), 3)),
-            rng.normal(size=(len(windows), 3)) * angle,
-            rng.normal(size=(len(windows), 6)) * noise_nu,
-        ],
-        axis=1,
-    )
-    with torch.no_grad():
-        true = predict(model, windows, states)[1].numpy()
-        started = predict(model, windows, moved(states, torch.as_tensor(kick)))[1].numpy()
-    error = true + rng.normal(size=true.shape) * noise_nu - started
-    mask = windows.mask[..., 6:12].numpy().copy()
-    mask[:, 0] = 0.0
-    good = np.isfinite(error).all((1, 2))
-    if not good.any():
-        return float("nan")
-    squared = (error[good] ** 2 * mask[good]).sum((0, 1)) / np.maximum(mask[good].sum((0, 1)), 1.0)
-    value = np.sqrt(squared) / np.where(scale.std > 0, scale.std, np.nan)
-    return float(np.nanmean(value[scale.excited])) if scale.excited.any() else float("nan")
-
-
-def _values(layout: Any, found: Explanation, names: Sequence[str]) -> dict[str, dict[str, dict[str, Any]]]:
-    out: dict[str, dict[str, dict[str, Any]]] = {}
-    at = 0
-    for name in found.names:
-        size = len(layout.columns[name])
-        columns = np.arange(at, at + size)
-        at += size
-        if name not in names:
-            continue
-        std, _ = standard_errors(found, columns)
-        out[name] = told(layout.model.effect(name), found.fitted.theta[columns], std)
-    return out
-
-
 def _silent(layout: Any, found: Explanation, names: Sequence[str], log: Log) -> list[str]:
     """Return a warning where the log says nothing about some parameters; refuse where it is all of an effect's."""
-    out, at = [], 0
-    for name in found.names:
-        size = len(layout.columns[name])
-        known = determined(found, np.arange(at, at + size))
-        at += size
-        if name not in names or known.all():
+    out, places = [], layout.places(found.names)
+    for name in names:
+        known = determined(found, places[name])
+        if known.all():
             continue
         dark = [
             f"{name}.{p.name}"

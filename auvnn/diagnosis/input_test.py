@@ -189,10 +189,8 @@ def _tested(sums: _Sums, key: str, scale: Array) -> float:
 def _need(sums: _Sums, layout: Layout, own: NDArray[np.int64], scale: Array, name: str) -> float:
     """Return the p-value of a name's parameters being at their null, with a force of some columns in the model."""
     explanation, inside = sums.explanation, sums.inside
-    before = explanation.names[: explanation.names.index(name)]
-    begin = sum(len(layout.columns[n]) for n in before)
     live = np.flatnonzero(~shapes(layout, name))
-    wanted, null = begin + live, layout.means[name][live]
+    wanted, null = layout.places(explanation.names)[name][live], layout.means[name][live]
     kept = np.isin(wanted, inside)
     if not kept.any():
         return 0.0

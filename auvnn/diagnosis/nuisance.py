@@ -59,6 +59,11 @@ class Layout:
         parts = [self.columns[n] for n in names]
         return np.concatenate(parts) if parts else np.zeros(0, dtype=np.int64)
 
+    def places(self, names: Sequence[str]) -> dict[str, NDArray[np.int64]]:
+        """Return where each effect's parameters are in the joined ones of several effects, in the order given."""
+        ends = np.cumsum([len(self.columns[n]) for n in names])
+        return {n: np.arange(end - len(self.columns[n]), end) for n, end in zip(names, ends, strict=True)}
+
 
 def stated(model: GreyBox) -> dict[str, float]:
     """Return the relative standard deviation of each coefficient group that the vehicle has at all."""

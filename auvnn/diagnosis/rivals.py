@@ -72,7 +72,7 @@ class Rivals:
             return False
         both = weigh(self.layout, self.together(other, best, at, base), factor)
         own = len(self.layout.columns[best.effects[-1]])
-        return other.misfit - both.misfit < chi2.isf(ALPHA_NEEDED, own)
+        return bool(other.misfit - both.misfit < chi2.isf(ALPHA_NEEDED, own))
 
     def told_apart(self, best: Explanation, other: Explanation) -> bool:
         """Whether the log decides between two explanations.

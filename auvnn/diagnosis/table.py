@@ -69,24 +69,24 @@ def fill(
     layout: Layout, table: dict[str, dict[str, Any]], explanation: Explanation, before: Explanation
 ) -> None:
     """Replace the one-step figures of an effect by those of its own fit."""
+    found = values(layout, explanation, explanation.effects)
     for name in explanation.effects:
-        columns = _columns(layout, explanation.names, name)
-        std, _ = standard_errors(explanation, columns)
         table[name].update(
             cv_before=before.cv,
             cv_after=float(np.sqrt(_scaled_left_out(explanation, before) / before.left_out_count.sum())),
-            parameters=told(layout.model.effect(name), explanation.fitted.theta[columns], std),
+            parameters=found[name],
         )
 
 
-def _columns(layout: Layout, names: Sequence[str], wanted: str) -> NDArray[np.int64]:
-    at = 0
-    for name in names:
-        size = len(layout.columns[name])
-        if name == wanted:
-            return np.arange(at, at + size)
-        at += size
-    raise KeyError(wanted)
+def values(
+    layout: Layout, found: Explanation, wanted: Sequence[str]
+) -> dict[str, dict[str, dict[str, Any]]]:
+    """Return the named effects' parameters as fitted, with their standard errors, as answers hold them."""
+    places = {n: at for n, at in layout.places(found.names).items() if n in wanted}
+    return {
+        n: told(layout.model.effect(n), found.fitted.theta[at], standard_errors(found, at)[0])
+        for n, at in places.items()
+    }
 
 
 def promised(current: Explanation, found: Score) -> float:

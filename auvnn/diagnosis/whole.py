@@ -126,15 +126,8 @@ class Refit:
 
     def values(self, layout: Layout, wanted: Sequence[str]) -> dict[str, dict[str, dict[str, Any]]]:
         """Return the named effects' parameters with their standard errors, as answers hold them."""
-        out: dict[str, dict[str, dict[str, Any]]] = {}
-        at = 0
-        for name in self.names:
-            effect = layout.model.effect(name)
-            here = slice(at, at + len(effect.parameters_of))
-            at = here.stop
-            if name in wanted:
-                out[name] = told(effect, self.theta[here], self.std[here])
-        return out
+        places = {n: at for n, at in layout.places(self.names).items() if n in wanted}
+        return {n: told(layout.model.effect(n), self.theta[at], self.std[at]) for n, at in places.items()}
 
 
 def refit(
@@ -171,14 +164,9 @@ def refit(
         )
         done = float(step @ normal @ step) < ENOUGH
         theta, steps = theta + step, steps + 1
-    std = _errors(passes, point, sums, priors, _blocks(layout, names))
+    std = _errors(passes, point, sums, priors, list(layout.places(names).values()))
     slow = lasting(sums.channel, sums.count, sums.rough, sums.pairs, sums.windows, floor)
     return Refit(names, parameters_of(model, names), std, sums, steps, done or not len(theta), slow)
-
-
-def _blocks(layout: Layout, names: Sequence[str]) -> list[NDArray[np.int64]]:
-    ends = np.cumsum([len(layout.columns[n]) for n in names])
-    return [np.arange(end - len(layout.columns[n]), end) for n, end in zip(names, ends, strict=True)]
 
 
 def _errors(

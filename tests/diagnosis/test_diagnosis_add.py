@@ -14,7 +14,8 @@ from strange_effects import HeavePush, listed
 
 from auvnn.diagnosis import add
 from auvnn.diagnosis.bake import with_body
-from auvnn.diagnosis.improve import _by_one_step, noise_floor, paired_gain
+from auvnn.diagnosis.gains import noise_floor, paired_gain
+from auvnn.diagnosis.improve import _by_one_step
 from auvnn.diagnosis.nuisance import lay_out
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run

@@ -9,7 +9,7 @@ from auvnn.diagnosis import add
 from auvnn.diagnosis.bake import baked
 from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.explain import explain
-from auvnn.diagnosis.improve import paired_gain
+from auvnn.diagnosis.gains import paired_gain
 from auvnn.diagnosis.nuisance import lay_out
 from auvnn.errors import AuvnnError
 from auvnn.logs import Log
