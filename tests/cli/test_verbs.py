@@ -160,7 +160,8 @@ def test_add_then_remove(report, auvnn, made):
     assert (status, err) == (0, "") and json.loads(out)["removed"] == ["ocean_current"]
     status, _, err = auvnn("remove", "model=without/model", "effect=ocean_current", "out=again")
     assert status == 2 and "ocean_current" in err
-    status, out, _ = auvnn("compare", "model=out/model", f"log={made / 'log.parquet'}", "horizons=[5]", "out=c", "json=true")
+    words = ["model=out/model", f"log={made / 'log.parquet'}", "horizons=[5]", "out=c", "json=true"]
+    status, out, _ = auvnn("compare", *words)
     assert status == 0 and json.loads(out)["rollout"]["5"]["total"] < 0.1
 
 
