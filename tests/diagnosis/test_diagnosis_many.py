@@ -184,7 +184,6 @@ def test_a_long_log_is_searched_on_a_sample_and_fitted_whole(paths, monkeypatch)
         window=2.0,
         max_effects=1,
         advice=False,
-        whiteness=False,
         search=12,
         windows=None,
         leading=1,
