@@ -62,7 +62,7 @@ def make_log(
     uneven: float = 0.0,
     command: np.ndarray | None = None,
     first: int = 0,
-    max_step: float = 0.03,
+    max_step: float = 0.05,
     stir: float = 0.05,
 ) -> Log:
     """Return a log of a model driven by sums of sines.

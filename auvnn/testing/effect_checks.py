@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -101,13 +102,10 @@ def vanishes(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters
 
     Neither does it where parameters of shape have other values, those of `starts` among them.
     """
-    scene = make_scene(vehicle, actuation)
-    plain = Predictor(GreyBox(vehicle, actuation=actuation))
+    scene, expected = _without(vehicle, actuation)
     described = kind.describe(vehicle, actuation)
     shapes = [{}, *_all_starts(kind, described, Extent(0.0, 1.0, 1.0, (3.0, 5.0)))[:5]]
     shapes.append({p.name: v for p in described if p.shape for v in (p.probes or (p.null + 0.3 * p.scale,))})
-    with torch.no_grad():
-        expected = plain(scene)
     for shape in shapes:
         null = Predictor(GreyBox(vehicle, [kind.build(vehicle, actuation, shape)], actuation=actuation))
         with torch.no_grad():
@@ -115,6 +113,14 @@ def vanishes(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters
         for output, value in expected.items():
             for a, b in zip(found[output].flatten(0, -2), value.flatten(0, -2), strict=True):
                 require_close(a, b, 1e-15, f"{kind.name} at its null {shape or ''} changes {output}")
+
+
+@lru_cache(maxsize=2)
+def _without(vehicle: Vehicle, actuation: str) -> tuple[Scene, dict[str, torch.Tensor]]:
+    """Return a scene and what happens in it without any effect, which is the same for all of them."""
+    scene = make_scene(vehicle, actuation)
+    with torch.no_grad():
+        return scene, Predictor(GreyBox(vehicle, actuation=actuation))(scene)
 
 
 def batches(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:

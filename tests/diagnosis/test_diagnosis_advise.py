@@ -42,7 +42,7 @@ def twins(monkeypatch):
 
 def test_an_ambiguous_answer_says_what_to_drive_and_it_is_what_tilts_the_vehicle(twins):
     model, log = twins
-    found = diagnose(model, log, [*NAMES, "thruster_lag"])
+    found = diagnose(model, log, [*NAMES, "thruster_lag"], whiteness=False)
     assert found.verdict == "ambiguous"
     after = found.to_dict()["next_experiment"]
     assert set(after["separates"]) == set(NAMES) and after["manoeuvre"] == "rotation"
@@ -53,7 +53,7 @@ def test_an_ambiguous_answer_says_what_to_drive_and_it_is_what_tilts_the_vehicle
     # Driving it settles the question.
     made = simulate(model, "rotation", {"name": "realistic"}, {"net_buoyancy": {"force": 6.0}}, 3, runs=1,
                     duration=60.0, rate=10.0, max_step=0.05)
-    settled = diagnose(model, made.log, NAMES)
+    settled = diagnose(model, made.log, NAMES, whiteness=False)
     assert (settled.verdict, settled.missing) == ("named", ["net_buoyancy"])
     assert settled.next_experiment is None
 
@@ -81,7 +81,7 @@ def test_without_advice_nothing_is_simulated(twins, monkeypatch):
     model, log = twins
     module = sys.modules["auvnn.diagnosis.search"]
     monkeypatch.setattr(module, "advise", None)
-    assert diagnose(model, log, NAMES, advice=False).next_experiment is None
+    assert diagnose(model, log, NAMES, advice=False, whiteness=False).next_experiment is None
 
 
 def test_where_nothing_would_help_it_says_so():

@@ -87,7 +87,7 @@ def test_a_name_that_explains_a_part_is_the_nearest_and_not_the_cause(model):
     """A steady push besides: a constant force explains that, and is not what comes and goes."""
     truth = pushed(model, 12.0).with_effects({"constant_force": {"X": 8.0}})
     log = make_log(truth, runs=2, duration=15.0, noise=1.0)
-    found = diagnose(model, log, ["constant_force"])
+    found = diagnose(model, log, ["constant_force"], whiteness=False)
     assert (found.verdict, found.missing, found.nearest) == ("unknown", [], ["constant_force"])
     assert found.steps == [{"verdict": "unknown", "effects": [], "p_value": found.steps[0]["p_value"]}]
     # What the nearest leaves is what nothing in the catalogue explains.
@@ -116,14 +116,14 @@ def test_a_withdrawn_name_is_not_among_the_nearest(model, monkeypatch):
     """A name that was taken first and withdrawn does not stand, whatever is left."""
     truth = pushed(model, 12.0).with_effects({"constant_force": {"X": 8.0}, "net_buoyancy": {"force": 6.0}})
     log = make_log(truth, runs=2, duration=15.0, noise=1.0)
-    both = diagnose(model, log, ["constant_force", "net_buoyancy"], advice=False).nearest
+    both = diagnose(model, log, ["constant_force", "net_buoyancy"], advice=False, whiteness=False).nearest
     assert set(both) == {"constant_force", "net_buoyancy"}
 
     def gone(self, taken, base):
         return explain(self.layout, self.windows, base, taken.effects[1:]), [taken.effects[0]]
 
     monkeypatch.setattr(Chooser, "withdrawn", gone)
-    assert diagnose(model, log, ["constant_force", "net_buoyancy"], advice=False).nearest == both[1:]
+    assert diagnose(model, log, ["constant_force", "net_buoyancy"], advice=False, whiteness=False).nearest == both[1:]
 
 
 def test_a_further_effect_takes_a_clearer_test_than_the_first(model, monkeypatch):
@@ -135,7 +135,7 @@ def test_a_further_effect_takes_a_clearer_test_than_the_first(model, monkeypatch
         return asked_for[0] if len(asked_for) == 1 else 0.03
 
     monkeypatch.setattr("auvnn.diagnosis.null_tests.together", doubtful)
-    found = diagnose(model, log, ["net_buoyancy", "constant_force"], advice=False)
+    found = diagnose(model, log, ["net_buoyancy", "constant_force"], advice=False, whiteness=False)
     assert [s["verdict"] for s in found.steps] == ["named", "adequate"] and len(asked_for) == 2
     assert found.steps[1]["p_value"] == 0.03
     # The first is asked at 0.05.
@@ -143,14 +143,14 @@ def test_a_further_effect_takes_a_clearer_test_than_the_first(model, monkeypatch
     tried: list[int] = []
     choose = Chooser.choose
     monkeypatch.setattr(Chooser, "choose", lambda *a, **k: tried.append(1) or choose(*a, **k))
-    diagnose(model, log, ["net_buoyancy", "constant_force"], advice=False)
+    diagnose(model, log, ["net_buoyancy", "constant_force"], advice=False, whiteness=False)
     assert len(tried) == 1
 
 
 def test_solvers_that_differ_are_no_force(model):
-    """No noise at all, and steps of the plant a tenth of the diagnosis's."""
-    log = make_log(model, runs=2, duration=15.0, noise=0.0, max_step=0.005)
-    found = diagnose(model, log, ["net_buoyancy"])
+    """No noise at all, and steps of the plant a fifth of the diagnosis's: the difference is as of a tenth."""
+    log = make_log(model, runs=2, duration=15.0, noise=0.0, max_step=0.01)
+    found = diagnose(model, log, ["net_buoyancy"], whiteness=False)
     assert (found.verdict, found.acts_in) == ("adequate", {})
 
 

@@ -21,6 +21,12 @@ def model():
     return GreyBox(small_vehicle())
 
 
+@pytest.fixture(scope="module")
+def lifted(model):
+    """A log with a hidden buoyancy."""
+    return make_log(model.with_effects({"net_buoyancy": {"force": 6.0}}), runs=2, duration=12.0, noise=1.0)
+
+
 def turned(model, force):
     """A model that is pushed sideways with twice its heading."""
     return model.rebuilt([HeadingForce.build(model.vehicle, "thrusters", {"force": force})])
@@ -70,11 +76,10 @@ def told(monkeypatch, found, left=0.05, p_value=1.0):
     ],
 )
 def test_a_name_falls_where_it_is_needless_or_leaves_much(
-    model, monkeypatch, p_value, needless, left, missing, nearest
+    model, lifted, monkeypatch, p_value, needless, left, missing, nearest
 ):
-    log = make_log(model.with_effects({"net_buoyancy": {"force": 6.0}}), runs=2, duration=12.0, noise=1.0)
     told(monkeypatch, InputForce("K", "r", p_value, needless), left)
-    found = diagnose(model, log, ["net_buoyancy"], advice=False, whiteness=False)
+    found = diagnose(model, lifted, ["net_buoyancy"], advice=False, whiteness=False)
     assert (found.missing, found.nearest) == (missing, nearest)
     # A force that is beyond doubt is left whoever stands.
     assert found.steps[-1]["verdict"] == ("unknown" if p_value < 1e-3 else "adequate")

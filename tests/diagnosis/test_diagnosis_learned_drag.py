@@ -31,7 +31,7 @@ def trained(hidden, runs=3, duration=12.0):
 
 def check(effect, name, value, **size):
     model, log = trained({effect: {name: value}}, **size)
-    found = diagnose(model, log, [*NAMES, effect], advice=False)
+    found = diagnose(model, log, [*NAMES, effect], advice=False, whiteness=False)
     assert (found.verdict, found.missing) == ("named", [effect])
     p = found.candidates[0]["parameters"][name]
     assert abs(p["value"] - value) < 4 * p["std"] + 0.01 * value and p["std"] < 0.05 * value
@@ -50,7 +50,7 @@ def test_a_current_that_they_swallowed_is_named_on_a_log_of_some_length():
 
 def test_honest_subnetworks_are_not_accused():
     model, log = trained(None)
-    found = diagnose(model, log, NAMES, advice=False)
+    found = diagnose(model, log, NAMES, advice=False, whiteness=False)
     assert (found.verdict, found.missing) == ("adequate", [])
 
 

@@ -23,7 +23,7 @@ NAMES = ("cg_offset", "constant_force", "net_buoyancy", "turning_forces", "thrus
     ],
 )
 def test_what_was_hidden_comes_first_with_its_value(effect, values):
-    log = make_log(MODEL.with_effects({effect: values}), duration=30.0, noise=0.3, max_step=0.05)
+    log = make_log(MODEL.with_effects({effect: values}), duration=20.0, noise=0.3, max_step=0.05)
     first = rank_one_step(MODEL, log, NAMES)[0]
     assert first.effect == effect and first.pays and first.gain > 5 * first.std
     scale = max(abs(v) for v in values.values())
@@ -32,7 +32,7 @@ def test_what_was_hidden_comes_first_with_its_value(effect, values):
 
 
 def test_where_nothing_is_missing_nothing_gains_much():
-    log = make_log(MODEL, duration=30.0, noise=1.0, max_step=0.05)
+    log = make_log(MODEL, duration=20.0, noise=1.0, max_step=0.05)
     for found in rank_one_step(MODEL, log, NAMES):
         assert found.gain < max(3 * found.std, 0.02 * found.before), found
 
@@ -41,9 +41,9 @@ def test_an_effect_and_its_double_are_one_group():
     """A constant force in a vehicle that never turns is what net buoyancy is: neither may be called better."""
     light = MODEL.with_effects({"net_buoyancy": {"force": 6.0}})
     # The four upright thrusters alone, all alike.
-    command = np.zeros((301, 8))
-    command[:, 4:] = 0.2 * sines(np.arange(301) / 10, 1, 3)
-    still = make_log(light, duration=30.0, noise=0.3, max_step=0.05, command=command, stir=0.0)
+    command = np.zeros((201, 8))
+    command[:, 4:] = 0.2 * sines(np.arange(201) / 10, 1, 3)
+    still = make_log(light, duration=20.0, noise=0.3, max_step=0.05, command=command, stir=0.0)
     found = {r.effect: r for r in rank_one_step(MODEL, still, ("net_buoyancy", "constant_force", "thruster_lag"))}
     best = max(found.values(), key=lambda r: r.gain)
     assert best.effect == "net_buoyancy" or found["net_buoyancy"].tied

@@ -101,10 +101,11 @@ def test_every_plot_is_a_figure_whose_axes_say_quantity_and_unit(name):
 
 @pytest.mark.parametrize("name", DRAWN)
 def test_equal_data_give_equal_files_whatever_the_users_settings(name):
-    plain = style.svg(DRAWN[name]())
+    # Laid out once, as pages do; `test_png_files_are_equal_too_and_as_fine_as_asked` leaves that to the drawing.
+    plain = style.svg(style.settle(DRAWN[name]()))
     with mpl.rc_context({"font.size": 20, "axes.grid": True, "lines.linewidth": 7, "svg.fonttype": "none"}):
         before = dict(mpl.rcParams)
-        assert style.svg(DRAWN[name]()) == plain
+        assert style.svg(style.settle(DRAWN[name]())) == plain
         assert dict(mpl.rcParams) == before
 
 
@@ -441,7 +442,7 @@ ODD = {
 @pytest.mark.filterwarnings("error")
 def test_odd_data_are_drawn_without_complaint(name):
     figure = ODD[name]()
-    assert len(style.svg(figure)) > 1000
+    assert len(style.svg(style.settle(figure))) > 1000
     assert figure.get_figwidth() <= style.PAGE + 1e-9
     assert figure.get_figheight() < 12
 
@@ -465,7 +466,7 @@ def test_hostile_names_are_drawn_as_text(name):
         excitation([{"channel": name, "std": 1.0, "noise": 0.1, "unit": name}]),
         history([1.0, 0.5], step=name, error=name),
     ):
-        text = style.svg(figure)
+        text = style.svg(style.settle(figure))
         tags = {element.tag.rpartition("}")[2] for element in ET.fromstring(text).iter()}
         assert "b" not in tags and "path" in tags
         assert "\x1b" not in text and "\u202e" not in text

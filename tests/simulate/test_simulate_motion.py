@@ -201,7 +201,7 @@ LAG, DELAY = {"thruster_lag": {"time_constant": 0.3}}, {"actuation_delay": {"del
 @pytest.mark.parametrize("actuators", [LAG, DELAY, {**DELAY, **LAG}])
 def test_closed_loop_replayed_in_open_loop_is_the_same(actuators):
     hidden = {**actuators, "ocean_current": {"v_north": 0.1}}
-    made = simulate(model_of("bluerov2_heavy"), "survey", "none", hidden, runs=2, duration=6.0)
+    made = simulate(model_of("bluerov2_heavy"), "survey", "none", hidden, runs=2, duration=3.0)
     t = torch.tensor(made.log.runs[0].t)
     with torch.no_grad():
         for run in made.log.runs:

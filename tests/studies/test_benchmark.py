@@ -26,7 +26,8 @@ OPTIONS: dict[str, Any] = {
     "vehicles": "rov95", "coefficients": "exact", "repeats": 3, "seed": 1000, "runs": 4, "duration": 60,
     "rate": 20, "workers": 1,
 }  # fmt: skip
-TINY = {**OPTIONS, "effects": "net_buoyancy", "sizes": "medium", "repeats": 1, "runs": 2, "duration": 20}
+TINY = {**OPTIONS, "effects": "net_buoyancy", "sizes": "medium", "repeats": 1, "runs": 2, "duration": 20,
+        "rate": 10}  # fmt: skip
 
 
 def row(

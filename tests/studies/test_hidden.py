@@ -20,7 +20,7 @@ from auvnn.training.ran import output_error
 
 # The contract's realistic noise: x, y, z; roll, pitch, yaw; u, v, w; p, q, r; accelerations are not measured.
 SIGMA = np.array([0.05, 0.05, 0.01, 0.003, 0.003, 0.008, *[0.006] * 3, *[0.003] * 3, *[np.inf] * 6])
-SHORT = {"runs": 1, "duration": 6.0, "rate": 20.0}
+SHORT = {"runs": 1, "duration": 6.0, "rate": 10.0}
 # One parameter, several, one that is bounded below by its null, one that sits in the sensor.
 MEASURED = ["net_buoyancy", "ocean_current", "thruster_lag", "velocity_lever_arm"]
 
