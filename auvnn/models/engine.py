@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import weakref
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import torch
@@ -20,7 +21,7 @@ from torch import Tensor, nn
 from auvnn.compiled import toolchain
 from auvnn.compiled.check import disagreement
 from auvnn.compiled.kernel import Kernel
-from auvnn.compiled.program import Layout, Numbers, trace, trace_plain
+from auvnn.compiled.program import Layout, Numbers, Program, trace, trace_plain
 from auvnn.compiled.recorder import CannotCompile
 from auvnn.compiled.source import write
 from auvnn.errors import ConfigError
@@ -292,7 +293,7 @@ def _traced(
     one = {name: x[0] for name, x in sample.items()}
     plain = trace(side, layout, numbers, one, False)
     joint = trace(side, layout, numbers, one, True) if gradient else None
-    source = write(layout, (plain, joint), trace_plain(unit_attitude, SIZE), tableau)
+    source = write(layout, (plain, joint), _attitude(), tableau)
     kernel = _KERNELS.get(source)
     if kernel is None:
         places = [place for place, _ in joint.parameter_gradient] if joint else []
@@ -300,6 +301,12 @@ def _traced(
         while len(_KERNELS) > _MOST:
             _KERNELS.pop(next(iter(_KERNELS)))
     return kernel, numbers.fixed()
+
+
+@lru_cache(maxsize=1)
+def _attitude() -> tuple[Program, Program]:
+    """Return what makes an attitude's quaternion a unit one, the same for all models."""
+    return trace_plain(unit_attitude, SIZE)
 
 
 def _samples(layout: Layout, count: int, seed: int) -> dict[str, Tensor]:

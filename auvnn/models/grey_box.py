@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import weakref
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -52,6 +53,10 @@ class Prepared:
     added: Tensor
     total: Tensor
     inverse: Tensor
+
+
+# A model's `without_absent`, as long as the same effects are there.
+_WITHOUT: weakref.WeakKeyDictionary[nn.Module, GreyBox] = weakref.WeakKeyDictionary()
 
 
 class GreyBox(nn.Module):
@@ -188,12 +193,28 @@ class GreyBox(nn.Module):
     def without_absent(self, keep: Sequence[str] = ()) -> GreyBox:
         """Return the model without the effects that are at their nulls, but for those named in `keep`.
 
-        It predicts the same at less cost. Effects and subnetworks are shared with this model, not copied.
+        It predicts the same at less cost. Effects and subnetworks are shared with this model, not copied. While the
+        same effects are there it is the same model each time: what runs it compiled knows it again.
         """
         left = [e for e in self.members if e.name in keep or not e.absent()]
         if len(left) == len(self.members):
             return self
-        return GreyBox(self.vehicle, left, self.damping, self.actuation).to(self._known("mass"))
+        known = _WITHOUT.get(self)
+        if known is None or not known.shares(self, left):
+            known = GreyBox(self.vehicle, left, self.damping, self.actuation).to(self._known("mass"))
+            _WITHOUT[self] = known
+        return known
+
+    def shares(self, other: GreyBox, effects: Sequence[Effect]) -> bool:
+        """Whether this model has these very effects, and all else in common with another one."""
+        return (
+            len(self.members) == len(effects)
+            and all(mine is theirs for mine, theirs in zip(self.members, effects, strict=True))
+            and self.damping is other.damping
+            and self.vehicle is other.vehicle
+            and self._known("mass").dtype == other._known("mass").dtype
+            and self._known("mass").device == other._known("mass").device
+        )
 
     def prepare(self, moment: Moment | None = None) -> Prepared:
         """Work out body and inertia matrices; `moment` is needed only where an effect varies in time."""

@@ -29,7 +29,7 @@ from auvnn.logs import Log
 from auvnn.models import GreyBox, load
 from auvnn.models.saving import remove
 
-MOST = 4  # names one after the other: the first decides, the others tell whether it comes back at all
+MOST = 2  # names one after the other: the first decides, the second tells whether it comes back at all
 SHOWN = 6  # of the ranking
 
 
