@@ -99,7 +99,7 @@ def make_log(
         starts.append([0.0, 0.0, 5.0, np.cos(heading / 2), 0.0, 0.0, np.sin(heading / 2), *stir * random.normal(size=6)])
     t, held, start = (torch.tensor(np.stack(x)) for x in (times, commands, starts))
     with torch.no_grad():
-        run = model.rollout(start[:, :7], start[:, 7:], held, t, max_step=max_step)
+        run = model.rollout(start[:, :7], start[:, 7:], held, t, max_step=max_step, engine="firm")
         rate_of = model.nu_dot(run.eta[..., :3], quat_to_matrix(run.eta[..., 3:]), run.nu, run.thrust, Inputs(held), t)
         seen = model.sense(Sensed(run.eta[..., :3], run.eta[..., 3:], run.nu, rate_of))
     assert not run.diverged and seen.nu_dot is not None

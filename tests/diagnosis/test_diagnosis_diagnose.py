@@ -186,7 +186,7 @@ def test_a_group_does_not_end_the_search_and_is_looked_at_again_beside_what_came
     truth = [effect_class(n).build(model.vehicle, "wrench", {"force": f})
              for n, f in (("net_buoyancy", lift), ("heading_force", 3.0))]
     log = make_log(model.rebuilt(truth), runs=3, duration=10.0, noise=1.0,
-                   command=sines(t, 6, 3) * [0, 0, 15.0, 0, 0, 6.0], stir=0.0)
+                   command=sines(t, 6, 3) * [0, 0, 15.0, 0, 0, 6.0], stir=0.0, max_step=0.03)
     group, verdict = {"net_buoyancy", "heave_push"}, "named" if lift > 5.0 else "ambiguous"
     if verdict == "named":
         group.discard("heave_push")
