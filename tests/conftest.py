@@ -19,8 +19,8 @@ if "AUVNN_CACHE" not in os.environ:
     os.environ["AUVNN_CACHE"] = KERNELS.name
 COMPILED = ("diagnosis", "studies")
 
-import pytest
-import torch
+import pytest  # noqa: E402
+import torch  # noqa: E402
 
 torch.set_num_threads(1)
 
