@@ -17,7 +17,7 @@ os.environ.setdefault("AUVNN_ENGINE", "torch")
 if "AUVNN_CACHE" not in os.environ:
     KERNELS = tempfile.TemporaryDirectory(prefix="auvnn-kernels-")
     os.environ["AUVNN_CACHE"] = KERNELS.name
-COMPILED = ("diagnosis", "studies")
+COMPILED = ("diagnosis", "simulate", "studies")
 
 import pytest  # noqa: E402
 import torch  # noqa: E402
@@ -32,7 +32,7 @@ page.FILE_DPI = 40
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_protocol(item):
-    """Run diagnoses as users do, compiled."""
+    """Run what runs free a thousand times as users do, compiled."""
     before = os.environ["AUVNN_ENGINE"]
     if before == "torch" and Path(item.fspath).parent.name in COMPILED:
         os.environ["AUVNN_ENGINE"] = "auto"

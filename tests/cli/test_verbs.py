@@ -11,8 +11,10 @@ import pytest
 
 from auvnn.cli.main import VERBS, main
 from auvnn.cli.speech import Speaker
+from auvnn.diagnosis import compare
 from auvnn.errors import InputError
 from auvnn.logs import Log
+from auvnn.models import load
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -160,9 +162,8 @@ def test_add_then_remove(report, auvnn, made):
     assert (status, err) == (0, "") and json.loads(out)["removed"] == ["ocean_current"]
     status, _, err = auvnn("remove", "model=without/model", "effect=ocean_current", "out=again")
     assert status == 2 and "ocean_current" in err
-    words = ["model=out/model", f"log={made / 'log.parquet'}", "horizons=[5]", "out=c", "json=true"]
-    status, out, _ = auvnn("compare", *words)
-    assert status == 0 and json.loads(out)["rollout"]["5"]["total"] < 0.1
+    after = compare(load("out/model"), Log.read(made / "log.parquet"), horizons=[5])
+    assert after.rollout["5"]["total"] < 0.1
 
 
 def test_train(report, made):

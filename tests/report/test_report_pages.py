@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+from filelock import FileLock
 from html_reading import PageText, broken_references, dangers
 from markupsafe import Markup
 from report_fakes import (
@@ -78,9 +79,20 @@ def drawer(kind: str) -> Page:
     return importlib.import_module(f"auvnn.report.pages.{kind}").PAGE
 
 
-@pytest.fixture(scope="module")
-def pages() -> dict[str, str]:
-    return {kind: drawer(kind).page(make(kind, 1200, 1)) for kind in KINDS}
+@pytest.fixture(scope="session")
+def pages(tmp_path_factory, worker_id) -> dict[str, str]:
+    """Return all pages; whichever worker needs them first draws them for all."""
+
+    def drawn():
+        return {kind: drawer(kind).page(make(kind, 1200, 1)) for kind in KINDS}
+
+    if worker_id == "master":
+        return drawn()
+    place = tmp_path_factory.getbasetemp().parent / "pages.json"
+    with FileLock(f"{place}.lock"):
+        if not place.exists():
+            place.write_text(json.dumps(drawn()), encoding="utf-8")
+    return json.loads(place.read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("kind", KINDS)
