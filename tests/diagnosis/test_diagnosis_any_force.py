@@ -148,7 +148,7 @@ def test_a_further_effect_takes_a_clearer_test_than_the_first(model, monkeypatch
 
 
 def test_solvers_that_differ_are_no_force(model):
-    """No noise at all, and steps of the plant a fifth of the diagnosis's: the difference is as of a tenth."""
+    """No noise at all, and steps of the plant that are a fifth of those with which a diagnosis begins."""
     log = make_log(model, runs=2, duration=15.0, noise=0.0, max_step=0.01)
     found = diagnose(model, log, ["net_buoyancy"], whiteness=False)
     assert (found.verdict, found.acts_in) == ("adequate", {})
