@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from auvnn.diagnosis.explain import Explanation, explain, weigh
-from auvnn.diagnosis.nuisance import Layout
+from auvnn.diagnosis.nuisance import Layout, shapes
 from auvnn.diagnosis.pays import pays
 from auvnn.diagnosis.rivals import ALPHA_NEEDED, ODDS, Rivals
 from auvnn.diagnosis.score import Score, inflation
@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 ALPHA = 0.05
 # Explanations are refitted in full, nonlinearly, as long as their one-step evidence is within reach of the best.
 LEADERS, REACH, REACH_SHARE = 5, 30.0, 0.5
+# Parts of what a test estimates from which a fit is begun, the next where it went astray from the one before: near the
+# bottom the force grows faster than any slope says.
+SHARES = (1.0, 0.1)
 
 
 @dataclass(frozen=True)
@@ -250,18 +253,36 @@ class Chooser:
         self.say(f"fitting {candidate.effect}")
         guess = at.model.rebuilt(at.model.copied_effects())
         known = parameters_of(at.model, [candidate.effect])
-        start = np.where(np.isfinite(candidate.estimate), candidate.estimate, known)
-        set_parameters(guess, [candidate.effect], start)
-        return explain(
-            self.layout,
-            self.windows,
-            base,
-            [*chosen, candidate.effect],
-            start=current.fitted,
-            guess=replace(at, model=guess),
-            sigma=current.fitted.sigma,
-            iterations=6,
-        )
+        start = self._begun(candidate, known)
+        shape = shapes(self.layout, candidate.effect)
+        for share in SHARES:
+            begin = np.where(shape, start, known + share * (start - known))
+            set_parameters(guess, [candidate.effect], begin)
+            found = explain(
+                self.layout,
+                self.windows,
+                base,
+                [*chosen, candidate.effect],
+                start=current.fitted,
+                guess=replace(at, model=guess),
+                sigma=current.fitted.sigma,
+                iterations=6,
+            )
+            # It holds the fit without the effect: one that is worse than that has gone astray.
+            if found.fitted.cost <= current.fitted.cost:
+                break
+        return found
+
+    def _begun(self, candidate: Score, known: Array) -> Array:
+        """Return where to begin the fit of an effect: what its test estimates, on the side of its null that there is.
+
+        A lag, however short, holds back the acceleration that is measured at the instant of a new command. The slope at
+        the null knows nothing of that, and may point to where there is no lag: what matters is to leave the null.
+        """
+        estimate = np.where(np.isfinite(candidate.estimate), candidate.estimate, known)
+        described = self.layout.described(candidate.effect)
+        low = np.array([p.low for p in described])
+        return np.where((known == low) & (estimate < low), 2 * known - estimate, estimate)
 
     def _without(self, after: Explanation, base: list[str], current: Explanation) -> Explanation:
         """Return the same model without the effect, everything else refitted.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.nuisance import DETERMINED, Layout, priors, scales, shapes
 from auvnn.diagnosis.score import inflation
+from auvnn.diagnosis.strays import fit_with_strays
 from auvnn.metrics.windows import Windows
 from auvnn.training.prediction_error import Fitted, Priors, Statistics, fit
 
@@ -48,24 +49,12 @@ class Explanation:
         return float(np.sqrt(self.left_out.sum() / max(self.left_out_count.sum(), 1.0)))
 
 
-def folds(windows: Windows) -> NDArray[np.int64]:
-    """Return each window's fold, (B,): by run where there are several, else by stretch of time."""
-    runs = np.unique(windows.run)
+def folds(run: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the fold of windows of these runs, (B,): by run where there are several, else by stretch of time."""
+    runs = np.unique(run)
     if len(runs) >= 2:
-        return np.searchsorted(runs, windows.run) % FOLDS
-    return (np.arange(len(windows)) * min(FOLDS, len(windows)) // max(len(windows), 1)).astype(np.int64)
-
-
-def by_stretches(explanation: Explanation) -> Array:
-    """Return each window's weighted squared error, fitted without the windows of its part of every run, (B,)."""
-    statistics = explanation.fitted.statistics
-    fold = np.zeros(len(statistics.run), dtype=np.int64)
-    for run in np.unique(statistics.run):
-        own = np.nonzero(statistics.run == run)[0]
-        order = np.argsort(np.argsort(statistics.first[own], kind="stable"))
-        fold[own] = order * min(FOLDS, len(own)) // len(own)
-    held = explanation.judged or explanation.fitted.priors
-    return left_out(statistics, explanation.fitted.theta, held, fold)
+        return np.searchsorted(runs, run) % FOLDS
+    return (np.arange(len(run)) * min(FOLDS, len(run)) // max(len(run), 1)).astype(np.int64)
 
 
 def plausible(layout: Layout, names: Sequence[str], effects: Sequence[str], held: Priors, theta: Array) -> Priors:
@@ -133,17 +122,13 @@ def explain(
     names = tuple(dict.fromkeys([*base, *effects]))
     held = priors(layout, names, free=effects)
     model = (guess or layout).model
-    fitted = fit(
-        model,
-        windows,
-        names,
-        held,
-        initial=None if start is None else start.initial,
-        sigma=sigma,
-        iterations=iterations,
-    )
+    if start is None and sigma is None:
+        fitted = fit_with_strays(model, windows, names, held, iterations=iterations)
+    else:
+        initial = None if start is None else start.initial
+        fitted = fit(model, windows, names, held, initial=initial, sigma=sigma, iterations=iterations)
     judged = plausible(layout, names, effects, held, fitted.theta)
-    cost = left_out(fitted.statistics, fitted.theta, judged, folds(windows))
+    cost = left_out(fitted.statistics, fitted.theta, judged, folds(windows.run))
     count = fitted.statistics.count[:, np.isfinite(fitted.sigma)].sum(1)
     return Explanation(tuple(effects), fitted, names, 0.0, cost, count, judged=judged)
 

@@ -5,36 +5,58 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.explain import Explanation, by_stretches
+from auvnn.diagnosis.explain import Explanation, folds
+from auvnn.training.prediction_error import limits
 
 Array = NDArray[np.float64]
-# Share of the information on an effect from which a run is the only one that counts.
-ONE_RUN = 0.6
 
 
 def pays(after: Explanation, before: Explanation) -> bool:
-    """Whether the error on what was left out falls by more than its own uncertainty.
-
-    Runs are left out. What shows in one run alone cannot be foreseen from the others: where most of what the log says
-    of the newest effect is in one run, stretches of all runs may be left out instead.
-    """
-    if _falls(after.left_out, before.left_out):
-        return True
-    return in_one_run(after) and _falls(by_stretches(after), by_stretches(before))
-
-
-def _falls(after: Array, before: Array) -> bool:
-    gain = before - after
+    """Whether what was left out is foreseen better by more than the gain's own uncertainty."""
+    gain = foreseen(before) - foreseen(after)
     return float(gain.sum()) > float(np.sqrt(len(gain)) * gain.std(ddof=1))
 
 
-def in_one_run(explanation: Explanation) -> bool:
-    """Whether one run of several holds most of the information on the newest effect."""
-    fitted, newest = explanation.fitted, explanation.effects[-1]
-    sizes = [fitted.model.effect(n).theta.numel() for n in explanation.names]
-    begin = sum(sizes[: explanation.names.index(newest)])
-    described = fitted.model.effect(newest).parameters_of
-    scale = np.array([p.scale for p in described])
-    own = np.diagonal(fitted.statistics.hessian, axis1=1, axis2=2)[:, begin : begin + len(scale)] @ scale**2
-    by_run = np.array([own[fitted.statistics.run == run].sum() for run in np.unique(fitted.statistics.run)])
-    return len(by_run) > 1 and bool(by_run.max() > ONE_RUN * by_run.sum())
+def foreseen(explanation: Explanation) -> Array:
+    """Return how well each window was foreseen: minus twice its log predictive density, up to a constant, (B,).
+
+    A fold of runs is left out, its windows foreseen one after the other, each from the other folds and from those
+    before it: the terms of a fold sum to its joint density. What the others leave open of the parameters is part of
+    what they foresee, so that one window that alone says something of a parameter is neither held against an effect
+    nor taken for it: with a guess put in place of what they leave open, it outweighed the gain in all others.
+
+    References: Geisser and Eddy (1979), JASA 74(365) 153-160 (predictive densities of what is left out); Dawid (1984),
+    JRSS A 147(2) 278-292 (one after the other).
+    """
+    fitted = explanation.fitted
+    held, theta = explanation.judged or fitted.priors, fitted.theta
+    # What a bound holds stays there, whatever the slope beyond it promises.
+    low, high = limits(fitted.model, explanation.names, held)
+    inside = np.nonzero(held.inside(theta) & (theta != low) & (theta != high))[0]
+    sums = fitted.statistics.columns(inside)
+    fold = folds(sums.run)
+    precision = held.precision[inside]
+    pull = precision * (theta - held.mean)[inside]
+    out = sums.cost.copy()
+    for f in np.unique(fold):
+        own = np.nonzero(fold == f)[0]
+        known = sums.hessian[fold != f].sum(0) + np.diag(precision)
+        step, volume = _solved(known, sums.slope[fold != f].sum(0) - pull)
+        for w in own[np.lexsort((sums.first[own], sums.run[own]))]:
+            hessian, slope = sums.hessian[w], sums.slope[w]
+            out[w] += step @ hessian @ step - 2 * slope @ step
+            ahead = slope - hessian @ step
+            known = known + hessian
+            change, after = _solved(known, ahead)
+            out[w] += after - volume - ahead @ change
+            step, volume = step + change, after
+    return out
+
+
+def _solved(square: Array, right: Array) -> tuple[Array, float]:
+    """Return the solution of a symmetric system, and the logarithm of its determinant."""
+    # In units of each parameter's own: what is hardly known must not pass for rounding beside what is well known.
+    unit = 1.0 / np.sqrt(np.maximum(np.diag(square), 1e-300))
+    even = square * unit[:, None] * unit
+    volume = float(np.linalg.slogdet(even)[1]) - 2.0 * float(np.log(unit).sum())
+    return np.linalg.lstsq(even, right * unit, rcond=1e-12)[0] * unit, volume

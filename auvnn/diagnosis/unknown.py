@@ -46,7 +46,7 @@ def depends_on(explanation: Explanation, windows: Windows) -> dict[str, dict[str
     known = len(fitted.theta)
     scale = np.array([p.scale for p in probe.parameters_of])
     chosen = list(range(known))
-    fold = folds(windows)
+    fold = folds(windows.run)
     left = _left(sums, chosen, explanation, scale, fold)
     open_ = [(i, n) for i in range(6) for n in probe.inputs]
     for _ in range(MOST):

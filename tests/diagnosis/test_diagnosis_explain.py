@@ -14,7 +14,6 @@ from small_logs import make_log, small_vehicle
 from auvnn.diagnosis.explain import (
     FOLDS,
     Explanation,
-    by_stretches,
     determined,
     explain,
     folds,
@@ -24,7 +23,7 @@ from auvnn.diagnosis.explain import (
     weigh,
 )
 from auvnn.diagnosis.nuisance import lay_out, priors, scales, stated
-from auvnn.diagnosis.pays import in_one_run, pays
+from auvnn.diagnosis.pays import foreseen, pays
 from auvnn.logs import Log, Run
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
@@ -94,14 +93,28 @@ def test_what_one_run_or_one_window_alone_says_of_an_effect_counts(world, heard)
     size = float(scales(here.layout, "net_buoyancy")[0])
     there, absent = drawn(here, 5, net_buoyancy=size), drawn(here, 5)
     after, before = judged(here, there, ["net_buoyancy"]), judged(here, there, [])
-    assert in_one_run(after) == (len(heard) < 60)
     assert pays(after, before)
     assert not pays(judged(here, absent, ["net_buoyancy"]), judged(here, absent, []))
-    if len(heard) == 15:
-        # Stretches of the run in which it shows foresee each other, the other runs do not foresee it.
-        by_run, by_stretch = before.left_out - after.left_out, by_stretches(before) - by_stretches(after)
-        assert by_stretch[heard].sum() > 2 * np.sqrt(15) * by_stretch[heard].std(ddof=1)
-        assert by_run[heard].sum() < 0.2 * by_stretch[heard].sum()
+
+
+@pytest.mark.parametrize("effects", [["net_buoyancy", "ocean_current"], []])
+def test_what_is_left_out_is_foreseen_as_the_joint_density_says(world, effects):
+    errors = drawn(world, 3, net_buoyancy=30.0)
+    found, columns = fitted(world, errors, effects)
+    held = plausible(world.layout, found.names, found.effects, found.fitted.priors, found.fitted.theta)
+    found = replace(found, judged=held)
+    told = foreseen(found)
+    assert len(told) == len(errors)
+    for run in range(4):
+        here = world.run == run
+        j = world.jacobian[~here][..., columns].reshape(-1, len(columns))
+        covariance = np.linalg.inv(j.T @ j + np.diag(held.precision))
+        departure = held.precision * (held.mean - world.means[columns])
+        mean = covariance @ (j.T @ errors[~here].ravel() + departure)
+        own = world.jacobian[here][..., columns].reshape(-1, len(columns))
+        density = multivariate_normal(own @ mean, np.eye(len(own)) + own @ covariance @ own.T)
+        expected = -2 * density.logpdf(errors[here].ravel()) - len(own) * np.log(2 * np.pi)
+        assert told[here].sum() == pytest.approx(expected, rel=1e-8)
 
 
 def test_a_window_that_alone_knows_a_parameter_is_not_foreseen_from_hearsay(world):
@@ -134,14 +147,14 @@ def test_folds_are_runs_or_stretches_of_the_only_run():
         return Run(number, t, np.tile([1.0, 0, 0, 0], (len(t), 1)), np.zeros((len(t), 6)), wrench=np.zeros((len(t), 6)))
 
     three = cut_windows(Log.from_runs([still(n, 6.0) for n in range(3)]), 1.0)
-    fold = folds(three)
+    fold = folds(three.run)
     assert len(set(fold)) == 3 and all(len(set(fold[three.run == r])) == 1 for r in (0, 1, 2))
     one = cut_windows(Log.from_runs([still(0, 12.0)]), 1.0)
-    fold = folds(one)
+    fold = folds(one.run)
     assert list(np.unique(fold)) == list(range(FOLDS)) and (np.diff(fold) >= 0).all()
     assert np.bincount(fold).min() >= 2
     many = replace(one, run=np.arange(12))
-    assert np.bincount(folds(many)).max() <= 3
+    assert np.bincount(folds(many.run)).max() <= 3
 
 
 @pytest.mark.parametrize("effects", [["ocean_current"], ["added_mass"]])

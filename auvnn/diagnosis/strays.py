@@ -1,0 +1,53 @@
+"""A fit in which a few windows went astray is begun again from what the others say.
+
+Where a vehicle is unstable and its coefficients are off, a window of free running may leave the measured motion so far
+that no small step of its initial state brings it back. Its error then drowns that of all the others: weights follow
+errors, and no test finds anything. The others hold the coefficients well enough to bring it back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from auvnn.metrics.free_run import initial_states
+from auvnn.metrics.windows import Windows
+from auvnn.models import GreyBox
+from auvnn.training.prediction_error import Fitted, Priors, fit
+
+# A window is astray whose error is so many times the median's.
+ASTRAY = 5.0
+
+
+def fit_with_strays(
+    model: GreyBox, windows: Windows, names: Sequence[str], priors: Priors, *, iterations: int
+) -> Fitted:
+    """Fit from the measured initial states; where it does not converge, again without the windows that are astray.
+
+    Args:
+        model: holds the named effects; it is not changed.
+        windows: what to fit.
+        names: effects whose parameters are free.
+        priors: of those parameters.
+        iterations: at most this many steps of each fit.
+
+    Returns:
+        the fit to all windows that leaves the smaller errors.
+    """
+    first = fit(model, windows, names, priors, iterations=iterations)
+    cost = first.statistics.cost
+    near = cost <= ASTRAY * np.median(cost)
+    if first.converged or near.all():
+        return first
+    others = fit(model, windows.pick(near), names, priors, iterations=iterations)
+    initial = initial_states(model, windows)
+    initial[near] = others.initial
+    again = fit(others.model, windows, names, priors, initial=initial, iterations=iterations)
+    return min(first, again, key=_errors)
+
+
+def _errors(fitted: Fitted) -> float:
+    """Return what a fit leaves in all channels: the negative log-likelihood at its own weights, up to a constant."""
+    count, known = fitted.statistics.count.sum(0), np.isfinite(fitted.sigma)
+    return float(count[known] @ np.log(fitted.sigma[known]))
