@@ -16,14 +16,16 @@ from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 from auvnn.training.prediction_error import Fitted, Priors, fit
 
-# A window is astray whose error is so many times the median's.
-ASTRAY = 5.0
+# A window is astray whose error is so many times the median's, and fit to lead the others back below so many.
+ASTRAY, NEAR = 3.0, 2.0
+# How often at most a fit is begun again.
+TRIES = 3
 
 
 def fit_with_strays(
     model: GreyBox, windows: Windows, names: Sequence[str], priors: Priors, *, iterations: int
 ) -> Fitted:
-    """Fit from the measured initial states; where it does not converge, again without the windows that are astray.
+    """Fit from the measured initial states; where windows end astray, again from a fit without them.
 
     Args:
         model: holds the named effects; it is not changed.
@@ -35,16 +37,20 @@ def fit_with_strays(
     Returns:
         the fit to all windows that leaves the smaller errors.
     """
-    first = fit(model, windows, names, priors, iterations=iterations)
-    cost = first.statistics.cost
-    near = cost <= ASTRAY * np.median(cost)
-    if first.converged or near.all():
-        return first
-    others = fit(model, windows.pick(near), names, priors, iterations=iterations)
-    initial = initial_states(model, windows)
-    initial[near] = others.initial
-    again = fit(others.model, windows, names, priors, initial=initial, iterations=iterations)
-    return min(first, again, key=_errors)
+    best = fit(model, windows, names, priors, iterations=iterations)
+    for _ in range(TRIES):
+        cost = best.statistics.cost
+        near = cost <= NEAR * np.median(cost)
+        if near.all() or (best.converged and (cost <= ASTRAY * np.median(cost)).all()):
+            break
+        others = fit(best.model, windows.pick(near), names, priors, iterations=iterations)
+        initial = initial_states(model, windows)
+        initial[near] = others.initial
+        again = fit(others.model, windows, names, priors, initial=initial, iterations=iterations)
+        if _errors(again) >= _errors(best):
+            break
+        best = again
+    return best
 
 
 def _errors(fitted: Fitted) -> float:
