@@ -117,6 +117,22 @@ def test_what_is_left_out_is_foreseen_as_the_joint_density_says(world, effects):
         assert told[here].sum() == pytest.approx(expected, rel=1e-8)
 
 
+def test_what_a_bound_holds_is_not_credited_with_what_lies_beyond_it(world):
+    """A lag cannot be negative, however much better that would foresee."""
+    errors = drawn(world, 4, thruster_lag=-0.3)
+    found, columns = fitted(world, errors, ["thruster_lag"])
+    held = plausible(world.layout, found.names, found.effects, found.fitted.priors, found.fitted.theta)
+    before, _ = fitted(world, errors, [])
+    theta = np.append(before.fitted.theta, 0.0)
+    everything = world.means.copy()
+    everything[columns] = theta
+    sums = world.statistics(errors, everything).columns(columns)
+    at_bound = replace(found, judged=held, fitted=replace(found.fitted, theta=theta, statistics=sums))
+    assert pays(replace(found, judged=held), before), "beyond its bound it would pay, or this says nothing"
+    assert not pays(at_bound, before)
+    np.testing.assert_allclose(foreseen(at_bound), foreseen(before), rtol=1e-9)
+
+
 def test_a_window_that_alone_knows_a_parameter_is_not_foreseen_from_hearsay(world):
     """Elsewhere the effect leaves a fiftieth of its trace: what is fitted to that is noise, several times its size."""
     column = int(world.layout.columns["net_buoyancy"][0])
