@@ -17,24 +17,33 @@ os.environ.setdefault("AUVNN_ENGINE", "torch")
 if "AUVNN_CACHE" not in os.environ:
     KERNELS = tempfile.TemporaryDirectory(prefix="auvnn-kernels-")
     os.environ["AUVNN_CACHE"] = KERNELS.name
-COMPILED = ("diagnosis", "simulate", "studies")
+COMPILED = ("cli", "diagnosis", "simulate", "studies")
 
 import pytest  # noqa: E402
 import torch  # noqa: E402
 
 torch.set_num_threads(1)
 
-from auvnn.report import page  # noqa: E402
+from auvnn.report import page, style  # noqa: E402
 
-# Hundreds of figures are written to files that no test looks at closely: those that do draw their own.
+# Hundreds of figures are written to files that no test looks at closely: those that do draw their own. Where parts of a
+# figure lie, which is half of the time that it takes, is for tests/report to ask.
 page.FILE_DPI = 40
+LAID_OUT = style.settle
+
+
+def unsettled(figure):
+    """Take away what would lay a figure out, and leave its parts where they are."""
+    figure.set_layout_engine("none")
+    return figure
 
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_protocol(item):
-    """Run what runs free a thousand times as users do, compiled."""
-    before = os.environ["AUVNN_ENGINE"]
-    if before == "torch" and Path(item.fspath).parent.name in COMPILED:
+    """Run what runs free a thousand times as users do, compiled; lay figures out where tests are about them."""
+    before, folder = os.environ["AUVNN_ENGINE"], Path(item.fspath).parent.name
+    if before == "torch" and folder in COMPILED:
         os.environ["AUVNN_ENGINE"] = "auto"
+    style.settle = LAID_OUT if folder == "report" else unsettled
     yield
     os.environ["AUVNN_ENGINE"] = before

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from torch import Tensor
 
 from auvnn.metrics.free_run import initial_states
 from auvnn.metrics.windows import Windows
@@ -18,8 +19,10 @@ from auvnn.training.prediction_error import Fitted, Priors, fit
 
 # A window is astray whose error is so many times the median's, and fit to lead the others back below so many.
 ASTRAY, NEAR = 3.0, 2.0
-# How often at most a fit is begun again.
-TRIES = 3
+# How often at most a fit is begun again, and steps of a window's initial state on its own.
+TRIES, ALONE = 3, 30
+# Each is fitted on its own where they are no larger a share of all.
+FEW = 0.15
 
 
 def fit_with_strays(
@@ -46,11 +49,21 @@ def fit_with_strays(
         others = fit(best.model, windows.pick(near), names, priors, iterations=iterations)
         initial = initial_states(model, windows)
         initial[near] = others.initial
+        strays = np.nonzero(~near)[0]
+        # One that needs short steps would hold up the others.
+        for few in np.array_split(strays, len(strays) if len(strays) <= FEW * len(windows) else 1):
+            initial[few] = _brought_back(others, windows.pick(few))
         again = fit(others.model, windows, names, priors, initial=initial, iterations=iterations)
         if _errors(again) >= _errors(best):
             break
         best = again
     return best
+
+
+def _brought_back(others: Fitted, strays: Windows) -> Tensor:
+    """Return the initial states of windows that fit them best under what the others say, (B, 13)."""
+    nothing = Priors(np.zeros(0), np.zeros(0))
+    return fit(others.model, strays, (), nothing, sigma=others.sigma, iterations=ALONE).initial
 
 
 def _errors(fitted: Fitted) -> float:
