@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_solve
 
 from auvnn.diagnosis.explain import Explanation, folds
 from auvnn.training.prediction_error import limits
@@ -57,6 +58,11 @@ def _solved(square: Array, right: Array) -> tuple[Array, float]:
     """Return the solution of a symmetric system, and the logarithm of its determinant."""
     # In units of each parameter's own: what is hardly known must not pass for rounding beside what is well known.
     unit = 1.0 / np.sqrt(np.maximum(np.diag(square), 1e-300))
-    even = square * unit[:, None] * unit
-    volume = float(np.linalg.slogdet(even)[1]) - 2.0 * float(np.log(unit).sum())
-    return np.linalg.lstsq(even, right * unit, rcond=1e-12)[0] * unit, volume
+    even, right = square * unit[:, None] * unit, right * unit
+    scale = 2.0 * float(np.log(unit).sum())
+    try:
+        factor = np.linalg.cholesky(even)
+    except np.linalg.LinAlgError:
+        return np.linalg.lstsq(even, right, rcond=1e-12)[0] * unit, float(np.linalg.slogdet(even)[1]) - scale
+    solved = cho_solve((factor, True), right, check_finite=False)
+    return solved * unit, 2.0 * float(np.log(np.diagonal(factor)).sum()) - scale
