@@ -33,8 +33,8 @@ LEVEL, DRAWS, LONGEST = 0.99, 200, 2.0
 # Windows behind the bands: more would make them no truer, only slower.
 SAMPLED = 10
 LAGS = 40
-# Windows taken at a time, which bounds the memory of the draws.
-CHUNK = 12
+# Windows taken at a time; those behind the bands one by one, which bounds the memory of the draws.
+CHUNK = 60
 
 
 @dataclass(frozen=True)
@@ -106,10 +106,13 @@ def residual_tests(explanation: Explanation, windows: Windows, draws: int = DRAW
     count = int(min(LAGS, length // 2, max(2, round(LONGEST / max(step, 1e-9)))))
     generator = torch.Generator().manual_seed(0)
     weight = torch.as_tensor(np.where(np.isfinite(fitted.sigma), 1.0 / fitted.sigma, 0.0))
+    # A channel that does not count would only be multiplied by nought.
+    live = torch.nonzero(weight).flatten()
+    weight = weight[live]
     loose = torch.diag(torch.as_tensor(1.0 / LOOSE))
     wrench = _wrench(fitted.model, windows)
     wrench = wrench - wrench.mean((0, 1))
-    measured, noise = _Sums(1, count), _Sums(draws, count)
+    measured, noise = _Sums(1, count, live), _Sums(draws, count, live)
     # The bands come from a share of the windows; their width goes with the root of the number.
     sampled = np.zeros(len(windows), dtype=bool)
     sampled[np.linspace(0, len(windows) - 1, min(SAMPLED, len(windows))).astype(int)] = True
@@ -119,16 +122,16 @@ def residual_tests(explanation: Explanation, windows: Windows, draws: int = DRAW
         some_of_them = slice(begin, begin + CHUNK)
         part = windows.pick(some_of_them)
         answer = respond(fitted.model, part, fitted.initial[some_of_them], (), ran=ran.pick(some_of_them))
-        mask = part.mask * (weight > 0)
-        state = torch.nn.functional.pad(answer.state, (0, 0, 0, 18 - answer.state.shape[-2]))
-        state = (state * weight[:, None]).reshape(len(part), length * 18, 12)
+        mask = part.mask[..., live]
+        state = torch.nn.functional.pad(answer.state, (0, 0, 0, 18 - answer.state.shape[-2]))[..., live, :]
+        state = (state * weight[:, None]).reshape(len(part), length * len(live), 12)
         q = torch.linalg.qr(torch.cat([state, loose.expand(len(part), 12, 12)], dim=1))[0][:, :-12]
         tau = wrench[begin : begin + CHUNK]
-        measured.add((answer.error * weight).unsqueeze(-1), q, mask, tau)
-        some = torch.as_tensor(sampled[begin : begin + CHUNK])
-        if some.any():
-            drawn = torch.randn(int(some.sum()), length, 18, draws, generator=generator, dtype=torch.float64)
-            noise.add(drawn, q[some], mask[some], tau[some])
+        measured.add((answer.error[..., live] * weight).unsqueeze(-1), q, mask, tau)
+        for k in np.nonzero(sampled[some_of_them])[0]:
+            one = slice(k, k + 1)
+            drawn = torch.randn(1, length, len(live), draws, generator=generator, dtype=torch.float64)
+            noise.add(drawn, q[one], mask[one], tau[one])
     auto, cross = measured.correlations()
     narrower = float(np.sqrt(sampled.mean()))
     bands = [_band(x, narrower) for x in noise.correlations()]
@@ -142,19 +145,25 @@ class _Sums:
     Args:
         series: how many.
         count: longest lag, samples.
+        live: (C,) which of the 18 channels count.
     """
 
-    def __init__(self, series: int, count: int) -> None:
+    def __init__(self, series: int, count: int, live: Tensor) -> None:
+        self.live = live
         self.own = torch.zeros(series, 6, count + 1, dtype=torch.float64)
         self.with_drive = torch.zeros(series, 6, 6, count, dtype=torch.float64)
         self.drive = torch.zeros(6, 6, dtype=torch.float64)
 
     def add(self, series: Tensor, q: Tensor, mask: Tensor, tau: Tensor) -> None:
-        """Project series (B, L, 18, S) as the initial states do, and add what B windows give."""
-        size, length = series.shape[:2]
-        flat = (series * mask.unsqueeze(-1)).reshape(size, length * 18, -1)
-        left = (flat - q @ (q.mT @ flat)).reshape(size, length, 18, -1)
-        error = (left * mask.unsqueeze(-1))[:, :, VELOCITY]
+        """Project series (B, L, C, S) as the initial states do, and add what B windows give; mask (B, L, C)."""
+        flat = (series * mask.unsqueeze(-1)).flatten(1, 2)
+        left = (flat - q @ (q.mT @ flat)).reshape(series.shape) * mask.unsqueeze(-1)
+        velocities = torch.arange(18)[VELOCITY]
+        told = torch.isin(velocities, self.live)
+        error, seen = series.new_zeros(*series.shape[:2], 6, series.shape[3]), mask.new_zeros(*mask.shape[:2], 6)
+        among = torch.isin(self.live, velocities)
+        error[:, :, told], seen[:, :, told] = left[:, :, among], mask[:, :, among]
+        length = series.shape[1]
         # Products at all lags at once by the Fourier transform, padded so that no end meets the other.
         padded, lags = 2 * length, self.own.shape[-1]
         errors = torch.fft.rfft(error, n=padded, dim=1)
@@ -163,7 +172,7 @@ class _Sums:
         self.own += torch.fft.irfft(power, n=padded, dim=0)[:lags].permute(1, 2, 0)
         both = torch.einsum("bfcd,bfj->fdcj", errors, drives)
         self.with_drive += torch.fft.irfft(both, n=padded, dim=0)[1:lags].permute(1, 2, 3, 0)
-        self.drive += torch.einsum("blc,blj->cj", mask[:, :, VELOCITY], tau**2)
+        self.drive += torch.einsum("blc,blj->cj", seen, tau**2)
 
     def correlations(self) -> tuple[Array, Array]:
         """Return autocorrelations (S, 6, K) and those with the wrench before, (S, 6, 6, K)."""
