@@ -34,7 +34,7 @@ def foreseen(explanation: Explanation) -> Array:
     # What a bound holds stays there, whatever the slope beyond it promises.
     low, high = limits(fitted.model, explanation.names, held)
     inside = np.nonzero(held.inside(theta) & (theta != low) & (theta != high))[0]
-    sums = fitted.statistics.columns(inside)
+    sums = fitted.statistics.columns(inside.tolist())
     fold = folds(sums.run)
     precision = held.precision[inside]
     pull = precision * (theta - held.mean)[inside]

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import torch
 from torch import Tensor
 
 from auvnn.metrics.free_run import initial_states
@@ -48,11 +49,11 @@ def fit_with_strays(
             break
         others = fit(best.model, windows.pick(near), names, priors, iterations=iterations)
         initial = initial_states(model, windows)
-        initial[near] = others.initial
+        initial[torch.as_tensor(near)] = others.initial
         strays = np.nonzero(~near)[0]
         # One that needs short steps would hold up the others.
         for few in np.array_split(strays, len(strays) if len(strays) <= FEW * len(windows) else 1):
-            initial[few] = _brought_back(others, windows.pick(few))
+            initial[torch.as_tensor(few)] = _brought_back(others, windows.pick(few))
         again = fit(others.model, windows, names, priors, initial=initial, iterations=iterations)
         if _errors(again) >= _errors(best):
             break
