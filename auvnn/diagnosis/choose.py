@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from auvnn.diagnosis.explain import Explanation, explain, weigh
-from auvnn.diagnosis.nuisance import Layout, shapes
+from auvnn.diagnosis.nuisance import Layout, begun, shapes
 from auvnn.diagnosis.pays import pays
 from auvnn.diagnosis.rivals import ALPHA_NEEDED, ODDS, Rivals
 from auvnn.diagnosis.score import Score, inflation
@@ -253,7 +253,7 @@ class Chooser:
         self.say(f"fitting {candidate.effect}")
         guess = at.model.rebuilt(at.model.copied_effects())
         known = parameters_of(at.model, [candidate.effect])
-        start = self._begun(candidate, known)
+        start = begun(self.layout, candidate.effect, candidate.estimate)
         shape = shapes(self.layout, candidate.effect)
         for share in SHARES:
             begin = np.where(shape, start, known + share * (start - known))
@@ -272,17 +272,6 @@ class Chooser:
             if found.fitted.cost <= current.fitted.cost:
                 break
         return found
-
-    def _begun(self, candidate: Score, known: Array) -> Array:
-        """Return where to begin the fit of an effect: what its test estimates, on the side of its null that there is.
-
-        A lag, however short, holds back the acceleration that is measured at the instant of a new command. The slope at
-        the null knows nothing of that, and may point to where there is no lag: what matters is to leave the null.
-        """
-        estimate = np.where(np.isfinite(candidate.estimate), candidate.estimate, known)
-        described = self.layout.described(candidate.effect)
-        low = np.array([p.low for p in described])
-        return np.where((known == low) & (estimate < low), 2 * known - estimate, estimate)
 
     def _without(self, after: Explanation, base: list[str], current: Explanation) -> Explanation:
         """Return the same model without the effect, everything else refitted.

@@ -18,7 +18,7 @@ from auvnn.diagnosis.learned_drag import reduced
 from auvnn.diagnosis.left_over import slow
 from auvnn.diagnosis.many import SEARCH
 from auvnn.diagnosis.nuisance import lay_out
-from auvnn.diagnosis.probes import start_at
+from auvnn.diagnosis.probes import null_is_no_start, start_at
 from auvnn.diagnosis.table import values
 from auvnn.diagnosis.trend import Trend, trend
 from auvnn.effects import effect_class
@@ -195,8 +195,8 @@ def _fitted(question: Question, path: Path) -> dict[str, Any]:
     base = [n for n in layout.names if n not in names or n in layout.nuisance]
     found = explain(layout, windows, [n for n in base if n not in names], ())
     for k in range(1, len(names) + 1):
-        shaped = any(p.shape for p in layout.model.effect(names[k - 1]).parameters_of)
-        guess = start_at(layout, windows, found, base, names[k - 1]) if shaped else None
+        looked = null_is_no_start(layout, names[k - 1])
+        guess = start_at(layout, windows, found, base, names[k - 1]) if looked else None
         found = explain(layout, windows, base, names[:k], start=found.fitted, guess=guess)
     start, source = start_of(path, question.mapping), "t"
     if start is None:

@@ -18,7 +18,7 @@ from auvnn.diagnosis.explain import Explanation, determined, explain
 from auvnn.diagnosis.gains import noise_floor, paired_gain
 from auvnn.diagnosis.nuisance import Layout, lay_out
 from auvnn.diagnosis.one_step_fit import explain_one_step, left_out_gain
-from auvnn.diagnosis.probes import start_at
+from auvnn.diagnosis.probes import null_is_no_start, start_at
 from auvnn.diagnosis.table import values
 from auvnn.effects import effect_class
 from auvnn.errors import ConfigError, InputError
@@ -231,9 +231,8 @@ def _by_windows(model: GreyBox, log: Log, window: float | None) -> Fit:
     def fit(
         layout: Layout, base: Sequence[str], effects: Sequence[str], before: Explanation | None
     ) -> Explanation:
-        # Where a shape is asked for, its null is no place to start from.
-        shaped = bool(effects) and any(p.shape for p in layout.model.effect(effects[-1]).parameters_of)
-        guess = start_at(layout, windows, before, base, effects[-1]) if before and shaped else None
+        looked = before is not None and bool(effects) and null_is_no_start(layout, effects[-1])
+        guess = start_at(layout, windows, before, base, effects[-1]) if before and looked else None
         start = None if before is None else before.fitted
         return explain(layout, windows, base, effects, start=start, guess=guess)
 

@@ -135,6 +135,27 @@ def shapes(layout: Layout, name: str) -> NDArray[np.bool_]:
     return np.array([p.shape for p in layout.described(name)])
 
 
+def one_sided(layout: Layout, name: str) -> NDArray[np.bool_]:
+    """Return which of an effect's parameters have nothing below their nulls, (p,)."""
+    return np.array([p.low == p.null and not p.shape for p in layout.described(name)])
+
+
+def begun(layout: Layout, name: str, estimate: Array) -> Array:
+    """Return where to begin the fit of an absent effect, (p,): what its test estimates, on the side that there is.
+
+    A lag, however short, holds back the acceleration that is measured at the instant of a new command. The slope at the
+    null knows nothing of that, and may point to where there is no lag: what matters is to leave the null.
+
+    Args:
+        layout: stated values.
+        name: the effect.
+        estimate: (p,) of its test at the null; NaN where it has none.
+    """
+    null = layout.means[name]
+    finite = np.where(np.isfinite(estimate), estimate, null)
+    return np.where(one_sided(layout, name), null + np.abs(finite - null), finite)
+
+
 def scales(layout: Layout, name: str) -> Array:
     """Return the plausible departure of an effect's parameters from their nulls, (p,)."""
     return np.array([p.scale for p in layout.described(name)])

@@ -21,7 +21,7 @@ from torch import Tensor, nn
 from torch.func import functional_call
 
 from auvnn.diagnosis.explain import Explanation
-from auvnn.diagnosis.nuisance import Layout
+from auvnn.diagnosis.nuisance import Layout, begun, one_sided, shapes
 from auvnn.diagnosis.score import Score, score
 from auvnn.effects import Body, Effect, Extent, Moment, Sensed, effect_class
 from auvnn.metrics.windows import POSITION, Windows
@@ -46,8 +46,13 @@ def start_at(layout: Layout, windows: Windows, found: Explanation, base: Sequenc
     looks = [probed(at, [name], extent), *nearer(at, held, name, extent)]
     scores = [asked.seen(windows, found, held, name, found.effects) for asked in looks]
     best = max(scores, key=lambda s: s.gain - s.degrees)
-    set_parameters(model, [name], best.estimate)
+    set_parameters(model, [name], begun(layout, name, best.estimate))
     return at
+
+
+def null_is_no_start(layout: Layout, name: str) -> bool:
+    """Whether the fit of an effect must begin elsewhere than at its null: it has a shape, or one side only."""
+    return bool(shapes(layout, name).any() or one_sided(layout, name).any())
 
 
 def extent_of(windows: Windows) -> Extent:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from small_logs import make_log, small_vehicle
 
+from auvnn.diagnosis import add
 from auvnn.diagnosis.choose import Chooser
 from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.explain import explain
@@ -48,3 +49,6 @@ def test_a_lag_of_which_the_slope_knows_nothing_is_begun_where_there_is_one(mode
     stays, _ = refitted(model, log, "thruster_lag", [0.0])
     assert stays.fitted.theta[-1] == 0.0, "from its null no step leads on, or this says nothing"
     assert begun.fitted.theta[-1] > 0 and begun.fitted.cost < without.fitted.cost - 100
+    # Who adds it by its name is answered alike.
+    better = add(model, log, "thruster_lag")
+    assert better.model.effect("thruster_lag").theta.item() > 0
