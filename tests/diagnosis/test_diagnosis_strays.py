@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import auvnn
+from auvnn.diagnosis import strays
 from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.nuisance import lay_out, priors
 from auvnn.diagnosis.strays import fit_with_strays
-from auvnn.training.prediction_error import fit
+from auvnn.training.prediction_error import Priors, fit
 
 # What the sensors of the condition "realistic" add to velocities and rates, m/s and rad/s.
 NOISE = np.repeat([0.006, 0.003], 3)
@@ -49,3 +50,24 @@ def test_where_none_goes_astray_it_is_the_plain_fit():
     found = fit_with_strays(model, windows, groups, known, iterations=15)
     np.testing.assert_array_equal(found.theta, plain.theta)
     np.testing.assert_allclose(plain.sigma[6:12], NOISE, rtol=0.1)
+
+
+def test_the_last_fit_begins_with_each_stray_already_brought_back(monkeypatch):
+    model, windows, groups, known = logged(59)
+    seen = []
+
+    def watched(at, some, names, held, **how):
+        seen.append((at, some, names, how))
+        return fit(at, some, names, held, **how)
+
+    monkeypatch.setattr(strays, "fit", watched)
+    found = fit_with_strays(model, windows, groups, known, iterations=15)
+    at, some, names, how = seen[-1]
+    assert len(some) == len(windows) and names == groups
+    nothing = Priors(np.zeros(0), np.zeros(0))
+
+    def errors(**begun):
+        return fit(at, windows, (), nothing, sigma=found.sigma, iterations=0, **begun).statistics.cost
+
+    assert errors().max() > 100 * np.median(errors()), "from the measured states some go astray, or this says nothing"
+    assert errors(initial=how["initial"]).max() < 2 * np.median(errors())
