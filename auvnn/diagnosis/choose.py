@@ -250,19 +250,19 @@ class Chooser:
     def _refitted(
         self, candidate: Score, at: Layout, base: list[str], chosen: list[str], current: Explanation
     ) -> Explanation:
-        self.say(f"fitting {candidate.effect}")
+        name = candidate.effect
+        self.say(f"fitting {name}")
         guess = at.model.rebuilt(at.model.copied_effects())
-        known = parameters_of(at.model, [candidate.effect])
-        start = begun(self.layout, candidate.effect, candidate.estimate)
-        shape = shapes(self.layout, candidate.effect)
+        known = parameters_of(at.model, [name])
+        start, shape = begun(self.layout, name, candidate.estimate), shapes(self.layout, name)
         for share in SHARES:
             begin = np.where(shape, start, known + share * (start - known))
-            set_parameters(guess, [candidate.effect], begin)
+            set_parameters(guess, [name], begin)
             found = explain(
                 self.layout,
                 self.windows,
                 base,
-                [*chosen, candidate.effect],
+                [*chosen, name],
                 start=current.fitted,
                 guess=replace(at, model=guess),
                 sigma=current.fitted.sigma,

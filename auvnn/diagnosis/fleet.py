@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from auvnn.answers import Answer, plain
+from auvnn.diagnosis.closer import closer_at
 from auvnn.diagnosis.cut import HORIZON, WARMUP, candidates_for, check_window, windows_for
 from auvnn.diagnosis.explain import explain
 from auvnn.diagnosis.learned_drag import reduced
 from auvnn.diagnosis.left_over import slow
 from auvnn.diagnosis.many import SEARCH
 from auvnn.diagnosis.nuisance import lay_out
-from auvnn.diagnosis.probes import null_is_no_start, start_at
+from auvnn.diagnosis.probes import null_is_no_start
 from auvnn.diagnosis.table import values
 from auvnn.diagnosis.trend import Trend, trend
 from auvnn.effects import effect_class
@@ -196,7 +197,7 @@ def _fitted(question: Question, path: Path) -> dict[str, Any]:
     found = explain(layout, windows, [n for n in base if n not in names], ())
     for k in range(1, len(names) + 1):
         looked = null_is_no_start(layout, names[k - 1])
-        guess = start_at(layout, windows, found, base, names[k - 1]) if looked else None
+        guess = closer_at(layout, windows, found, base).start(names[k - 1]) if looked else None
         found = explain(layout, windows, base, names[:k], start=found.fitted, guess=guess)
     start, source = start_of(path, question.mapping), "t"
     if start is None:

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from auvnn.answers import Answer, plain
 from auvnn.catalogue import unknown_name
 from auvnn.diagnosis.bake import baked
+from auvnn.diagnosis.closer import closer_at
 from auvnn.diagnosis.compare import stitch
 from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.explain import Explanation, determined, explain
 from auvnn.diagnosis.gains import noise_floor, paired_gain
 from auvnn.diagnosis.nuisance import Layout, lay_out
 from auvnn.diagnosis.one_step_fit import explain_one_step, left_out_gain
-from auvnn.diagnosis.probes import null_is_no_start, start_at
+from auvnn.diagnosis.probes import null_is_no_start
 from auvnn.diagnosis.table import values
 from auvnn.effects import effect_class
 from auvnn.errors import ConfigError, InputError
@@ -232,7 +233,7 @@ def _by_windows(model: GreyBox, log: Log, window: float | None) -> Fit:
         layout: Layout, base: Sequence[str], effects: Sequence[str], before: Explanation | None
     ) -> Explanation:
         looked = before is not None and bool(effects) and null_is_no_start(layout, effects[-1])
-        guess = start_at(layout, windows, before, base, effects[-1]) if before and looked else None
+        guess = closer_at(layout, windows, before, base).start(effects[-1]) if before and looked else None
         start = None if before is None else before.fitted
         return explain(layout, windows, base, effects, start=start, guess=guess)
 

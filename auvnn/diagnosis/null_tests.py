@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from auvnn.diagnosis.choose import ALPHA
+from auvnn.diagnosis.closer import Closer
 from auvnn.diagnosis.explain import Explanation
 from auvnn.diagnosis.nuisance import Layout
-from auvnn.diagnosis.probes import Probed, extent_of, nearer, probed
+from auvnn.diagnosis.probes import Probed, extent_of, probed
 from auvnn.diagnosis.score import Score, similarity
 from auvnn.metrics.windows import Windows
 from auvnn.training.prediction_error import Statistics, answers, reduce, set_parameters
@@ -113,20 +114,18 @@ class NullTests:
         told = {n: s for n, s in scores.items() if s.degrees and n not in self.layout.nuisance}
         if not told:
             return {}
-        name = max(told, key=lambda n: told[n].gain - told[n].degrees)
+        leading = {max(told, key=lambda n: told[n].gain - told[n].degrees), max(told, key=lambda n: told[n].evidence)}
         nothing = len(told) * min(s.p_value for s in told.values()) >= ALPHA
+        closer = Closer(at, self.windows, current, base, chosen, self.extent)
         found: dict[str, Score] = {}
-        for n in told if nothing else [name]:
+        for n in told if nothing else leading:
             promised = chi2.sf(told[n].gain, told[n].degrees)
-            asked = nearer(at, base, n, self.extent) if promised * len(told) < ALPHA else []
-            if not asked:
+            if promised * len(told) >= ALPHA or not closer.due(n):
                 continue
             self.say(f"looking at {n} more closely")
-            looks = [each.seen(self.windows, current, base, n, chosen) for each in asked]
-            best = max(looks, key=lambda s: s.gain - s.degrees)
-            p_value = min(s.p_value for s in looks)
-            if p_value < told[n].p_value:
-                found[n] = replace(best, p_value=p_value)
+            best = closer.look(n)
+            if best is not None and best.p_value < told[n].p_value:
+                found[n] = best
         return found
 
 

@@ -21,34 +21,15 @@ from torch import Tensor, nn
 from torch.func import functional_call
 
 from auvnn.diagnosis.explain import Explanation
-from auvnn.diagnosis.nuisance import Layout, begun, one_sided, shapes
+from auvnn.diagnosis.nuisance import Layout, one_sided, shapes
 from auvnn.diagnosis.score import Score, score
 from auvnn.effects import Body, Effect, Extent, Moment, Sensed, effect_class
 from auvnn.metrics.windows import POSITION, Windows
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import Statistics, answers, reduce, set_parameters
+from auvnn.training.prediction_error import Statistics, answers, reduce
 from auvnn.training.replay import Replayed
 
 Array = NDArray[np.float64]
-# Of an effect that is looked at more closely, starts around which that is done at a time: this bounds the memory.
-NEARER = 2
-
-
-def start_at(layout: Layout, windows: Windows, found: Explanation, base: Sequence[str], name: str) -> Layout:
-    """Return the layout at a fit, with an effect that is still absent set to the best of its shapes.
-
-    Whoever asks for one effect by name is answered by a closer look where there is one.
-    """
-    model = layout.model.rebuilt(layout.model.copied_effects())
-    set_parameters(model, found.names, found.fitted.theta)
-    at, extent = replace(layout, model=model), extent_of(windows)
-    held = [*base, *(e for e in found.effects if e not in base)]
-    looks = [probed(at, [name], extent), *nearer(at, held, name, extent)]
-    scores = [asked.seen(windows, found, held, name, found.effects) for asked in looks]
-    best = max(scores, key=lambda s: s.gain - s.degrees)
-    set_parameters(model, [name], begun(layout, name, best.estimate))
-    return at
-
 
 def null_is_no_start(layout: Layout, name: str) -> bool:
     """Whether the fit of an effect must begin elsewhere than at its null: it has a shape, or one side only."""
@@ -233,27 +214,6 @@ class Probed:
         p_value = min(1.0, count * min(s.p_value for s in seen))
         evidence = float(logsumexp([s.evidence for s in seen]) - np.log(count))
         return replace(best, effect=name, p_value=p_value, evidence=evidence, estimate=estimate, std=std)
-
-
-def nearer(layout: Layout, base: Sequence[str], name: str, extent: Extent) -> list[Probed]:
-    """Return the closer looks at an effect, each around some of its starts; an empty list where it has none.
-
-    Around all of them: which of the starts is best says little while what lies between them is what counts.
-
-    Args:
-        layout: at a fit.
-        base: effects that are free beside it; all others are left out.
-        name: the effect.
-        extent: of the log.
-    """
-    described = layout.model.effect(name).parameters_of
-    kind = effect_class(name)
-    closer = [kind.closer(described, extent, shape) for shape in kind.starts(described, extent)]
-    kept = [e for e in layout.model.copied_effects() if str(e.name) in (*base, name)]
-    at = narrowed(layout, layout.model.rebuilt(kept))
-    whole = {name: sum(map(len, closer))}
-    groups = [[s for some in closer[k : k + NEARER] for s in some] for k in range(0, len(closer), NEARER)]
-    return [replace(probed(at, [name], extent, {name: g}), counts=whole) for g in groups if g]
 
 
 def narrowed(layout: Layout, model: GreyBox) -> Layout:

@@ -279,6 +279,17 @@ class Effect(nn.Module):
         return []
 
     @classmethod
+    def closest(
+        cls, parameters: tuple[Parameter, ...], extent: Extent, shape: dict[str, float], level: int
+    ) -> list[dict[str, float]]:
+        """Return shapes around the best one that a closer look has found, to look again: level 0, then 1, and so on.
+
+        Asked for until the list is empty, which it is by default. An onset or a frequency that is off by more than the
+        errors can tell ends in a valley of its own, out of which no fit gets.
+        """
+        return []
+
+    @classmethod
     def told(cls, values: dict[str, float]) -> dict[str, float]:
         """Return the values by which people would state the same effect; the ones given, by default.
 

@@ -14,6 +14,10 @@ from auvnn.physics.restoring import restoring_force
 GRASP = 0.3
 """Duration of the grasp, in units of sqrt(length / gravity): about a tenth of a second for 1 m."""
 PLACES = ("x", "y", "z")
+TIMES = 8
+"""At so many times it is asked for, and between any two of them that are further apart than a fit finds its way."""
+SURE = 1.0
+"""s: an onset that is off by less is found by the fit."""
 
 
 class Payload(Effect):
@@ -49,7 +53,7 @@ class Payload(Effect):
     @classmethod
     def starts(cls, parameters: tuple[Parameter, ...], extent: Extent) -> list[dict[str, float]]:
         """Return eight times, evenly over the log."""
-        return [{"time": extent.begin + (k + 0.5) / 8 * extent.duration} for k in range(8)]
+        return [{"time": extent.begin + (k + 0.5) / TIMES * extent.duration} for k in range(TIMES)]
 
     @classmethod
     def closer(
@@ -61,6 +65,17 @@ class Payload(Effect):
         return [
             {**start, **{n: sign * half[n] for n, sign in zip(PLACES, signs, strict=True)}} for signs in corners
         ]
+
+    @classmethod
+    def closest(
+        cls, parameters: tuple[Parameter, ...], extent: Extent, shape: dict[str, float], level: int
+    ) -> list[dict[str, float]]:
+        """Return times before and after the one found, at the place found, until they are a second apart."""
+        before = extent.duration / TIMES ** (level + 1)
+        if before <= SURE:
+            return []
+        steps = range(1 - TIMES, TIMES)
+        return [{**shape, "time": shape["time"] + k / TIMES * before} for k in steps]
 
     def settle(self, vehicle: Any, actuation: str) -> None:
         """Keep gravity and the duration of the grasp."""

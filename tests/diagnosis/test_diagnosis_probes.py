@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import torch
 
+from auvnn.diagnosis.closer import Closer, closer_at
 from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.explain import explain
 from auvnn.diagnosis.nuisance import lay_out
 from auvnn.diagnosis.null_tests import NullTests
-from auvnn.diagnosis.probes import extent_of, nearer, probed, start_at
+from auvnn.diagnosis.probes import extent_of, probed
 from auvnn.diagnosis.score import score
 from auvnn.effects import EFFECTS, Extent
 from auvnn.metrics.free_run import initial_states
@@ -139,7 +140,7 @@ def test_a_load_off_the_centre_is_seen_at_the_places_around_it(model):
 
     extent = extent_of(windows)
     far = found(probed(layout, ["payload"], extent))[0]
-    looks = [found(asked) for asked in nearer(layout, base, "payload", extent)]
+    looks = [found(asked) for asked in Closer(layout, windows, fit, base, [], extent).nearer("payload")]
     near, label, asked, sums = max(looks, key=lambda look: look[0].gain)
     assert near.gain > 2.0 * far.gain and near.evidence > far.evidence + 20.0 and near.p_value < far.p_value
     names = [p.name for p in layout.model.effect("payload").parameters_of]
@@ -150,11 +151,27 @@ def test_a_load_off_the_centre_is_seen_at_the_places_around_it(model):
     # Eight places at each of eight times.
     assert sum(len(look[2].starts["payload"]) for look in looks) == 64
     assert near.p_value == pytest.approx(64 * score(sums, asked.layout, base, label, []).p_value)
-    assert nearer(lay_out(model, ["waves"]), [], "waves", extent) == []
+    assert Closer(lay_out(model, ["waves"]), windows, fit, [], [], extent).nearer("waves") == []
     # A search looks there as well, where the first look promises more than chance.
     asked_for = NullTests(layout, windows, lambda words: None)(fit, ["payload"], base, [])
     assert asked_for.scores["payload"].gain > 2.0 * far.gain
     # Whoever asks for a load starts from there.
-    values = start_at(layout, windows, fit, base, "payload").model.effect("payload").values()
-    shape = ("time", "x", "y", "z")
+    values = closer_at(layout, windows, fit, base).start("payload").model.effect("payload").values()
+    shape = ("x", "y", "z")
     assert [values[n] for n in shape] == pytest.approx([place[n] for n in shape]) and values["mass"] != 0
+    # At that place other times have been looked at.
+    assert abs(values["time"] - 8.0) < 0.3
+
+
+def test_an_onset_is_looked_for_until_a_fit_would_find_it(model):
+    """In a log of ten minutes the first times asked for are 75 s apart."""
+    kind = EFFECTS.get("payload")
+    described = kind.describe(model.vehicle, "thrusters")
+    extent = Extent(0.0, 600.0, 600.0, (0.0, 0.0))
+    for true in (3.0, 217.3, 301.0, 599.0):
+        near = min(kind.starts(described, extent), key=lambda s: abs(s["time"] - true))
+        level = 0
+        while around := kind.closest(described, extent, {**near, "x": 0.3}, level):
+            assert all(s["x"] == 0.3 for s in around)
+            near, level = min(around, key=lambda s: abs(s["time"] - true)), level + 1
+        assert abs(near["time"] - true) < 0.6 and level == 3
