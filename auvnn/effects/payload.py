@@ -74,8 +74,8 @@ class Payload(Effect):
         before = extent.duration / TIMES ** (level + 1)
         if before <= SURE:
             return []
-        steps = range(1 - TIMES, TIMES)
-        return [{**shape, "time": shape["time"] + k / TIMES * before} for k in steps]
+        times = [shape["time"] + k / TIMES * before for k in range(1 - TIMES, TIMES)]
+        return [{**shape, "time": t} for t in times if 0 <= t - extent.begin <= extent.duration]
 
     def settle(self, vehicle: Any, actuation: str) -> None:
         """Keep gravity and the duration of the grasp."""

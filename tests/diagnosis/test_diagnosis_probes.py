@@ -172,6 +172,6 @@ def test_an_onset_is_looked_for_until_a_fit_would_find_it(model):
         near = min(kind.starts(described, extent), key=lambda s: abs(s["time"] - true))
         level = 0
         while around := kind.closest(described, extent, {**near, "x": 0.3}, level):
-            assert all(s["x"] == 0.3 for s in around)
+            assert all(s["x"] == 0.3 and 0.0 <= s["time"] <= 600.0 for s in around)
             near, level = min(around, key=lambda s: abs(s["time"] - true)), level + 1
         assert abs(near["time"] - true) < 0.6 and level == 3
