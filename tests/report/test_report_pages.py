@@ -31,6 +31,8 @@ from auvnn.report import style
 from auvnn.report.html import SECURITY
 from auvnn.report.page import Page
 
+# As it is for users; while a test of this file runs, figures are not laid out (tests/conftest.py).
+LAID_OUT = style.settle
 ELEMENTS = {
     *(
         "html",
@@ -81,10 +83,12 @@ def drawer(kind: str) -> Page:
 
 @pytest.fixture(scope="session")
 def pages(tmp_path_factory, worker_id) -> dict[str, str]:
-    """Return all pages; whichever worker needs them first draws them for all."""
+    """Return all pages, their figures laid out; whichever worker needs them first draws them for all."""
 
     def drawn():
-        return {kind: drawer(kind).page(make(kind, 1200, 1)) for kind in KINDS}
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(style, "settle", LAID_OUT)
+            return {kind: drawer(kind).page(make(kind, 1200, 1)) for kind in KINDS}
 
     if worker_id == "master":
         return drawn()
