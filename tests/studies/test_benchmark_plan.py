@@ -40,6 +40,19 @@ def test_a_plan_is_its_parts_one_after_the_other():
     assert {(c.duration, c.runs) for c in found} == {(15.0, 4)}
 
 
+def test_a_plan_can_be_asked_again_on_logs_that_nobody_has_seen():
+    pairs = {"pairs": 12, "repeats": 0}
+    options = plan(one={"effects": "cg_offset", "seed": 500}, two={"effects": "nothing"}, three=pairs)
+    before, after = cases(options), cases({**options, "shift": 77})
+    assert [c.seed for c in after] == [c.seed + 77 for c in before]
+    assert [(c.part, c.kind, c.duration) for c in after] == [(c.part, c.kind, c.duration) for c in before]
+    # What is hidden together is drawn anew as well.
+    drawn = [[c.hidden for c in found if c.kind == "several"] for found in (before, after)]
+    assert len(drawn[0]) == len(drawn[1]) == 12 and drawn[0] != drawn[1]
+    with pytest.raises(ConfigError, match="shift=-1"):
+        cases({**options, "shift": -1})
+
+
 def test_only_some_parts_are_run_where_only_some_are_wanted():
     options = plan(one={"targets": [{"rate": "named_first", "least": 1.0}]}, two={"effects": "nothing"})
     assert {c.part for c in cases({**options, "only": "two"})} == {"two"}

@@ -180,7 +180,7 @@ def _combined(options: Mapping[str, Any], part: str) -> list[Case]:
     candidates = _several(options, "candidates")
     for name in candidates:
         EFFECTS.get(name)
-    repeats, seed = _count(options, "repeats"), _count(options, "seed")
+    repeats, seed = _count(options, "repeats"), _count(options, "seed") + _count(options, "shift")
     out = []
     for vehicle, plant, noise, excitation, accelerations, coefficients in itertools.product(
         _several(options, "vehicles"),
