@@ -27,7 +27,7 @@ from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox, Inputs
 from auvnn.simulate.manoeuvres import Manoeuvred, manoeuvres
-from auvnn.training.prediction_error import Statistics, answers, reduce
+from auvnn.training.window_sums import Statistics, answers, reduce
 
 Array = NDArray[np.float64]
 # One run of this length and rate stands for each manoeuvre, s and Hz.

@@ -22,7 +22,7 @@ from auvnn.diagnosis.input_forces import AXES
 from auvnn.effects import Body, Effect, Moment, Parameter
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import answers, reduce
+from auvnn.training.window_sums import answers, reduce
 
 Array = NDArray[np.float64]
 HARMONICS = 3

@@ -10,7 +10,7 @@ from auvnn.diagnosis.explain import Explanation
 from auvnn.diagnosis.nuisance import Layout
 from auvnn.effects.base import Body
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import set_parameters
+from auvnn.training.free_parameters import set_parameters
 from auvnn.vehicle import Vehicle
 
 

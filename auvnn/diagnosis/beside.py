@@ -16,7 +16,7 @@ from auvnn.errors import InputError
 from auvnn.logs import Log
 from auvnn.metrics.one_step import Derivative
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import Priors, limits, parameters_of, set_parameters
+from auvnn.training.free_parameters import Priors, limits, parameters_of, set_parameters
 
 Array = NDArray[np.float64]
 

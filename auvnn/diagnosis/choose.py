@@ -19,7 +19,7 @@ from auvnn.diagnosis.rivals import ALPHA_NEEDED, ODDS, Rivals
 from auvnn.diagnosis.score import Score, inflation
 from auvnn.effects import effect_class
 from auvnn.metrics.windows import Windows
-from auvnn.training.prediction_error import parameters_of, set_parameters
+from auvnn.training.free_parameters import parameters_of, set_parameters
 
 Array = NDArray[np.float64]
 ALPHA = 0.05

@@ -14,7 +14,7 @@ from auvnn.diagnosis.probes import Probed, extent_of, narrowed, probed
 from auvnn.diagnosis.score import Score
 from auvnn.effects import Effect, Extent, effect_class
 from auvnn.metrics.windows import Windows
-from auvnn.training.prediction_error import set_parameters
+from auvnn.training.free_parameters import set_parameters
 
 Array = NDArray[np.float64]
 # Starts around which that is done at a time: this bounds the memory.

@@ -12,7 +12,9 @@ from auvnn.diagnosis.nuisance import DETERMINED, Layout, priors, scales, shapes
 from auvnn.diagnosis.score import inflation
 from auvnn.diagnosis.strays import fit_with_strays
 from auvnn.metrics.windows import Windows
-from auvnn.training.prediction_error import Fitted, Priors, Statistics, fit
+from auvnn.training.free_parameters import Priors
+from auvnn.training.prediction_error import Fitted, fit
+from auvnn.training.window_sums import Statistics
 
 Array = NDArray[np.float64]
 # Runs left out at a time where there are many, and stretches where there is one run only.

@@ -30,7 +30,7 @@ from auvnn.logs.mapping import Mapping
 from auvnn.logs.portions import is_large, kind_of, log_files, start_of
 from auvnn.metrics.parts import Cut, plan_file, runs_of
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import TRUST, motion
+from auvnn.training.window_sums import TRUST, motion
 
 # Level of the tests over dives, shared by all parameters (Bonferroni).
 LEVEL = 0.05

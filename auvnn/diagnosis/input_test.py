@@ -20,8 +20,8 @@ from auvnn.diagnosis.nuisance import Layout, shapes
 from auvnn.diagnosis.score import inflation
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import Statistics, answers, reduce
 from auvnn.training.sensitivity import Response
+from auvnn.training.window_sums import Statistics, answers, reduce
 
 Array = NDArray[np.float64]
 # Directions of a force of which the log says less than this, beside the best known one, are not asked for.

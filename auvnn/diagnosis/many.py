@@ -42,7 +42,7 @@ from auvnn.logs.mapping import Mapping
 from auvnn.logs.portions import log_files
 from auvnn.metrics.parts import Cut, Plan, joined, plan_file, runs_of
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import set_parameters
+from auvnn.training.free_parameters import set_parameters
 
 # Windows for the search, and for the look and the fit; effects of the catalogue that are looked at beside those found.
 SEARCH, WINDOWS, LEADING = 240, 1000, 8

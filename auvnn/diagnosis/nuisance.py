@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from auvnn.effects import Parameter, effect_class
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import Priors
+from auvnn.training.free_parameters import Priors
 
 Array = NDArray[np.float64]
 

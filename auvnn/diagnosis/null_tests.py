@@ -16,7 +16,8 @@ from auvnn.diagnosis.nuisance import Layout
 from auvnn.diagnosis.probes import Probed, extent_of, probed
 from auvnn.diagnosis.score import Score, similarity
 from auvnn.metrics.windows import Windows
-from auvnn.training.prediction_error import Statistics, answers, reduce, set_parameters
+from auvnn.training.free_parameters import set_parameters
+from auvnn.training.window_sums import Statistics, answers, reduce
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,9 @@ from auvnn.diagnosis.explain import FOLDS, Explanation, left_out
 from auvnn.diagnosis.nuisance import Layout, priors
 from auvnn.logs import Log
 from auvnn.metrics.one_step import Derivative
+from auvnn.training.free_parameters import set_parameters
 from auvnn.training.one_step_error import fit_one_step
-from auvnn.training.prediction_error import Fitted, set_parameters
+from auvnn.training.prediction_error import Fitted
 
 Array = NDArray[np.float64]
 # Neighbouring stretches are correlated; so many groups of them stand for independent ones.

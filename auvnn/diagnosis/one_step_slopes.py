@@ -13,7 +13,7 @@ from auvnn.logs import Log
 from auvnn.logs.derivatives import LocalPolynomial
 from auvnn.metrics.one_step import Derivative, Replay
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import parameters_of, set_parameters
+from auvnn.training.free_parameters import parameters_of, set_parameters
 
 Array = NDArray[np.float64]
 

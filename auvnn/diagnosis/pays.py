@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_solve
 
 from auvnn.diagnosis.explain import Explanation, folds
-from auvnn.training.prediction_error import limits
+from auvnn.training.free_parameters import limits
 
 Array = NDArray[np.float64]
 

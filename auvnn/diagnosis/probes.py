@@ -26,8 +26,8 @@ from auvnn.diagnosis.score import Score, score
 from auvnn.effects import Body, Effect, Extent, Moment, Sensed, effect_class
 from auvnn.metrics.windows import POSITION, Windows
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import Statistics, answers, reduce
 from auvnn.training.replay import Replayed
+from auvnn.training.window_sums import Statistics, answers, reduce
 
 Array = NDArray[np.float64]
 

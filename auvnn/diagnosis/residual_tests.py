@@ -22,9 +22,9 @@ from auvnn.diagnosis.explain import Explanation
 from auvnn.diagnosis.locate import AXES
 from auvnn.metrics.windows import VELOCITY, Windows
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import LOOSE
 from auvnn.training.ran import run
 from auvnn.training.sensitivity import respond
+from auvnn.training.window_sums import LOOSE
 
 Array = NDArray[np.float64]
 NAMES = ("u", "v", "w", "p", "q", "r")

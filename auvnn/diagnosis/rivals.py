@@ -12,7 +12,7 @@ from auvnn.diagnosis.explain import Explanation, explain, weigh
 from auvnn.diagnosis.nuisance import Layout
 from auvnn.effects import effect_class
 from auvnn.metrics.windows import Windows
-from auvnn.training.prediction_error import parameters_of, set_parameters
+from auvnn.training.free_parameters import parameters_of, set_parameters
 
 # Odds of a hundred to one: below that two explanations are not told apart. Several of them compete in every log, and
 # at twenty to one a wrong one wins now and then by chance.

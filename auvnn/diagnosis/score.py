@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from auvnn.diagnosis.nuisance import DETERMINED, FREE, Layout, priors, scales
-from auvnn.training.prediction_error import Priors, Statistics, parameters_of
+from auvnn.training.free_parameters import Priors, parameters_of
+from auvnn.training.window_sums import Statistics
 
 Array = NDArray[np.float64]
 # Shares of a parameter's information below this are rounding.

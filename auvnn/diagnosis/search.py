@@ -26,7 +26,7 @@ from auvnn.diagnosis.unknown import depends_on
 from auvnn.logs import Log
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import TRUST, motion
+from auvnn.training.window_sums import TRUST, motion
 
 Array = NDArray[np.float64]
 # Once something is in the model the question is asked again, and each time chance gets another turn.

@@ -16,7 +16,8 @@ from torch import Tensor
 from auvnn.metrics.free_run import initial_states
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import Fitted, Priors, fit
+from auvnn.training.free_parameters import Priors
+from auvnn.training.prediction_error import Fitted, fit
 
 # A window is astray whose error is so many times the median's, and fit to lead the others back below so many.
 ASTRAY, NEAR = 3.0, 2.0

@@ -10,7 +10,8 @@ from auvnn.diagnosis.input_forces import AXES, InputForces
 from auvnn.diagnosis.left_over import excess
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import Priors, Statistics, answers, reduce
+from auvnn.training.free_parameters import Priors
+from auvnn.training.window_sums import Statistics, answers, reduce
 
 Array = NDArray[np.float64]
 # Share of what is unexplained, below which a dependence is not worth a word; standard errors of its gain, below which

@@ -18,13 +18,7 @@ from auvnn.diagnosis.score import Score, following, judged, projection, ratio
 from auvnn.diagnosis.told import told
 from auvnn.effects import Extent
 from auvnn.metrics.parts import Cut
-from auvnn.training.prediction_error import (
-    Priors,
-    bounded_step,
-    limits,
-    parameters_of,
-    set_parameters,
-)
+from auvnn.training.free_parameters import Priors, bounded_step, limits, parameters_of, set_parameters
 from auvnn.training.sums import Combination, Sums
 
 Array = NDArray[np.float64]

@@ -20,7 +20,8 @@ from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
 from auvnn.simulate import bottom_below, simulate
-from auvnn.training.prediction_error import answers, reduce, set_parameters
+from auvnn.training.free_parameters import set_parameters
+from auvnn.training.window_sums import answers, reduce
 
 Array = NDArray[np.float64]
 

@@ -24,7 +24,9 @@ from auvnn.logs.derivatives import LocalPolynomial
 from auvnn.metrics.one_step import Derivative, Replay
 from auvnn.metrics.windows import ACCELERATION, CHANNELS
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import Fitted, Priors, Statistics, parameters_of, set_parameters
+from auvnn.training.free_parameters import Priors, parameters_of, set_parameters
+from auvnn.training.prediction_error import Fitted
+from auvnn.training.window_sums import Statistics
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from torch import Tensor, as_tensor
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import Statistics, answers, reduce
+from auvnn.training.window_sums import Statistics, answers, reduce
 
 Array = NDArray[np.float64]
 # Steps of Gauss and Newton for each window's initial state: a few seconds of free running are nearly linear in it.
@@ -92,7 +92,7 @@ class Sums:
         return type(self)(**{name: mine[name] + theirs[name] for name in mine})
 
     def spread(self, floor: Array, parameters: int) -> Array:
-        """Return each channel's root-mean-square error, (18,), as `prediction_error.spread` does."""
+        """Return each channel's root-mean-square error, (18,), as `window_sums.spread` does."""
         spent = (12 * self.windows + parameters) * self.count / max(self.count.sum(), 1.0)
         with np.errstate(invalid="ignore", divide="ignore"):
             value = np.sqrt(self.channel / np.maximum(self.count - spent, 0.25 * self.count))

@@ -11,7 +11,8 @@ from small_logs import small_vehicle
 
 from auvnn.diagnosis.nuisance import Layout, lay_out, priors, scales, stated
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import Statistics, set_parameters
+from auvnn.training.free_parameters import set_parameters
+from auvnn.training.window_sums import Statistics
 
 STATED = 0.15
 CANDIDATES = ["ocean_current", "net_buoyancy", "thruster_lag", "added_mass", "cg_offset"]

@@ -18,7 +18,8 @@ from auvnn.models import GreyBox
 from auvnn.simulate import manoeuvres as library
 from auvnn.simulate import simulate
 from auvnn.testing import plain_vehicle
-from auvnn.training.prediction_error import Priors, fit
+from auvnn.training.free_parameters import Priors
+from auvnn.training.prediction_error import fit
 
 NAMES = ("net_buoyancy", "heave_push")
 CUT = (HORIZON, WARMUP)

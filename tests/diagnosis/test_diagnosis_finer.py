@@ -13,7 +13,7 @@ from auvnn.diagnosis.search import Search
 from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.windows import VELOCITY
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import TRUST, motion
+from auvnn.training.window_sums import TRUST, motion
 
 
 @pytest.fixture(scope="module")

@@ -17,8 +17,9 @@ from auvnn.effects import EFFECTS, Extent
 from auvnn.metrics.free_run import initial_states
 from auvnn.models import GreyBox, load
 from auvnn.simulate import simulate
-from auvnn.training.prediction_error import answers, reduce, set_parameters
+from auvnn.training.free_parameters import set_parameters
 from auvnn.training.sensitivity import respond
+from auvnn.training.window_sums import answers, reduce
 
 SHAPED = [
     n

@@ -10,7 +10,8 @@ from auvnn.diagnosis import strays
 from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.nuisance import lay_out, priors
 from auvnn.diagnosis.strays import fit_with_strays
-from auvnn.training.prediction_error import Priors, fit
+from auvnn.training.free_parameters import Priors
+from auvnn.training.prediction_error import fit
 
 # What the sensors of the condition "realistic" add to velocities and rates, m/s and rad/s.
 NOISE = np.repeat([0.006, 0.003], 3)

@@ -15,8 +15,9 @@ from auvnn.metrics.free_run import initial_states, moved
 from auvnn.models import GreyBox, load
 from auvnn.simulate import simulate
 from auvnn.studies.hidden import BEYOND, SIZES, oracle_information, sized
-from auvnn.training.prediction_error import LOOSE, set_parameters
+from auvnn.training.free_parameters import set_parameters
 from auvnn.training.ran import output_error
+from auvnn.training.window_sums import LOOSE
 
 # The contract's realistic noise: x, y, z; roll, pitch, yaw; u, v, w; p, q, r; accelerations are not measured.
 SIGMA = np.array([0.05, 0.05, 0.01, 0.003, 0.003, 0.008, *[0.006] * 3, *[0.003] * 3, *[np.inf] * 6])

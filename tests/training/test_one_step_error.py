@@ -10,8 +10,8 @@ from auvnn.errors import InputError
 from auvnn.logs import Log, Run
 from auvnn.metrics.one_step import Derivative, accelerations, choose_derivative
 from auvnn.models import GreyBox
+from auvnn.training.free_parameters import Priors, set_parameters
 from auvnn.training.one_step_error import fit_one_step
-from auvnn.training.prediction_error import Priors, set_parameters
 
 HIDDEN = {
     "net_buoyancy": {"force": 6.0},

@@ -15,20 +15,11 @@ from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
 from auvnn.testing import plain_vehicle
-from auvnn.training.prediction_error import (
-    LOOSE,
-    Fitted,
-    Priors,
-    Statistics,
-    bounded_step,
-    fit,
-    parameters_of,
-    reduce,
-    set_parameters,
-    spread,
-)
+from auvnn.training.free_parameters import Priors, bounded_step, parameters_of, set_parameters
+from auvnn.training.prediction_error import Fitted, fit
 from auvnn.training.ran import output_error
 from auvnn.training.sensitivity import Response
+from auvnn.training.window_sums import LOOSE, Statistics, reduce, spread
 
 HIDDEN = {
     "ocean_current": {"v_north": 0.12, "v_east": -0.08, "v_down": 0.03},

@@ -15,7 +15,7 @@ from auvnn.metrics.windows import ACCELERATION, POSITION, cut_windows
 from auvnn.models import GreyBox, Inputs
 from auvnn.testing import example_vehicle
 from auvnn.testing.scene import typical_values
-from auvnn.training.prediction_error import parameters_of, set_parameters
+from auvnn.training.free_parameters import parameters_of, set_parameters
 from auvnn.training.ran import output_error
 from auvnn.training.sensitivity import respond
 

@@ -29,7 +29,8 @@ from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import CHANNELS, Windows
 from auvnn.models import GreyBox
 from auvnn.simulate.noise import make_noise
-from auvnn.training.prediction_error import TRUST, answers, bounded_step, motion, reduce, set_parameters
+from auvnn.training.free_parameters import bounded_step, set_parameters
+from auvnn.training.window_sums import TRUST, answers, motion, reduce
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Mapping[str, float]]

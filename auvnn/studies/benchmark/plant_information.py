@@ -16,8 +16,8 @@ from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 from auvnn.physics.attitude import quat_conjugate, quat_multiply, quat_to_rotvec
 from auvnn.studies.benchmark.information import Information, Point
-from auvnn.training.prediction_error import reduce
 from auvnn.training.sensitivity import Response
+from auvnn.training.window_sums import reduce
 
 Array = NDArray[np.float64]
 # Steps: of a parameter, as a share of its plausible scale; of an initial state, m, rad, m/s and rad/s.

@@ -71,8 +71,8 @@ def sized_stranger(model: Any, name: str, size: str, *, seed: int = 0, **how: An
     from auvnn.studies.benchmark.information import noise_sigma
     from auvnn.studies.benchmark.plant_information import PlantOutputs, change, state_slopes
     from auvnn.studies.hidden import SIZES
-    from auvnn.training.prediction_error import reduce
     from auvnn.training.sensitivity import Response
+    from auvnn.training.window_sums import reduce
 
     how = {**how, "noise": "realistic"}
     windows = windows_for(model, simulate(model, seed=seed, max_step=0.025, **how).log)

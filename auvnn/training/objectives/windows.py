@@ -15,9 +15,9 @@ from auvnn.logs import Log
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import ACCELERATION, POSITION, Windows, cut_windows
 from auvnn.models import GreyBox
-from auvnn.training.prediction_error import CHUNK, LOOSE, TRUST, motion
 from auvnn.training.ran import output_error
 from auvnn.training.sensitivity import Response, respond
+from auvnn.training.window_sums import CHUNK, LOOSE, TRUST, motion
 
 Array = NDArray[np.float64]
 # History from which the state of lagging actuators is worked out, s.

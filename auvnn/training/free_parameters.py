@@ -1,0 +1,83 @@
+"""Parameters of effects in a fit: their values in a model, what is assumed of them, and steps within their bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from auvnn.models import GreyBox
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Priors:
+    """Independent normal priors of the P free parameters: `mean` and `precision` (zero where free), (P,).
+
+    Attributes:
+        mean: (P,).
+        precision: (P,).
+        reach: (P,) no parameter may leave its mean by more; infinite where there is no such limit.
+    """
+
+    mean: Array
+    precision: Array
+    reach: Array | None = None
+
+    def inside(self, theta: Array) -> NDArray[np.bool_]:
+        """Return which parameters are within their reach rather than at its end, (P,)."""
+        if self.reach is None:
+            return np.ones(len(theta), dtype=bool)
+        return np.abs(theta - self.mean) < self.reach * (1.0 - 1e-6)
+
+
+def parameters_of(model: GreyBox, names: Sequence[str]) -> Array:
+    """Return the values of the named effects' parameters, joined, (P,)."""
+    parts = [model.effect(n).theta.detach().cpu().numpy() for n in names]
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def set_parameters(model: GreyBox, names: Sequence[str], theta: Array) -> None:
+    """Set the values of the named effects' parameters, clipped to their bounds."""
+    at = 0
+    with torch.no_grad():
+        for name in names:
+            effect = model.effect(name)
+            size = len(effect.parameters_of)
+            low = [p.low for p in effect.parameters_of]
+            high = [p.high for p in effect.parameters_of]
+            effect.theta.copy_(torch.as_tensor(np.clip(theta[at : at + size], low, high)))
+            at += size
+
+
+def limits(model: GreyBox, names: Sequence[str], priors: Priors) -> tuple[Array, Array]:
+    """Return least and largest values of the named effects' parameters, (P,) each: their bounds, within reach."""
+    described = [p for name in names for p in model.effect(name).parameters_of]
+    low = np.array([p.low for p in described], dtype=float)
+    high = np.array([p.high for p in described], dtype=float)
+    if priors.reach is not None:
+        low, high = np.maximum(low, priors.mean - priors.reach), np.minimum(high, priors.mean + priors.reach)
+    return low, high
+
+
+def bounded_step(normal: Array, gradient: Array, low: Array, high: Array) -> Array:
+    """Return the step that minimises x^T N x / 2 - g^T x between `low` and `high`, all (P,) but N (P, P).
+
+    Parameters that would leave their range are put at its end, and the others solved for again.
+    """
+    fixed = np.zeros(len(gradient), dtype=bool)
+    step = np.zeros(len(gradient))
+    for _ in range(len(gradient) + 1):
+        free = ~fixed
+        rest = gradient[free] - normal[np.ix_(free, fixed)] @ step[fixed]
+        step[free] = np.linalg.lstsq(normal[np.ix_(free, free)], rest, rcond=1e-13)[0]
+        out = free & ((step < low) | (step > high))
+        step = np.clip(step, low, high)
+        if not out.any():
+            break
+        fixed |= out
+    return step
