@@ -31,6 +31,8 @@ from auvnn.testing.units import Units, powers
 from auvnn.vehicle import Vehicle
 
 Kind = type[Effect]
+# Looks around a start that refine tenfold each are finer than any log by then.
+MOST_LEVELS = 20
 
 
 def describes_itself(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
@@ -65,10 +67,26 @@ def describes_itself(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "t
     shapes = {p.name for p in described if p.shape}
     for start in _all_starts(kind, described, Extent(0.0, 60.0, 60.0, (3.0, 8.0))):
         require(set(start) <= shapes, f"{name}: starts name {sorted(start)}, shapes are {sorted(shapes)}")
+    _looks_around(kind, described)
     built = kind.build(vehicle, actuation)
     require(built.values() == {p.name: p.null for p in described}, f"{name} does not start at its null")
     values = typical_values(kind, vehicle, actuation)
     require(kind.build(vehicle, actuation, values).values() == values, f"{name} does not keep its values")
+
+
+def _looks_around(kind: Kind, described: tuple[Any, ...]) -> None:
+    """Check that the looks around a start are at shapes within bounds, wherever it is in a log, and come to an end."""
+    extent = Extent(0.0, 600.0, 600.0, (3.0, 8.0))
+    bounds = {p.name: (p.low, p.high) for p in described if p.shape}
+    starts = kind.starts(described, extent)
+    for start in (starts[0], starts[-1]):
+        shape, level = {p.name: p.null for p in described if p.shape} | start, 0
+        while around := kind.closest(described, extent, shape, level):
+            for values in around:
+                out = [n for n, v in values.items() if n not in bounds or not bounds[n][0] <= v <= bounds[n][1]]
+                require(not out, f"{kind.name}: closest looks where {out} is no shape within its bounds")
+            shape, level = around[0], level + 1
+            require(level < MOST_LEVELS, f"{kind.name}: closest does not end")
 
 
 def _all_starts(kind: Kind, described: tuple[Any, ...], extent: Extent) -> list[dict[str, float]]:

@@ -132,6 +132,26 @@ class RateLimited(EFFECTS.get("thruster_lag")):
         return Response(end, 0.5 * (state + end), end - state, state)
 
 
+class LooksOutside(EFFECTS.get("payload")):
+    """Looks before the log has begun: an onset below zero cannot be built."""
+
+    name = "looks_outside"
+
+    @classmethod
+    def closest(cls, parameters, extent, shape, level):
+        return [] if level else [{**shape, "time": extent.begin - 1.0}]
+
+
+class LooksForever(EFFECTS.get("payload")):
+    """Never near enough."""
+
+    name = "looks_forever"
+
+    @classmethod
+    def closest(cls, parameters, extent, shape, level):
+        return [{**shape}]
+
+
 BROKEN = [
     ("answers_like_a_lag", Overshoots),
     ("answers_like_a_lag", RateLimited),
@@ -140,6 +160,8 @@ BROKEN = [
     ("describes_itself", NoCause),
     ("describes_itself", NoHook),
     ("describes_itself", NotSI),
+    ("describes_itself", LooksOutside),
+    ("describes_itself", LooksForever),
     ("refuses", AnythingGoes),
     ("vanishes", NeverQuiet),
     ("batches", MixesRuns),
