@@ -44,7 +44,7 @@ def pytest_runtest_protocol(item):
     before, folder = os.environ["AUVNN_ENGINE"], Path(item.fspath).parent.name
     if before == "torch" and folder in COMPILED:
         os.environ["AUVNN_ENGINE"] = "auto"
-    plots = folder == "report" and Path(item.fspath).stem != "test_report_pages"
+    plots = folder == "report" and not Path(item.fspath).stem.startswith("test_report_page")
     style.settle = LAID_OUT if plots else unsettled
     yield
     os.environ["AUVNN_ENGINE"] = before

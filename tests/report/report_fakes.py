@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 from types import SimpleNamespace
 
 import numpy as np
+
+from auvnn.report.page import Page
 
 CHANNELS = "uvwpqr"
 AXES = "XYZKMN"
@@ -408,3 +411,8 @@ def make(kind: str, n: int = 300, runs: int = 2) -> Fake:
     if kind in sized:
         return sized[kind](n, runs)
     return {"diagnosis": diagnosis, "training": training, "demo": lambda: demo(n)}[kind]()
+
+
+def drawer(kind: str) -> Page:
+    """Return what draws the page of a kind of answer."""
+    return importlib.import_module(f"auvnn.report.pages.{kind}").PAGE
