@@ -122,13 +122,23 @@ def test_the_noise_is_that_of_the_condition(model, log):
     assert (noise_sigma("none", windows)[:12] < sigma[:12]).all()
 
 
+def test_a_plant_is_asked_only_of_what_it_can_hold_and_windows_can_say():
+    from auvnn.studies.benchmark.plant_information import covers
+
+    assert covers("numpy", ["net_buoyancy", "constant_force"])
+    assert not covers("numpy", ["net_buoyancy", "thruster_lag"]), "it remembers commands from before a window"
+    # A current is confusable with one that grows with depth, which the engine has not got.
+    assert covers("numpy", ["ocean_current", "current_shear"])
+    pytest.importorskip("mujoco")
+    assert covers("mujoco", ["ocean_current"]) and not covers("mujoco", ["ocean_current", "current_shear"])
+
+
 @pytest.mark.long
 def test_an_independent_plant_holds_the_same_information(model, point, found):
     pytest.importorskip("auvnn.plants")
-    from auvnn.studies.benchmark.plant_information import covers, plant_information
+    from auvnn.studies.benchmark.plant_information import plant_information
 
     names = ["net_buoyancy", "constant_force"]
-    assert covers(point, names) and not covers(point, [*names, "thruster_lag"])
     theirs = plant_information("numpy", model, point, names)
     for rival in (NONE, "constant_force"):
         assert theirs.distance("net_buoyancy", rival) == pytest.approx(

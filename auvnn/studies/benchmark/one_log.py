@@ -164,7 +164,7 @@ def _ties(case: Case, model: Any, log: Any, truth: Mapping[str, Any], found: Any
     close = group and any(own[h].get(n, np.inf) <= TIED for h in own for n in group[0])
     if case.plant != "own" and close:
         names = list(dict.fromkeys([*hidden, *group[0]]))
-        if covers(point, names):
+        if covers(case.plant, names):
             bottom = truth["conditions"]["bottom"]
             by_plant = plant_information(case.plant, model, point, names, bottom)
             out["plant_imitation"] = imitation(by_plant, [n for n in group[0] if n not in hidden])

@@ -92,9 +92,15 @@ def state_slopes(outputs: PlantOutputs, states: Array, now: Array, effects: Mapp
     return np.stack([change(now, one) / STATE for one in after], axis=-1)
 
 
-def covers(point: Point, names: Sequence[str]) -> bool:
-    """Whether windows say all of these effects: none remembers commands or counts the time since the run began."""
-    return not any(n in REMEMBERING or {"delay", "respond"} & set(effect_class(n).hooks()) for n in names)
+def covers(plant: str, names: Sequence[str]) -> bool:
+    """Whether windows of a plant say all of these effects.
+
+    None may remember commands or count the time since the run began, and the plant must be able to hold each.
+    """
+    from auvnn.plants import PLANTS
+
+    remembering = any(n in REMEMBERING or {"delay", "respond"} & set(effect_class(n).hooks()) for n in names)
+    return not remembering and not any(PLANTS.get(plant)().refuses(n) for n in names)
 
 
 def plant_information(
