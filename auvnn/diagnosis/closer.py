@@ -12,7 +12,7 @@ from auvnn.diagnosis.explain import Explanation
 from auvnn.diagnosis.nuisance import Layout, begun
 from auvnn.diagnosis.probes import Probed, extent_of, narrowed, probed
 from auvnn.diagnosis.score import Score
-from auvnn.effects import Effect, Extent, effect_class
+from auvnn.effects import Extent, effect_class
 from auvnn.metrics.windows import Windows
 from auvnn.training.free_parameters import set_parameters
 
@@ -41,10 +41,10 @@ class Closer:
     free: Sequence[str]
     extent: Extent
 
-    @staticmethod
-    def due(name: str) -> bool:
+    def due(self, name: str) -> bool:
         """Return whether there is a closer look at an effect."""
-        return effect_class(name).closer.__func__ is not Effect.closer.__func__
+        kind, described = effect_class(name), self.layout.model.effect(name).parameters_of
+        return any(kind.closer(described, self.extent, shape) for shape in kind.starts(described, self.extent))
 
     def nearer(self, name: str) -> list[Probed]:
         """Return the closer looks at an effect, each around some of its starts; an empty list where it has none.

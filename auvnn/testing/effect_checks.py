@@ -31,7 +31,7 @@ from auvnn.testing.units import Units, powers
 from auvnn.vehicle import Vehicle
 
 Kind = type[Effect]
-# Looks around a start that refine tenfold each are finer than any log by then.
+# An effect that wants to look around a start more often than this does not end.
 MOST_LEVELS = 20
 
 

@@ -12,7 +12,7 @@ from auvnn.diagnosis.explain import explain
 from auvnn.diagnosis.nuisance import lay_out
 from auvnn.diagnosis.null_tests import NullTests
 from auvnn.diagnosis.probes import extent_of, probed
-from auvnn.diagnosis.score import score
+from auvnn.diagnosis.score import Score, score
 from auvnn.effects import EFFECTS, Extent
 from auvnn.metrics.free_run import initial_states
 from auvnn.models import GreyBox, load
@@ -162,6 +162,27 @@ def test_a_load_off_the_centre_is_seen_at_the_places_around_it(model):
     assert [values[n] for n in shape] == pytest.approx([place[n] for n in shape]) and values["mass"] != 0
     # At that place other times have been looked at.
     assert abs(values["time"] - 8.0) < 0.3
+
+
+def test_what_leads_by_evidence_is_looked_at_as_well_as_what_promises_most(model, windows, monkeypatch):
+    """An effect of rough errors may promise more than the one that the test is surer of."""
+    layout = lay_out(model, ["payload", "constant_force", "waves"])
+    tests = NullTests(layout, windows, lambda words: None)
+
+    def score_of(effect, p_value, gain, evidence):
+        return Score(effect, p_value, gain, 8, 1.0, np.zeros(8), np.ones(8), evidence, gain)
+
+    looked = []
+    monkeypatch.setattr(Closer, "look", lambda self, name: looked.append(name))
+    scores = {
+        "payload": score_of("payload", 1e-9, 200.0, 50.0),
+        "constant_force": score_of("constant_force", 1e-6, 240.0, 5.0),
+    }
+    assert tests._closer(None, layout, [], [], scores) == {} and looked == ["payload"]
+    # Where it neither promises most nor leads, it is not.
+    looked.clear()
+    scores["payload"] = score_of("payload", 1e-9, 200.0, 4.0)
+    assert tests._closer(None, layout, [], [], scores) == {} and looked == []
 
 
 def test_an_onset_is_looked_for_until_a_fit_would_find_it(model):
