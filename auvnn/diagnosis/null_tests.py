@@ -115,11 +115,11 @@ class NullTests:
         told = {n: s for n, s in scores.items() if s.degrees and n not in self.layout.nuisance}
         if not told:
             return {}
-        leading = {max(told, key=lambda n: told[n].gain - told[n].degrees), max(told, key=lambda n: told[n].evidence)}
+        promises, surest = max(told, key=lambda n: told[n].gain - told[n].degrees), max(told, key=lambda n: told[n].evidence)
         nothing = len(told) * min(s.p_value for s in told.values()) >= ALPHA
         closer = Closer(at, self.windows, current, base, chosen, self.extent)
         found: dict[str, Score] = {}
-        for n in told if nothing else leading:
+        for n in told if nothing else dict.fromkeys([promises, surest]):
             promised = chi2.sf(told[n].gain, told[n].degrees)
             if promised * len(told) >= ALPHA or not closer.due(n):
                 continue
