@@ -115,7 +115,8 @@ class NullTests:
         told = {n: s for n, s in scores.items() if s.degrees and n not in self.layout.nuisance}
         if not told:
             return {}
-        promises, surest = max(told, key=lambda n: told[n].gain - told[n].degrees), max(told, key=lambda n: told[n].evidence)
+        promises = max(told, key=lambda n: told[n].gain - told[n].degrees)
+        surest = max(told, key=lambda n: told[n].evidence)
         nothing = len(told) * min(s.p_value for s in told.values()) >= ALPHA
         closer = Closer(at, self.windows, current, base, chosen, self.extent)
         found: dict[str, Score] = {}
