@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from command_line import auvnn, refused
-from stand_ins import write_two
 
 from auvnn.cli import check
 from auvnn.cli.job import Job, Verb
+from tests.cli.stand_ins import write_two
+from tests.command_line import auvnn, refused
 
 __all__ = ["auvnn", "refused", "stand_in"]
 
@@ -28,3 +28,8 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[Calla
 
     put(write_two)
     return put
+
+
+@pytest.fixture(scope="module", autouse=True)
+def engine(compiled_engine: None) -> None:
+    """Use the compiled engine in every module of this folder, as users do."""
