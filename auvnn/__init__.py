@@ -26,13 +26,10 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from auvnn.comparison import compare
     from auvnn.diagnosis import diagnose, diagnose_files
     from auvnn.improvement import add, fleet
-    from auvnn.logs import Log
-    from auvnn.logs.quality.quality import Quality
+    from auvnn.logs import Log, check
     from auvnn.models import GreyBox, load, remove
     from auvnn.online import adapt
     from auvnn.simulation import simulate
@@ -46,6 +43,7 @@ _WHERE = {
     "Vehicle": "auvnn.vehicle",
     "adapt": "auvnn.online",
     "add": "auvnn.improvement",
+    "check": "auvnn.logs",
     "compare": "auvnn.comparison",
     "diagnose": "auvnn.diagnosis",
     "diagnose_files": "auvnn.diagnosis",
@@ -56,18 +54,6 @@ _WHERE = {
     "train": "auvnn.training",
     "train_files": "auvnn.training",
 }
-
-
-def check(log: Log | str | Path | list[str | Path], mapping: Any = None) -> Quality:
-    """Return the quality report of a log, or of the files that it is to be read from.
-
-    Args:
-        log: a log, a CSV or Parquet file, or a list of files.
-        mapping: for files, how their columns are named; see `Log.read`.
-    """
-    from auvnn.logs import Log as _Log
-
-    return (log if isinstance(log, _Log) else _Log.read(log, mapping)).quality()
 
 
 def __getattr__(name: str) -> Any:
