@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import surge_and_roll as simple
 from scipy.integrate import cumulative_trapezoid
 from scipy.signal import freqz, savgol_coeffs, savgol_filter
 
+import tests.metrics.surge_and_roll as simple
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run
 from auvnn.metrics.one_step import (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import surge_and_roll as simple
 
+import tests.metrics.surge_and_roll as simple
 from auvnn.logs import Log, Run
 from auvnn.metrics.rollouts import HORIZONS, NAMES, roll, rollout_table, scale_of
 from auvnn.models import GreyBox
