@@ -198,6 +198,10 @@ class Effect(nn.Module):
     reference: ClassVar[str]
     channels: ClassVar[tuple[str, ...]] = ()
     excludes: ClassVar[tuple[str, ...]] = ()
+    # For people: effects that leave a similar trace, and the manoeuvre (configs/excitation) that tells them apart.
+    confused_with: ClassVar[tuple[str, ...]] = ()
+    manoeuvre: ClassVar[str] = ""
+    told_apart_by: ClassVar[str] = ""
     plainer: ClassVar[tuple[str, ...]] = ()
     time_varying: ClassVar[bool] = False
 
