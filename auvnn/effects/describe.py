@@ -1,4 +1,4 @@
-"""Effects described for people: equation, parameters, what each needs, what it is confused with, what to drive to see it."""
+"""Effects described for people: equation, parameters, needs, look-alikes, and what to drive to see them."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ def describe_all(kinds: list[type[Effect]]) -> str:
     """Return the page of all effects as Markdown."""
     head = (
         "# Effects\n\n"
-        "An effect is one physical cause. It acts where it acts in nature and vanishes exactly when all its parameters are at\n"
-        'their null, so that "is it missing?" is the same question for all of them. Plausible sizes and bounds depend on the\n'
-        f"vehicle; those below are for `{EXAMPLE}`. `auvnn effects NAME` prints one of these.\n"
+        "An effect is one physical cause. It acts where it acts in nature and vanishes exactly when all its parameters\n"
+        "are at their null, so that the question whether it is missing is the same for all of them. Plausible sizes and\n"
+        f"bounds depend on the vehicle; those below are for `{EXAMPLE}`. `auvnn effects NAME` prints one of these.\n"
     )
     return "\n".join([head, *(describe_effect(kind) for kind in kinds)])
 

@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 
 import matplotlib as mpl
+import matplotlib.pyplot as plt
 import numpy as np
 
 import auvnn
@@ -21,7 +22,6 @@ from auvnn.metrics.windows import cut_windows
 
 mpl.use("svg")
 mpl.rcParams |= {"svg.hashsalt": "auvnn", "svg.fonttype": "none", "font.family": "sans-serif"}
-import matplotlib.pyplot as plt
 
 ROOT = Path(__file__).resolve().parents[2]
 HORIZON = 5.0

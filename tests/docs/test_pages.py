@@ -55,16 +55,13 @@ def test_python_blocks_run(name, place, monkeypatch):
     monkeypatch.chdir(place)
     model = auvnn.load("rov95")
     trained = with_subnetworks(model, "mlp") if name == "training" else model
-    zeros = {
-        "eta": torch.zeros(7).double(),
-        "nu": torch.zeros(6).double(),
-        "command": torch.zeros(model.actuators.size).double(),
-    }
+    size = model.actuators.size
+    zeros = {key: torch.zeros(n).double() for key, n in (("eta", 7), ("nu", 6), ("command", size))}
     zeros["eta"][3] = 1.0
     times = torch.arange(0.0, 1.0, 0.05, dtype=torch.float64)
     given = {
         "auvnn": auvnn, "model": trained, "t": 0.0, **zeros, "eta0": zeros["eta"], "nu0": zeros["nu"],
-        "times": times, "commands": torch.zeros(len(times), model.actuators.size).double(), "log": auvnn.Log.read("dive.parquet"),
+        "times": times, "commands": torch.zeros(len(times), size).double(), "log": auvnn.Log.read("dive.parquet"),
         "held_out": auvnn.Log.read("other-dive.parquet"),
     }  # fmt: skip
     for block in blocks(name, "python"):
