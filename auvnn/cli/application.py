@@ -28,6 +28,7 @@ from auvnn.cli.job import Job, Verb, files
 from auvnn.cli.speech import Speaker, complain
 from auvnn.cli.sweep import jobs_of, note, run_jobs, statuses
 from auvnn.cli.words import Words
+from auvnn.cli.working import refuse_links
 from auvnn.config import config_dir
 from auvnn.errors import AuvnnError, ConfigError, one_line
 
@@ -48,6 +49,8 @@ def run_verb(name: str, verb: Verb, arguments: list[str]) -> int:
     out = _dated(name) if config.out is None else Path(str(config.out)).expanduser()
     overrides.append(f"out={quoted(out)}")
     refuse_taken(out, overwrite=config.overwrite is True)
+    if words.multirun:
+        refuse_links(out, out, "multirun.yaml")  # Hydra writes it
     jobs = jobs_of(overrides) if words.multirun else [overrides]
     with contextlib.ExitStack() as stack:
         if config.dry_run:
@@ -103,7 +106,12 @@ def _job(name: str, verb: Verb, composer: Composer, config: DictConfig) -> int:
     root = own.run.dir if number is None else own.sweep.dir
     out = Path(str(config.out)) / os.path.relpath(own.runtime.output_dir, str(root))
     label = f"auvnn {name}" if number is None else f"auvnn {name} (job {number})"
-    status = outcome(label, lambda: _run(verb, composer, config, out), None if config.dry_run else out)
+
+    def run() -> None:
+        refuse_links(Path(str(config.out)), out)
+        _run(verb, composer, config, out)
+
+    status = outcome(label, run, None if config.dry_run else out)
     with contextlib.suppress(OSError):
         out.rmdir()  # made by Hydra; taken away if nothing came into it
     return status

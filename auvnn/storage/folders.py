@@ -12,6 +12,7 @@ from pathlib import Path
 
 from auvnn.errors import InputError, ModelError
 from auvnn.storage.manifest import CODE_SUFFIXES, MANIFEST, check_name, read_manifest
+from auvnn.storage.removal import remove_own
 
 SCHEMA = "auvnn/folder/1"
 
@@ -71,7 +72,7 @@ def write_folder(
         shutil.rmtree(staged, ignore_errors=True)
         _restore_previous(path)
         raise
-    shutil.rmtree(_previous(path), ignore_errors=True)
+    remove_own(_previous(path))
     return path
 
 
@@ -163,10 +164,11 @@ def _previous(path: Path) -> Path:
 def _restore_previous(path: Path) -> None:
     """Put back what a killed replacement had moved aside."""
     previous = _previous(path)
-    if not previous.is_dir():
+    if not previous.is_dir() or previous.is_symlink():
+        remove_own(previous)
         return
     if path.exists():
-        shutil.rmtree(previous, ignore_errors=True)
+        remove_own(previous)
     else:
         os.replace(previous, path)
 
