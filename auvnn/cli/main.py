@@ -13,6 +13,7 @@ from typing import Any
 from auvnn.catalogue import Catalogue
 from auvnn.cli.faults import INTERRUPTED, OK, TERMINATED, Terminated, outcome
 from auvnn.cli.speech import complain
+from auvnn.executors.safe_path import keep_safe
 
 VERBS = Catalogue(
     "verb",
@@ -64,7 +65,8 @@ def _dispatch(verb: str, rest: list[str]) -> int:
 
 
 def _prepare() -> None:
-    """Let SIGTERM end a run as Ctrl-C does, let no character be unprintable, and keep libraries quiet."""
+    """Let SIGTERM end a run as Ctrl-C does, import nothing from here, print every character, keep libraries quiet."""
+    keep_safe()
 
     def end(_signal: int, _frame: Any) -> None:
         raise Terminated

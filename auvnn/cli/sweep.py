@@ -7,7 +7,6 @@ launchers put jobs into other processes, each leaves its exit status in a small 
 from __future__ import annotations
 
 import contextlib
-import os
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -23,6 +22,7 @@ from auvnn.cli.faults import BAD_INPUT, FAULT
 from auvnn.cli.speech import complain
 from auvnn.cli.working import WORK, refuse_links, take_away
 from auvnn.errors import ConfigError
+from auvnn.executors.safe_path import environment, python
 
 _ENDED = "ended"
 
@@ -82,14 +82,12 @@ def _run_job(verb: str, number: int, words: Sequence[str], out: Path) -> int:
         complain(f"auvnn {verb} (job {number}): {error}")
         return BAD_INPUT
     mine = [word for word in words if word.partition("=")[0] != "out"]
-    environment = {"OMP_NUM_THREADS": "1", **os.environ}
-    environment["PYTHONPATH"] = os.pathsep.join(p or os.getcwd() for p in sys.path)
     done = subprocess.run(
-        [sys.executable, "-m", "auvnn", verb, *mine, f"out={quoted(out / str(number))}"],
+        python("auvnn", verb, *mine, f"out={quoted(out / str(number))}"),
         capture_output=True,
         text=True,
         errors="replace",
-        env=environment,
+        env={"OMP_NUM_THREADS": "1", **environment()},
         stdin=subprocess.DEVNULL,
     )
     label = f"auvnn {verb} (job {number})"
