@@ -164,12 +164,12 @@ class Composer:
             raise ConfigError(f"{word}: ${{{found}:...}} is refused; write the value itself")
         if any(key in text for key in ("_target_", "_args_", "_partial_")):
             raise ConfigError(f"{word}: options name members of catalogues, never Python code")
-        if ".." in re.split(r"[=@]", text)[0] or text.startswith("+") and ".." in re.split(r"[/'\"]", text.partition("=")[2]):
+        key, _, value = text.partition("=")
+        if ".." in key or (key.startswith("+") and ".." in re.split(r"[/'\"]", value)):
             raise ConfigError(f"{word}: leads out of the folder of configs; name one that is in it")
         if "=" not in text:
             near = f"log={word}" if "log" in self.known else "key=value"
             raise ConfigError(f"'{word}' is not of the form key=value; did you mean {near}?")
-        key = text.partition("=")[0]
         if key in _RESERVED:
             raise ConfigError(f"{key} cannot be set; use out=, --multirun and --config-dir")
         try:

@@ -137,8 +137,7 @@ def _judge_defaults(entries: Any, path: Path) -> None:
                 raise ConfigError(f"{path}: defaults: '{word}' leads out of the folder; name configs in it")
             group = word.removeprefix("override ").removeprefix("optional ").strip().lstrip("/")
             if (
-                (re.match(r"hydra(/|$)", group)
-                and group not in _CHOSEN)
+                (re.match(r"hydra(/|$)", group) and group not in _CHOSEN)
                 or "@hydra" in group
                 or ".hydra" in group
             ):
