@@ -105,7 +105,9 @@ def save(model: GreyBox, folder: str | Path, *, overwrite: bool = False) -> Path
         InputError: the folder exists, is not empty and `overwrite` is not set.
     """
     path = Path(folder)
-    write_folder(path, contents(model, path), overwrite=overwrite)
+    write_folder(
+        path, contents(model, path), overwrite=overwrite, readable=lambda files: from_contents(files, path)
+    )
     return path
 
 

@@ -62,7 +62,8 @@ class Checkpoints:
         if path.exists():
             # A damaged one that was passed over, or one ahead of where a resumed fit went on from.
             remove_own(path, _FILES)
-        write_folder(path, {"state.json": state, "state.safetensors": weights}, schema=SCHEMA)
+        files: dict[str, bytes | str] = {"state.json": state, "state.safetensors": weights}
+        write_folder(path, files, schema=SCHEMA, readable=_parts)
         for old in self._found()[KEPT:]:
             with contextlib.suppress(InputError):  # what it also holds is not ours to delete
                 remove_own(old, _FILES)
@@ -91,9 +92,7 @@ class Checkpoints:
         for path in self._found():
             try:
                 files = read_folder(path, schema=SCHEMA)
-                state = json.loads(files["state.json"])
-                where = f"{path}/state.safetensors"
-                tensors = tensors_from_bytes(files["state.safetensors"], where=where, finite=False)
+                state, tensors = _parts(files, path)
             except (ModelError, KeyError, ValueError) as error:
                 notes.append(f"checkpoint not used: {error}")
                 continue
@@ -130,6 +129,13 @@ class Checkpoints:
             raise ModelError(
                 f"{path}: does not fit this fit: {'; '.join(wrong)}: train again in another folder"
             )
+
+
+def _parts(files: Mapping[str, bytes], path: Path | str = "checkpoint") -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """Return what a checkpoint's files hold: the plain part, and the tensors."""
+    state = json.loads(files["state.json"])
+    where = f"{path}/state.safetensors"
+    return state, tensors_from_bytes(files["state.safetensors"], where=where, finite=False)
 
 
 def _changes(old: Any, new: Any, where: str = "") -> list[str]:
