@@ -58,9 +58,7 @@ def _configs(given: str | None, stack: contextlib.ExitStack) -> tuple[dict[str, 
     return configs, write_configs(configs, place)
 
 
-def _run_verb(
-    name: str, verb: Verb, words: Words, composer: Composer, configs: dict[str, str] | None
-) -> int:
+def _run_verb(name: str, verb: Verb, words: Words, composer: Composer, configs: dict[str, str] | None) -> int:
     folder = [] if composer.folder is None else ["--config-dir", str(composer.folder)]
     overrides = composer.checked([mended(w) for w in words.overrides], sweep=words.multirun)
     config = composer.compose(overrides)
@@ -91,7 +89,9 @@ def _run_verb(
             ended = run_jobs(name, flags, overrides, out, words.jobs)
         elif words.multirun:
             # A launcher may run jobs in other processes, on other machines: how they ended comes back by files.
-            tally = Path(stack.enter_context(tempfile.TemporaryDirectory()) if config.dry_run else out).absolute()
+            tally = Path(
+                stack.enter_context(tempfile.TemporaryDirectory()) if config.dry_run else out
+            ).absolute()
             if configs is not None and not config.dry_run:
                 # Where the launcher's processes see it too, on whatever machine.
                 take_away(tally / WORK / "configs")

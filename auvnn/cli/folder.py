@@ -116,7 +116,9 @@ def written(path: Path, *, overwrite: bool) -> Iterator[Path]:
         try:
             yield new
             if not is_marked(path, mark):
-                raise ConfigError(f"out={path}: {path / WORK} was exchanged during the run; run again elsewhere")
+                raise ConfigError(
+                    f"out={path}: {path / WORK} was exchanged during the run; run again elsewhere"
+                )
             old.mkdir()
             for entry in sorted(new.iterdir()):
                 target = path / entry.name

@@ -34,7 +34,9 @@ def compiler() -> str | None:
     if named:
         return shutil.which(named)
     # A relative folder in PATH would be one of whoever gave us the current folder.
-    path = os.pathsep.join(p for p in os.environ.get("PATH", os.defpath).split(os.pathsep) if os.path.isabs(p))
+    path = os.pathsep.join(
+        p for p in os.environ.get("PATH", os.defpath).split(os.pathsep) if os.path.isabs(p)
+    )
     return next((found for name in ("cc", "gcc", "clang") if (found := shutil.which(name, path=path))), None)
 
 

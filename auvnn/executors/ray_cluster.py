@@ -48,7 +48,13 @@ class RayCluster(Executor):
                 with kept_safe():
                     # A job of Ray's client: otherwise Ray puts the current folder first in its workers' search path.
                     job = importlib.import_module("ray.job_config").JobConfig(_client_job=True)
-                    ray.init(address=self.address, log_to_driver=False, logging_level="ERROR", job_config=job, **own)
+                    ray.init(
+                        address=self.address,
+                        log_to_driver=False,
+                        logging_level="ERROR",
+                        job_config=job,
+                        **own,
+                    )
                 return
             except Exception as problem:  # Ray raises a bare Exception where a node does not come up in time
                 ray.shutdown()

@@ -31,7 +31,9 @@ def tensors_to_bytes(tensors: Mapping[str, Tensor], *, finite: bool = True) -> b
     data = save(plain)
     again = tensors_from_bytes(data, finite=False)
     if again.keys() != plain.keys() or not all(_same(again[name], plain[name]) for name in plain):
-        raise ModelError("weights cannot be read back as they are: not saved; please report this with the model")
+        raise ModelError(
+            "weights cannot be read back as they are: not saved; please report this with the model"
+        )
     return data
 
 

@@ -131,7 +131,9 @@ class Checkpoints:
             )
 
 
-def _parts(files: Mapping[str, bytes], path: Path | str = "checkpoint") -> tuple[dict[str, Any], dict[str, Tensor]]:
+def _parts(
+    files: Mapping[str, bytes], path: Path | str = "checkpoint"
+) -> tuple[dict[str, Any], dict[str, Tensor]]:
     """Return what a checkpoint's files hold: the plain part, and the tensors."""
     state = json.loads(files["state.json"])
     where = f"{path}/state.safetensors"

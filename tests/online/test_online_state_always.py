@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 import torch
-from online_world import driven, fed, vehicle
 
 from auvnn.online import Adapter
+from tests.online.online_world import driven, fed, vehicle
 
 
 @pytest.mark.parametrize(("learner", "watch"), [("rls", True), ("sgd", False), ("replay", False)])

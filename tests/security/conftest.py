@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from command_line import auvnn, refused
+from tests.command_line import auvnn, refused
 
 __all__ = ["auvnn", "refused"]

@@ -9,10 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from poison import PACKAGE, outside, poisoned
 
 from auvnn.executors import EXECUTORS
 from auvnn.executors.safe_path import environment, import_path, kept_safe
+from tests.security.poison import PACKAGE, outside, poisoned
 
 SIMULATE = ["simulate", "model=rov95", "runs=1", "duration=1", "noise=none", "out=made"]
 RUN = "import sys; from auvnn.cli.main import main; sys.exit(main(sys.argv[1:]))"
