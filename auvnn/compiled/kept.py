@@ -8,6 +8,7 @@ the process with SIGBUS when it is run.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import hashlib
 import os
 import stat
@@ -42,9 +43,27 @@ def looks_sound(code: Path) -> bool:
     return all(_plain(path) for path in (code, _hash_of(code)))
 
 
-def is_sound(code: Path) -> bool:
-    """Say whether a file of code may be run: ours, private, no link, and with the hash that stands beside it."""
-    return looks_sound(code) and _read(_hash_of(code), 100) == _digest(_read(code, MOST_BYTES))
+def load(code: Path) -> ctypes.CDLL | None:
+    """Load a file of code; None where it must not be run.
+
+    What is loaded is a copy of the content that was checked, without a name: nobody can exchange it after the check,
+    and nobody can cut it short while it is in use.
+
+    Raises:
+        OSError: it is no code for this machine.
+    """
+    content = _read(code, MOST_BYTES) if looks_sound(code) else None
+    if content is None or _read(_hash_of(code), 100) != _digest(content):
+        return None
+    handle, copy = tempfile.mkstemp(dir=code.parent, prefix=".loading-", suffix=".so")
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+        os.chmod(copy, 0o700)
+        return ctypes.CDLL(copy)
+    finally:
+        with contextlib.suppress(OSError):  # where open files cannot be removed it goes with the folder
+            os.unlink(copy)
 
 
 def keep(made: Path, code: Path) -> None:

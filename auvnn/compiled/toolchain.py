@@ -21,6 +21,8 @@ from auvnn.compiled.recorder import CannotCompile
 FLAGS = ("-O2", "-std=gnu11", "-march=native", "-fPIC", "-shared", "-fno-math-errno", "-fno-trapping-math")
 MOST = 256
 """Kernels that are kept; the ones that were not used for longest make room."""
+LEFT = 86400.0
+"""Seconds after which what a killed process left in the folder goes."""
 TIMEOUT = 180.0
 """Seconds after which a compiler is given up."""
 
@@ -93,19 +95,22 @@ def build(source: str, lanes: int) -> tuple[ctypes.CDLL, float]:
     folder = cache_folder()
     kept.private(folder)
     target, spent = folder / f"{name}.so", 0.0
-    if not kept.is_sound(target):
-        begin = time.perf_counter()
-        _compile(command, source, lanes, target)
-        spent = time.perf_counter() - begin
-        _make_room(folder)
     try:
-        loaded = ctypes.CDLL(str(target))
-        with contextlib.suppress(OSError):
-            os.utime(target)  # when it was used last
-        return loaded, spent
+        loaded = kept.load(target)
+        if loaded is None:
+            begin = time.perf_counter()
+            _compile(command, source, lanes, target)
+            spent = time.perf_counter() - begin
+            _make_room(folder)
+            loaded = kept.load(target)
     except OSError as error:
         kept.forget(target)
         raise CannotCompile(f"compiled code cannot be loaded: {error}") from None
+    if loaded is None:
+        raise CannotCompile(f"{target}: is not what was compiled a moment ago; make {folder} private")
+    with contextlib.suppress(OSError):
+        os.utime(target)  # when it was used last
+    return loaded, spent
 
 
 def _make_room(folder: Path) -> None:
@@ -114,6 +119,9 @@ def _make_room(folder: Path) -> None:
         there = sorted(folder.glob("*.so"), key=lambda f: f.lstat().st_mtime)
         for old in there[:-MOST]:
             kept.forget(old)
+        for left in (*folder.glob(".loading-*"), *folder.glob("making-*")):
+            if time.time() - left.lstat().st_mtime > LEFT:  # of a process that was killed
+                shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
 
 
 def _compile(command: str, source: str, lanes: int, target: Path) -> None:

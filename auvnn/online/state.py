@@ -19,8 +19,10 @@ import torch
 from torch import Tensor
 
 from auvnn.errors import AuvnnError, ModelError
-from auvnn.models.saving import MODEL, contents, from_contents
+from auvnn.models.loading import from_contents
+from auvnn.models.saving import MODEL, contents
 from auvnn.online.change import Monitor
+from auvnn.online.counts import Counts
 from auvnn.online.guards import Guards
 from auvnn.online.residual import Sample
 from auvnn.storage import read_folder, tensors_from_bytes, tensors_to_bytes, write_folder
@@ -45,10 +47,11 @@ def save(adapter: Adapter, folder: str | Path) -> Path:
     )
 
 
-def restore(folder: str | Path, *, validated: bool = False) -> Adapter:
+def restore(kind: type[Adapter], folder: str | Path, *, validated: bool = False) -> Adapter:
     """Return the adapter that `save` wrote.
 
     Args:
+        kind: the class to build.
         folder: where it is.
         validated: begin from the last validated weights, which drops updates that were still being judged.
 
@@ -57,7 +60,7 @@ def restore(folder: str | Path, *, validated: bool = False) -> Adapter:
         ModelError: it is damaged, incomplete, or of another kind.
     """
     path = Path(folder)
-    adapter = _restored(read_folder(path, schema=SCHEMA), path)
+    adapter = _restored(kind, read_folder(path, schema=SCHEMA), path)
     if validated:
         adapter.weights.write(adapter._shadow.valid)
         adapter.scheme.load(adapter._shadow.scheme_state)
@@ -65,13 +68,11 @@ def restore(folder: str | Path, *, validated: bool = False) -> Adapter:
     return adapter
 
 
-def _restored(files: Mapping[str, bytes], path: Path) -> Adapter:
-    from auvnn.online.adapter import Adapter, Counts
-
+def _restored(kind: type[Adapter], files: Mapping[str, bytes], path: Path) -> Adapter:
     tensors, plain, model = _parts(files, path)
     try:
         watched = plain["monitor"]
-        adapter = Adapter(
+        adapter = kind(
             model,
             plain["scheme"],
             guards=Guards(**plain["guards"]),

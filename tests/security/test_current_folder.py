@@ -98,6 +98,7 @@ def test_launchers_run_nothing_of_the_current_folder(ran, launcher, module):
 def test_whatever_the_command_starts_has_no_current_folder(ran, monkeypatch):
     """What launchers do: a Python by -c or -m, with the environment and the search path of the command."""
     monkeypatch.setenv("PYTHONPATH", f":.:{os.getcwd()}")
+    monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
     monkeypatch.setattr(sys, "path", ["", os.getcwd(), ".", *sys.path])
     with kept_safe():
         assert not {"", "."} & set(sys.path) and os.getcwd() not in sys.path

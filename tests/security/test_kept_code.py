@@ -49,7 +49,7 @@ def planted(folder: Path, marker: Path) -> Path:
 
 
 def test_sound_code_is_used_again(cache):
-    assert build() == 0.0 and kept.is_sound(code(cache))
+    assert build() == 0.0 and kept.load(code(cache))
     assert {p.suffix for p in cache.iterdir()} == {".so", ".sha256"}
 
 
@@ -79,10 +79,10 @@ def test_what_was_planted_is_never_run(cache, tmp_path, monkeypatch, how):
         digest.chmod(0o606)
     if how == "owner":
         monkeypatch.setattr(os, "getuid", lambda: 4711)
-        assert not kept.is_sound(target) and not kept.looks_sound(target)
+        assert kept.load(target) is None and not kept.looks_sound(target)
         return
     assert build() > 0.0
-    assert not marker.exists() and kept.is_sound(target) and not target.is_symlink()
+    assert not marker.exists() and kept.load(target) and not target.is_symlink()
 
 
 @pytest.mark.parametrize("share", [0.4])
@@ -100,9 +100,9 @@ def test_a_flipped_bit_anywhere_is_seen(cache):
     content = target.read_bytes()
     for place in range(0, len(content), max(1, len(content) // 200)):
         target.write_bytes(content[:place] + bytes([content[place] ^ 4]) + content[place + 1 :])
-        assert not kept.is_sound(target)
+        assert kept.load(target) is None
     target.write_bytes(content)
-    assert kept.is_sound(target)
+    assert kept.load(target)
 
 
 def test_a_kill_between_hash_and_code_costs_one_more_compilation(cache):
@@ -138,3 +138,11 @@ def test_a_compiler_that_lies_in_the_current_folder_is_not_run(tmp_path, monkeyp
     monkeypatch.setenv("PATH", f":.:{os.environ['PATH']}")
     found = toolchain.compiler()
     assert found is None or not Path(found).resolve().is_relative_to(tmp_path)
+
+
+def test_code_in_use_cannot_be_cut_short(cache):
+    words = "from auvnn.compiled import toolchain as t; import os, sys; lib, s = t.build(sys.argv[1], 1)\n"
+    words += "os.truncate(sys.argv[2], 0); sys.exit(0 if lib.answer() == 42 and s == 0 else 3)"
+    done = subprocess.run([sys.executable, "-c", words, SOURCE, str(code(cache))], timeout=120)
+    assert done.returncode == 0, "a signal is a negative status"
+    assert not [p for p in cache.iterdir() if p.name.startswith(".")]

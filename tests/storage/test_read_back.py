@@ -66,7 +66,7 @@ def test_what_cannot_be_read_again_does_not_replace_what_can(tmp_path, monkeypat
     def unreadable(files, path, actuation=None):
         raise ModelError("the reader has a fault")
 
-    monkeypatch.setattr(saving_module, "from_contents", unreadable)
+    monkeypatch.setattr(saving_module, "_readers", [unreadable])
     with pytest.raises(ModelError, match="not saved, because it could not be read again"):
         model.save(tmp_path / "model", overwrite=True)
     assert read_folder(folder) == before and [p.name for p in tmp_path.iterdir()] == ["model"]
