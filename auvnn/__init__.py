@@ -2,6 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+
+if sys.orig_argv[1:3] == ["-m", "auvnn"] and not sys.flags.safe_path:
+    # Python put the folder where the user stands before everything else: what lies there is not to be run.
+    import os
+
+    if sys.path[:1] == [os.getcwd()] and not os.path.samefile(sys.path[0], os.path.dirname(__path__[0])):
+        del sys.path[0]
+
 import importlib
 from typing import TYPE_CHECKING, Any
 
