@@ -95,7 +95,7 @@ def simulate(
         plant: what makes the motion: `own`, the model's own equations; `numpy`, independent ones with an adaptive
             solver; `mujoco`, a physics engine. Excitation, sampling and sensors' noise are the same for all.
         world: what departs from the assumptions of models: `between`, `disturbed_10`, `disturbed_25`, `shaped`,
-            `sensors`, `conventions`, `everything`, or a mapping of options. Laws other than the usual ones need `plant="numpy"`.
+            `sensors`, `conventions`, `everything`, or a mapping of options. Other laws need `plant="numpy"`.
 
     Returns:
         Log, truth and plant.
