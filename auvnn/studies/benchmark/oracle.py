@@ -15,13 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.nuisance import FREE
-from auvnn.diagnosis.probes import extent_of
+from auvnn.diagnosis.hypotheses.layout import FREE
+from auvnn.diagnosis.score_tests.probes import extent_of
 from auvnn.effects import Parameter, effect_class
+from auvnn.estimation.priors import bounded_step
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
-from auvnn.simulate import Simulation
-from auvnn.simulate.noise import make_noise
+from auvnn.simulation import Simulation
+from auvnn.simulation.noise import make_noise
 from auvnn.studies.benchmark.oracle_filter import Noise, information
 from auvnn.studies.benchmark.oracle_slopes import (
     Course,
@@ -30,14 +31,18 @@ from auvnn.studies.benchmark.oracle_slopes import (
     reports,
     transitions,
 )
-from auvnn.training.free_parameters import bounded_step
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Mapping[str, float]]
 
 NONE = "nothing"
 # What is stated of a vehicle with an uncertainty, and the axes that it has.
-COEFFICIENTS = {"added_mass": "XYZKMN", "linear_damping": "XYZKMN", "quadratic_damping": "XYZKMN", "inertia": "KMN"}
+COEFFICIENTS = {
+    "added_mass": "XYZKMN",
+    "linear_damping": "XYZKMN",
+    "quadratic_damping": "XYZKMN",
+    "inertia": "KMN",
+}
 SHARE = 1e-3
 CHANNELS = ("x", "y", "z", "phi", "theta", "psi", "u", "v", "w", "p", "q", "r")
 
@@ -104,7 +109,9 @@ class Oracle:
         motion, rows = course.motion, course.rows
         nu, nu_dot = motion.nu[:, rows], motion.nu_dot[:, rows]
         moving = np.concatenate([nu[..., :3], nu[..., 3:], nu_dot], axis=-1)
-        return Noise(sigma, float(sensors.get("correlation") or 0.0), (late * moving) ** 2, measured, rms, correlation)
+        return Noise(
+            sigma, float(sensors.get("correlation") or 0.0), (late * moving) ** 2, measured, rms, correlation
+        )
 
     def _shift(self, other: Values) -> tuple[Array, Array]:
         """Return what other effects would change, in a step (R, K, 12) and in the reports (R, K + 1, 12)."""
@@ -117,7 +124,11 @@ class Oracle:
         kind = effect_class(name)
         described = kind.describe(self.model.vehicle, self.model.actuation)
         base = {p.name: p.null for p in described} | dict(shape) | self.truth.get(name, {})
-        begin = (np.zeros(()), np.zeros(())) if name in self.truth or not shape else self._shift({**self.truth, name: base})
+        begin = (
+            (np.zeros(()), np.zeros(()))
+            if name in self.truth or not shape
+            else self._shift({**self.truth, name: base})
+        )
         out = []
         for p in described:
             if p.shape:

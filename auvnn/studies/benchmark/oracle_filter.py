@@ -89,7 +89,9 @@ def information(transition: Array, push: Array, seen: Array, step: float, noise:
         gain = gain * unit[:, None, :]
         keep = np.eye(n) - gain @ h
         # Joseph's form stays symmetric and positive.
-        cover = keep @ cover @ np.swapaxes(keep, 1, 2) + (gain * variance[:, None, :]) @ np.swapaxes(gain, 1, 2)
+        cover = keep @ cover @ np.swapaxes(keep, 1, 2) + (gain * variance[:, None, :]) @ np.swapaxes(
+            gain, 1, 2
+        )
         slope = slope - gain @ effect
         phi[:, :size, :size] = transition[:, k]
         cover = phi @ cover @ np.swapaxes(phi, 1, 2)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from auvnn.plants import Motion, Task
+from auvnn.plants import Motion, PlantTask
 from auvnn.plants.independent.equations import Equations
 from auvnn.plants.independent.sensors import Reported, report
 from auvnn.plants.independent.thrust import Actuators
@@ -35,13 +35,13 @@ class Course:
         step: s.
     """
 
-    task: Task
+    task: PlantTask
     motion: Motion
     rows: NDArray[np.int64]
     step: float
 
     @classmethod
-    def of(cls, task: Task, motion: Motion, runs: int) -> Course:
+    def of(cls, task: PlantTask, motion: Motion, runs: int) -> Course:
         """Return the course of the first runs of a motion."""
         dt = float(task.t[1] - task.t[0])
         each = max(1, round(FINE / dt))
@@ -51,7 +51,9 @@ class Course:
             for n in ("eta", "nu", "nu_dot", "position", "quaternion", "velocity", "rate", "command", "fins")
         }
         task = replace(
-            task, laws=replace(task.laws, wander=None), voltage=None if task.voltage is None else task.voltage[:runs]
+            task,
+            laws=replace(task.laws, wander=None),
+            voltage=None if task.voltage is None else task.voltage[:runs],
         )
         return cls(task, Motion(**few), rows, each * dt)
 
@@ -99,7 +101,9 @@ def accelerations(course: Course, effects: Values, kicks: Array | None = None) -
         row = int(np.searchsorted(task.t, moment + 1e-9, side="right")) - 1
         while done < row:
             done += 1
-            actuators.hold(motion.command[:, done], float(task.t[done]), float(task.t[min(done + 1, len(task.t) - 1)]))
+            actuators.hold(
+                motion.command[:, done], float(task.t[done]), float(task.t[min(done + 1, len(task.t) - 1)])
+            )
         thrust = actuators.between(moment, moment + 2e-9)(moment)
         place = (places[None, :, j] + changes[:, None, :3]).reshape(-1, 3)
         rotation = (rotations[None, :, j] @ turns[:, None]).reshape(-1, 3, 3)
@@ -159,7 +163,11 @@ def reports(course: Course, effects: Values) -> tuple[Array, Array, Array]:
     )  # fmt: skip
     seen = report(effects, flat, course.task.vehicle.gravity)
     velocity = np.concatenate([seen.v, seen.turn], axis=-1)
-    return seen.position.reshape(*shape, 3), matrix_of(seen.quaternion).reshape(*shape, 3, 3), velocity.reshape(*shape, 6)
+    return (
+        seen.position.reshape(*shape, 3),
+        matrix_of(seen.quaternion).reshape(*shape, 3, 3),
+        velocity.reshape(*shape, 6),
+    )
 
 
 def differences(one: Sequence[Array], other: Sequence[Array]) -> Array:
