@@ -1,4 +1,4 @@
-"""How the plant's acceleration and its sensors change with the state and with what an oracle does not know, row by row."""
+"""How a plant's acceleration and its sensors change with the state and with what an oracle does not know."""
 
 from __future__ import annotations
 
