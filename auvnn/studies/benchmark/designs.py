@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from auvnn.errors import ConfigError
-from auvnn.studies.benchmark.cases import CLOSED, Case, apart
+from auvnn.studies.benchmark.case import CLOSED, Case, apart
 
 # A stream of random numbers that no log uses.
 BALANCED = 204
