@@ -52,7 +52,7 @@ def read_portion(path: Path, mapping: Mapping, first: int, count: int) -> Portio
     reader, _ = choose(path)
     collector = Collector()
     with np.errstate(all="ignore"):
-        table = mapping.apply(reader.read_rows(path, first, count), str(path))
+        table = reader.mapped_rows(path, mapping, first, count)
         if table.rows == 0:
             raise InputError(f"{path}: has no row {first}")
         name = mapping.run if mapping.run not in (None, "file") else "run"
@@ -113,6 +113,8 @@ def is_large(paths: Sequence[Path]) -> bool:
     rows = 0
     for path in paths:
         reader, _ = choose(path)
+        if not reader.in_parts:
+            continue  # topics are merged as a whole
         rows += reader.rows(path) if reader.name == "parquet" else path.stat().st_size // ROW_BYTES
         if rows > LARGE:
             return True
@@ -147,7 +149,7 @@ def start_of(path: Path, mapping: Mapping) -> float | None:
     stamp = None if source is None else reader.first_stamp(path, source)
     if stamp is not None:
         return stamp
-    table = mapping.apply(reader.read_rows(path, 0, 1), str(path))
+    table = reader.mapped_rows(path, mapping, 0, 1)
     if "t" not in table.columns or table.rows == 0:
         return None
     first = float(mapping.seconds(table.columns["t"], "t" in table.seconds)[0])

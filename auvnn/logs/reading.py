@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import ConfigError, InputError
-from auvnn.logs import attitude, clock, delays, frames, masks, plausible, required
+from auvnn.logs import attitude, clock, delays, frames, in_world, masks, plausible, required, several_rates
 from auvnn.logs.channels import (
     ACCELERATION,
     EULER,
@@ -137,6 +137,7 @@ def _number_apart(collector: Collector, first: int, file: Path, several: bool) -
 def collect(table: Table, plan: Mapping, file: Path, collector: Collector) -> None:
     """Turn a table into runs: told apart, in order of time, mended and checked."""
     where = str(file)
+    plan = table.rest or plan
     required.check(table, where)
     collector.repairs.extend(required.notes(table, where))
     label_column = plan.run if plan.run not in (None, "file") else "run"
@@ -161,6 +162,8 @@ def collect(table: Table, plan: Mapping, file: Path, collector: Collector) -> No
             columns = {n: c[pick].astype(np.float64, copy=False) for n, c in table.columns.items()}
             columns["t"] = t[pick]
             columns, notes = delays.undo(columns, plan, here)
+            collector.repairs.extend(notes)
+            columns, notes = several_rates.settle(columns, plan, here)
             collector.repairs.extend(notes)
             run = _run(number if i == 0 else highest, columns, outside, plan, here, collector.repairs)
             collector.runs.append(run)
@@ -212,13 +215,15 @@ def _run(
         return np.stack([columns.get(n, missing) for n in names], axis=1)
 
     velocity = block(VELOCITY)
-    assert velocity is not None  # required.check has seen these columns
+    if velocity is None:
+        velocity = np.full((len(columns["t"]), 6), np.nan)
     raw = block(QUATERNION) if all(n in columns for n in QUATERNION) else None
     if raw is not None:
         quaternion, notes = attitude.from_quaternions(raw, where)
     else:
         angles = block(EULER)
-        assert angles is not None
+        if angles is None:
+            angles = np.full((len(columns["t"]), 3), np.nan)
         quaternion, notes = attitude.from_angles(angles, columns["t"], velocity[:, 5], where)
     repairs.extend(notes)
     acceleration, wrench, position = block(ACCELERATION), block(WRENCH), block(POSITION)
@@ -237,6 +242,8 @@ def _run(
         reset=columns.get(RESET),
         extra={n: columns[n] for n in outside},
     )
+    run, notes = in_world.settle(run, plan, where)
+    repairs.extend(notes)
     for mend in (plausible.check, masks.apply):
         run, notes = mend(run, where)
         repairs.extend(notes)
