@@ -5,11 +5,15 @@ A MOOS body has y forward, x to starboard and z up; NAV_PITCH is positive nose u
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from auvnn.logs.known.rule import Rule
 from auvnn.logs.recording import Recording, Topic
 
 
-def _present(*names: tuple[str, str, dict[str, object]]) -> object:
+def present(*names: tuple[str, str, dict[str, object]]) -> Callable[[Recording, Topic], dict[str, object]]:
+    """Return a rule's columns where each variable is a topic of its own: those that are there, if the first of them is."""
+
     def columns(recording: Recording, topic: Topic) -> dict[str, object]:
         found = {c: {"from": f"@{v}", **more} for c, v, more in names if v in recording.topics}
         return found if names[0][1] == topic.name else {}
@@ -19,14 +23,14 @@ def _present(*names: tuple[str, str, dict[str, object]]) -> object:
 
 _DEG: dict[str, object] = {"unit": "deg"}
 RULES = [
-    Rule("attitude", "moos", _present(("psi", "NAV_HEADING", _DEG), ("phi", "NAV_ROLL", {}), ("theta", "NAV_PITCH", {}))),
-    Rule("velocity", "moos", _present(("u", "NAV_SPEED", {})),
+    Rule("attitude", "moos", present(("psi", "NAV_HEADING", _DEG), ("phi", "NAV_ROLL", {}), ("theta", "NAV_PITCH", {}))),
+    Rule("velocity", "moos", present(("u", "NAV_SPEED", {})),
          note="NAV_SPEED is taken as u; v and w are not measured"),
-    Rule("position", "moos", _present(("x", "NAV_Y", {}), ("y", "NAV_X", {}), ("z", "NAV_DEPTH", {}))),
-    Rule("altitude", "moos", _present(("altitude", "NAV_ALTITUDE", {}))),
-    Rule("commands", "moos", _present(("thruster_1", "DESIRED_THRUST", {"scale": 0.01})),
+    Rule("position", "moos", present(("x", "NAV_Y", {}), ("y", "NAV_X", {}), ("z", "NAV_DEPTH", {}))),
+    Rule("altitude", "moos", present(("altitude", "NAV_ALTITUDE", {}))),
+    Rule("commands", "moos", present(("thruster_1", "DESIRED_THRUST", {"scale": 0.01})),
          note="DESIRED_THRUST is taken as percent of the one thruster"),
-    Rule("fins", "moos", _present(("fin_1", "DESIRED_RUDDER", _DEG), ("fin_2", "DESIRED_ELEVATOR", _DEG)),
+    Rule("fins", "moos", present(("fin_1", "DESIRED_RUDDER", _DEG), ("fin_2", "DESIRED_ELEVATOR", _DEG)),
          note="DESIRED_RUDDER is taken as fin_1, DESIRED_ELEVATOR as fin_2"),
-    Rule("voltage", "moos", _present(("voltage", "BATTERY_VOLTAGE", {}))),
+    Rule("voltage", "moos", present(("voltage", "BATTERY_VOLTAGE", {}))),
 ]  # fmt: skip

@@ -1,13 +1,15 @@
-"""Slocum gliders' sensors: radians, metres, seconds since 1970; pitch is positive nose up."""
+"""Slocum gliders' sensors: radians and metres; pitch is positive nose up; each sensor has times of its own."""
 
 from __future__ import annotations
 
-from auvnn.logs.known.rule import Rule, triple
+from auvnn.logs.known.moos import present
+from auvnn.logs.known.rule import Rule
 
+_KIND = "slocum"
 RULES = [
-    Rule("attitude", "slocum", triple("phi theta psi", "m_roll m_pitch m_heading"), 1),
-    Rule("depth", "slocum", {"z": "m_depth"}, 1),
-    Rule("fins", "slocum", {"fin_1": "m_fin"}, 1),
-    Rule("altitude", "slocum", {"altitude": "m_altitude"}, 1),
-    Rule("voltage", "slocum", {"voltage": "m_battery"}, 1),
+    Rule("attitude", _KIND, present(("theta", "m_pitch", {}), ("phi", "m_roll", {}), ("psi", "m_heading", {}))),
+    Rule("depth", _KIND, present(("z", "m_depth", {}))),
+    Rule("fins", _KIND, present(("fin_1", "m_fin", {}))),
+    Rule("altitude", _KIND, present(("altitude", "m_altitude", {}))),
+    Rule("voltage", _KIND, present(("voltage", "m_battery", {}))),
 ]
