@@ -24,14 +24,20 @@ def _looked(job: Job) -> list[dict[str, object]]:
         found.append(seen.to_dict())
         job.say(f"format    {path}: {seen.format}")
         for line in seen.lines():
-            job.say(line, style=_STYLE.get({"refused": "error", "lacking": "warning"}.get(line.split()[0], "")))
+            job.say(
+                line, style=_STYLE.get({"refused": "error", "lacking": "warning"}.get(line.split()[0], ""))
+            )
         if job["mapping_out"] is not None and len(found) == 1:
-            written = write_mapping(seen, Path(str(job["mapping_out"])).expanduser(), job["overwrite"] is True)
+            written = write_mapping(
+                seen, Path(str(job["mapping_out"])).expanduser(), job["overwrite"] is True
+            )
             job.say(f"mapping   written to {written}")
             if job["mapping"] is None:
                 job.options["mapping"] = str(written)
         elif job["mapping"] is None and seen.proposal.mapping["columns"] and len(found) == 1:
-            job.say("mapping   write the one that is proposed, to look at or to change, with mapping_out=map.yaml")
+            job.say(
+                "mapping   write the one that is proposed, to look at or to change, with mapping_out=map.yaml"
+            )
     return found
 
 
@@ -42,7 +48,7 @@ def _run(job: Job) -> Answering:
     if looked:
         quality = replace(quality, files=looked)
     if job["model"] is not None:
-        from auvnn.diagnosis import check_actuators
+        from auvnn.checks import check_actuators
 
         checked = check_actuators(job.model(log), log)
         quality = quality.with_actuators(checked)

@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import ConfigError, InputError
-from auvnn.logs import attitude, differences, frames, other_clocks, rates
+from auvnn.logs import differences, other_clocks, rates
 from auvnn.logs.channels import ACCELERATION, EULER, POSITION, QUATERNION, VELOCITY, WRENCH
 from auvnn.logs.known import lies, propose
-from auvnn.logs.mapping import Column, Mapping
 from auvnn.logs.rates import Series
 from auvnn.logs.readers.base import Table
+from auvnn.logs.reading import attitude, frames
+from auvnn.logs.reading.mapping import Column, Mapping
+from auvnn.logs.reading.repair import Repair
 from auvnn.logs.recording import PRIMARY, Recording, Topic, base_name, topic_of
-from auvnn.logs.repair import Repair
 
 if TYPE_CHECKING:
     from auvnn.logs.readers.recordings import RecordingReader
@@ -70,7 +71,11 @@ def assemble(reader: RecordingReader, path: Path, plan: Mapping, until: float | 
     paths = set(sources(plan))
 
     def wanted(name: str, kind: str) -> bool:
-        return base_name(name) in names or name in names or any(p == name or p.startswith(name + ".") for p in paths)
+        return (
+            base_name(name) in names
+            or name in names
+            or any(p == name or p.startswith(name + ".") for p in paths)
+        )
 
     recording = reader.record(path, wanted, until)
     if set(recording.topics) == {""} and not plan.topics:
@@ -135,11 +140,15 @@ def from_recording(recording: Recording, plan: Mapping, where: str) -> Table:
             topic, values = _values(name, column, recording, plan, where, result)
             by_place.setdefault((topic.name, column.delay), []).append((name, topic, values))
         for (_, delay), found in by_place.items():
-            series += _series([n for n, _, _ in found], [v for _, _, v in found], found[0][1], delay, plan, times, where)
+            series += _series(
+                [n for n, _, _ in found], [v for _, _, v in found], found[0][1], delay, plan, times, where
+            )
     if plan.core is not None:
         words = "core: belongs to tables; of a recording take the instance, XKF1[primary].VN"
         raise ConfigError(f"{plan.where}: {words}")
-    other_clocks.align(series, {n: r for n, r in plan.topics.items() if r.offset == "auto"}, where, result.repairs)
+    other_clocks.align(
+        series, {n: r for n, r in plan.topics.items() if r.offset == "auto"}, where, result.repairs
+    )
     _merged(series, recording, plan, where, result)
     for name, value in constants.items():
         result.columns[name] = np.full(result.rows, value)
@@ -189,7 +198,9 @@ def _values(
         each = [t.columns[f] if t is topic else _held(t, f, topic) for t, f in found]
         return topic, plan.mixed(each, column, name, where, result)
     if column.by is not None:
-        raise ConfigError(f"{plan.where}: columns: {name}: 'by' belongs to tables; of a recording take XKF1[primary].VN")
+        raise ConfigError(
+            f"{plan.where}: columns: {name}: 'by' belongs to tables; of a recording take XKF1[primary].VN"
+        )
     assert column.source is not None
     topic, field = _primary(recording, column.source, plan, where)
     words = lies(topic)
@@ -209,7 +220,13 @@ def _values(
         values, notes = column.valid.mask(values, table, name, where, plan.where)
         result.repairs += notes
     if column.more.factor is None:
-        degrees = plan.angles if name in EULER or name.startswith("fin_") else plan.rates if name in _TURNING else "rad"
+        degrees = (
+            plan.angles
+            if name in EULER or name.startswith("fin_")
+            else plan.rates
+            if name in _TURNING
+            else "rad"
+        )
         values = values * (np.pi / 180.0) if degrees == "deg" else values
     return topic, np.asarray(values, dtype=np.float64)
 
@@ -263,7 +280,13 @@ def _of_core_in_use(name: str, cores: Sequence[Topic], recording: Recording, say
 
 
 def _series(
-    names: list[str], values: list[Array], topic: Topic, delay: float, plan: Mapping, times: _Times, where: str
+    names: list[str],
+    values: list[Array],
+    topic: Topic,
+    delay: float,
+    plan: Mapping,
+    times: _Times,
+    where: str,
 ) -> list[Series]:
     """Return what a topic says of one group of columns, in FRD and NED."""
     rule = plan.topics.get(topic.name) or plan.topics.get(base_name(topic.name))
@@ -308,12 +331,16 @@ def _attitude(
             data = {n: data.get(n, np.zeros(len(t))) for n in EULER}
         angles = np.stack([data[n] for n in EULER], axis=1)
         if body == "FLU" or world == "ENU":
-            q = frames.quaternion_to_ned_frd(attitude.from_angles(angles, t, np.zeros(len(t)), where)[0], body, world)
+            q = frames.quaternion_to_ned_frd(
+                attitude.from_angles(angles, t, np.zeros(len(t)), where)[0], body, world
+            )
         else:
             q = attitude.from_angles(angles, t, np.zeros(len(t)), where)[0]
     else:
         if set(names) != set(QUATERNION):
-            raise InputError(f"{where}: {plan.where} gives {', '.join(names)} from one topic, not a whole quaternion")
+            raise InputError(
+                f"{where}: {plan.where} gives {', '.join(names)} from one topic, not a whole quaternion"
+            )
         parts = [data[n] for n in QUATERNION]
         if plan.quaternion == "xyzw":
             parts = [parts[3], *parts[:3]]
@@ -374,14 +401,20 @@ def _parts(
         result.repairs.append(Repair(words, where, len(back), "warning"))
     parts: list[list[Series]] = [[] for _ in range(len(back) + len(cuts) + 1)]
     for one in series:
-        if len(back) and rows.arrival is not None and one.arrival is not None and len(one.arrival) == len(one.t):
+        if (
+            len(back)
+            and rows.arrival is not None
+            and one.arrival is not None
+            and len(one.arrival) == len(one.t)
+        ):
             index = np.searchsorted(rows.arrival[back], one.arrival, side="right")
         elif len(back):
-            own = np.cumsum(np.concatenate([[0], np.diff(one.t) < -_BACK])) if len(one.t) else np.zeros(0, int)
+            own = (
+                np.cumsum(np.concatenate([[0], np.diff(one.t) < -_BACK])) if len(one.t) else np.zeros(0, int)
+            )
             index = np.minimum(own, len(back))
         else:
             index = np.searchsorted(np.array(cuts), one.t, side="right")
         for k in range(len(parts)):
             parts[k].append(one.cut(index == k))
     return parts
-

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from auvnn.errors import InputError, MissingExtra, one_line
-from auvnn.logs.mapping import Mapping
 from auvnn.logs.readers.base import Table
 from auvnn.logs.readers.frame import clean_names, to_table
+from auvnn.logs.reading.mapping import Mapping
 
 if TYPE_CHECKING:
     import pandas as pd
     import polars as pl
 
     from auvnn.logs.log import Log
-    from auvnn.logs.reading import Reading
+    from auvnn.logs.reading.reading import Reading
 
 
 def from_dataframe(data: Any, mapping: Any = None, name: str = "data frame") -> Reading:
@@ -35,7 +35,7 @@ def from_dataframe(data: Any, mapping: Any = None, name: str = "data frame") -> 
     """
     from pathlib import Path
 
-    from auvnn.logs.reading import Collector, Reading, collect
+    from auvnn.logs.reading.reading import Collector, Reading, collect
 
     plan = Mapping.read(mapping)
     collector = Collector()
@@ -76,7 +76,9 @@ def _pandas_columns(data: Any, where: str) -> dict[str, np.ndarray]:
         raise InputError(f"{where}: has columns of several levels; flatten their names first")
     twice = sorted({str(n) for n in data.columns[data.columns.duplicated()]})
     if twice:
-        raise InputError(f"{where}: the columns {', '.join(map(repr, twice))} occur twice; rename one of each")
+        raise InputError(
+            f"{where}: the columns {', '.join(map(repr, twice))} occur twice; rename one of each"
+        )
     columns: dict[str, np.ndarray] = {}
     index = data.index
     if index.name is not None and str(index.name) not in map(str, data.columns):
@@ -108,7 +110,9 @@ def _frame_of(data: MappingType[Any, Any], where: str) -> pl.DataFrame:
         if array.ndim != 1:
             raise InputError(f"{where}: '{name}' has shape {array.shape}; a column is an array (N,)")
         if array.dtype.kind == "O":
-            columns[str(name)] = pl.Series(str(name), [None if _missing(v) else v for v in array.tolist()], strict=False)
+            columns[str(name)] = pl.Series(
+                str(name), [None if _missing(v) else v for v in array.tolist()], strict=False
+            )
         elif array.dtype.kind == "M":
             columns[str(name)] = array.astype("datetime64[ns]")
         elif array.dtype.kind == "m":
@@ -120,7 +124,9 @@ def _frame_of(data: MappingType[Any, Any], where: str) -> pl.DataFrame:
     sizes = {name: len(column) for name, column in columns.items()}
     if len(set(sizes.values())) > 1:
         short, long = min(sizes, key=lambda n: sizes[n]), max(sizes, key=lambda n: sizes[n])
-        raise InputError(f"{where}: '{short}' has {sizes[short]} rows and '{long}' {sizes[long]}: columns must be as long")
+        raise InputError(
+            f"{where}: '{short}' has {sizes[short]} rows and '{long}' {sizes[long]}: columns must be as long"
+        )
     try:
         return pl.DataFrame(columns, nan_to_null=False)
     except (pl.exceptions.PolarsError, TypeError, ValueError) as problem:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.logs.rotation import conjugate, continuous, multiply, rotate
-from auvnn.logs.segments import GAP_STEPS
+from auvnn.logs.signals.rotation import conjugate, continuous, multiply, rotate
+from auvnn.logs.signals.segments import GAP_STEPS
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import numpy as np
 from auvnn.errors import ConfigError
 from auvnn.logs import differences
 from auvnn.logs.channels import VELOCITY
-from auvnn.logs.mapping import Mapping
-from auvnn.logs.repair import Repair
+from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.repair import Repair
 from auvnn.logs.run import Run
 
 

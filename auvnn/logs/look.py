@@ -13,8 +13,8 @@ from auvnn.logs.channels import is_canonical
 from auvnn.logs.known import Proposal, propose
 from auvnn.logs.readers import choose
 from auvnn.logs.readers.recordings import RecordingReader
+from auvnn.logs.reading.repair import Repair
 from auvnn.logs.recording import Recording, Topic
-from auvnn.logs.repair import Repair
 
 _SHOWN_FIELDS = 400
 _HEAD_BYTES = 8_000_000
@@ -52,7 +52,11 @@ class Look:
         found: dict[str, list[tuple[str, str]]] = {}
         for name, spec in self.proposal.mapping["columns"].items():
             source = spec if isinstance(spec, str) else spec.get("from", "")
-            topic = max((t for t in self.recording.topics if source.startswith(f"{t}.") or source == t), key=len, default="")
+            topic = max(
+                (t for t in self.recording.topics if source.startswith(f"{t}.") or source == t),
+                key=len,
+                default="",
+            )
             if not topic:
                 topic = source.split(".")[0].replace("[primary]", "[0]")
             found.setdefault(topic, []).append((name, source))
@@ -89,7 +93,11 @@ class Look:
                 out.append(f"topic     {_told(topic)}: {gives}")
         for name, why in self.proposal.refused.items():
             out.append(f"refused   {name}: {why}")
-        others = [t for t in self.recording.topics.values() if t.name not in used and t.name not in self.proposal.refused and t.name]
+        others = [
+            t
+            for t in self.recording.topics.values()
+            if t.name not in used and t.name not in self.proposal.refused and t.name
+        ]
         for topic in others[:40]:
             fields = [c for c in topic.columns if "covar" not in c]
             some = ", ".join(fields[:8]) + (f", ... ({len(fields)} fields)" if len(fields) > 8 else "")
@@ -106,9 +114,13 @@ class Look:
 
     def mapping_text(self) -> str:
         """Return the proposed mapping as the text of a file, with what should be known of it in comments."""
-        head = [f"# Proposed for {self.path.name} ({self.format}). Check order and sign of the thrusters, units and frames."]
+        head = [
+            f"# Proposed for {self.path.name} ({self.format}). Check order and sign of the thrusters, units and frames."
+        ]
         head += [f"# Assumed: {words}" for words in self.proposal.notes]
-        head += [f"# Guessed by name alone: {', '.join(self.proposal.guessed)}"] if self.proposal.guessed else []
+        head += (
+            [f"# Guessed by name alone: {', '.join(self.proposal.guessed)}"] if self.proposal.guessed else []
+        )
         head += [f"# Lacking: {words}" for words in self.lacks]
         head += [f"# Refused: {name}: {why}" for name, why in self.proposal.refused.items()]
         others = [t for t in self.recording.topics.values() if t.name and t.name not in self.used]
@@ -132,7 +144,13 @@ def look(path: str | Path) -> Look:
         table = reader.read_head(path, min(1.0, _HEAD_BYTES / size))
         t = table.columns.get("t")
         times = t.astype("f8") if t is not None else None
-        rows = Topic("", "array", times if times is not None else _index(table.rows), dict(table.columns), count=table.rows)
+        rows = Topic(
+            "",
+            "array",
+            times if times is not None else _index(table.rows),
+            dict(table.columns),
+            count=table.rows,
+        )
         recording = Recording({"": rows}, list(table.repairs))
     certain = propose(recording)
     whole = not certain.lacks or bool(certain.mapping["columns"])
@@ -154,7 +172,9 @@ def write_mapping(found: Look, path: Path, overwrite: bool = False) -> Path:
         raise InputError(f"mapping_out={path}: is there already; choose another name, or say overwrite=true")
     if not found.proposal.mapping["columns"]:
         fields = ", ".join(found.recording.topics) or "nothing"
-        raise InputError(f"{found.path}: no field of it is known or sounds like what a log needs; it has {fields[:300]}")
+        raise InputError(
+            f"{found.path}: no field of it is known or sounds like what a log needs; it has {fields[:300]}"
+        )
     return write_text(path, found.mapping_text())
 
 

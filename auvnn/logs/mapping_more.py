@@ -151,7 +151,9 @@ def of_column(value: Mapping[str, Any], name: str, here: str) -> More:
         over = value["over"]
         over = {"from": over} if isinstance(over, str) else over
         if not isinstance(over, Mapping) or not isinstance(over.get("from"), str):
-            raise ConfigError(f"{here}: over must name the column of the time that a displacement took, not {over!r}")
+            raise ConfigError(
+                f"{here}: over must name the column of the time that a displacement took, not {over!r}"
+            )
         _known(over, ("from", "unit"), f"{here}: over")
         found["over"] = over["from"]
         found["over_factor"] = unit_factor(over.get("unit", "s"), f"{here}: over: unit")
@@ -229,7 +231,11 @@ def _topic(rule: Any, here: str) -> TopicRule:
         raise ConfigError(f"{here}: must be {{body: ..., world: ..., offset: ...}}, not {rule!r}")
     _known(rule, ("body", "world", "offset", "delay", "stamps", "trust"), here)
     found: dict[str, Any] = {}
-    for key, choices in (("body", ("FRD", "FLU")), ("world", ("NED", "ENU")), ("stamps", ("header", "arrival"))):
+    for key, choices in (
+        ("body", ("FRD", "FLU")),
+        ("world", ("NED", "ENU")),
+        ("stamps", ("header", "arrival")),
+    ):
         if key in rule:
             if rule[key] not in choices:
                 raise ConfigError(f"{here}: {key}: {unknown_name('choice', str(rule[key]), choices)}")

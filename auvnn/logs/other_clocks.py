@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import InputError
-from auvnn.logs import differences, lags
+from auvnn.logs import differences
 from auvnn.logs.channels import POSITION, QUATERNION, VELOCITY
-from auvnn.logs.repair import Repair
+from auvnn.logs.reading.repair import Repair
+from auvnn.logs.signals import lags
 
 if TYPE_CHECKING:
     from auvnn.logs.mapping_more import TopicRule

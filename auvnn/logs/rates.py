@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from auvnn.errors import InputError
 from auvnn.logs.channels import ACCELERATION, EULER, QUATERNION, RESET, VELOCITY, WRENCH
-from auvnn.logs.repair import Repair
-from auvnn.logs.rotation import continuous
-from auvnn.logs.segments import GAP_STEPS
+from auvnn.logs.reading.repair import Repair
+from auvnn.logs.signals.rotation import continuous
+from auvnn.logs.signals.segments import GAP_STEPS
 
 Array = NDArray[np.float64]
 
@@ -165,7 +165,9 @@ def _at(
         return _nearest(one, t, step)
     if one.step > _SLOWER * step:
         words = f"{'attitude' if attitude else ', '.join(one.names)} at {1 / one.step:.3g} Hz interpolated"
-        repairs.append(Repair(f"{words} to rows at {1 / step:.3g} Hz", f"{where}, {one.topic}", len(t), "warning"))
+        repairs.append(
+            Repair(f"{words} to rows at {1 / step:.3g} Hz", f"{where}, {one.topic}", len(t), "warning")
+        )
     values = continuous(one.values) if attitude else one.values
     result = linear(one.t, values, t, GAP_STEPS * max(one.step, step))
     if attitude:
@@ -220,7 +222,9 @@ def _commands(
     mixed = inside > start
     if between == "held" and mixed.any():
         # The integral of a held command is linear between its messages.
-        grown = np.concatenate([np.zeros((1, one.values.shape[1])), np.cumsum(np.diff(one.t)[:, None] * one.values[:-1], axis=0)])
+        grown = np.concatenate(
+            [np.zeros((1, one.values.shape[1])), np.cumsum(np.diff(one.t)[:, None] * one.values[:-1], axis=0)]
+        )
         a, b = start[mixed], inside[mixed]
         begin = np.maximum(t[mixed], one.t[0])
         whole = (grown[b] + (end[mixed] - one.t[b])[:, None] * one.values[b]) - (

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from auvnn.catalogue import unknown_name
 from auvnn.errors import InputError
-from auvnn.logs.repair import Repair
+from auvnn.logs.reading.repair import Repair
 
 Array = NDArray[np.float64]
 Wanted = Callable[[str, str], bool]
@@ -88,7 +88,9 @@ class Recording:
         if rest not in topic.columns:
             known = list(topic.columns)
             if rest in topic.words:
-                raise InputError(f"{where}: {mapping} takes numbers from '{path}', which is the word '{topic.words[rest]}'")
+                raise InputError(
+                    f"{where}: {mapping} takes numbers from '{path}', which is the word '{topic.words[rest]}'"
+                )
             raise InputError(
                 f"{where}: {mapping} takes a value from '{path}': {unknown_name(f'field of {topic.name}', rest, known)}"
             )

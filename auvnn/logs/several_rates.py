@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.logs import attitude, differences, rates
+from auvnn.logs import differences, rates
 from auvnn.logs.channels import EULER, QUATERNION, VELOCITY, WRENCH
-from auvnn.logs.mapping import Mapping
 from auvnn.logs.rates import Series
-from auvnn.logs.repair import Repair
+from auvnn.logs.reading import attitude
+from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.repair import Repair
 
 Array = NDArray[np.float64]
 
@@ -45,7 +46,9 @@ def settle(columns: dict[str, Array], plan: Mapping, where: str) -> tuple[dict[s
             out[name] = np.full(len(out["t"]), np.nan)
     steps = sorted({round(1.0 / s.step, 2) for s in series if np.isfinite(s.step)})
     told = ", ".join(f"{r:g}" for r in steps)
-    words = f"columns of several rates ({told} Hz) brought to the times of {rows.topic}, {1 / rows.step:.3g} Hz"
+    words = (
+        f"columns of several rates ({told} Hz) brought to the times of {rows.topic}, {1 / rows.step:.3g} Hz"
+    )
     return out, [Repair(words, where, len(out["t"]), "info"), *repairs]
 
 
@@ -58,6 +61,11 @@ def _with_quaternion(series: list[Series], plan: Mapping, where: str) -> list[Se
             q = attitude.from_angles(angles, one.t, np.zeros(len(one.t)), where)[0]
             one = Series(QUATERNION, one.t, q, one.topic)
         elif set(one.names) == set(QUATERNION):
-            one = Series(QUATERNION, one.t, np.stack([one.values[:, one.names.index(n)] for n in QUATERNION], axis=1), one.topic)
+            one = Series(
+                QUATERNION,
+                one.t,
+                np.stack([one.values[:, one.names.index(n)] for n in QUATERNION], axis=1),
+                one.topic,
+            )
         out.append(one)
     return out

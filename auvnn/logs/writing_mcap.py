@@ -15,7 +15,7 @@ import numpy as np
 
 from auvnn.errors import InputError, MissingExtra
 from auvnn.logs.channels import POSITION, QUATERNION, VELOCITY
-from auvnn.logs.rotation import multiply
+from auvnn.logs.signals.rotation import multiply
 
 if TYPE_CHECKING:
     from auvnn.logs.log import Log
@@ -93,7 +93,10 @@ def _write(run: Run, begin: int, writer: Any, odometry: Any, rest: Any, store: A
         pose = kinds["Pose"](kinds["Point"](*position[i]), kinds["Quaternion"](x, y, z, w))
         twist = kinds["Twist"](kinds["Vector3"](*velocity[i, :3]), kinds["Vector3"](*velocity[i, 3:]))
         message = kinds["Odometry"](
-            header, "base_link", kinds["PoseWithCovariance"](pose, none), kinds["TwistWithCovariance"](twist, none)
+            header,
+            "base_link",
+            kinds["PoseWithCovariance"](pose, none),
+            kinds["TwistWithCovariance"](twist, none),
         )
         writer.write(odometry, stamp, store.serialize_cdr(message, "nav_msgs/msg/Odometry"))
         message = kinds["JointState"](header, names, values[i], empty, empty)

@@ -135,7 +135,10 @@ def _rosbags(log: Log, writer: Any, typestore: Any, serialize: Any, ros1: bool) 
         pose = make["Pose"](make["Point"](*position[i]), make["Quaternion"](*xyzw[i]))
         twist = make["Twist"](make["Vector3"](*velocity[i, :3]), make["Vector3"](*velocity[i, 3:]))
         message = kinds["nav_msgs/msg/Odometry"](
-            header, "base_link", make["PoseWithCovariance"](pose, none), make["TwistWithCovariance"](twist, none)
+            header,
+            "base_link",
+            make["PoseWithCovariance"](pose, none),
+            make["TwistWithCovariance"](twist, none),
         )
         writer.write(odometry, stamp, serialize(message, "nav_msgs/msg/Odometry"))
         data = make["Float64MultiArray"](make["MultiArrayLayout"]([], 0), run.thrusters[i].copy())
@@ -194,7 +197,18 @@ def lsf(log: Log, path: Path) -> Path:
 
 
 def _df(number: int, codes: str, values: list[Any]) -> bytes:
-    kinds = {"Q": "Q", "B": "B", "H": "H", "h": "h", "f": "f", "d": "d", "c": "h", "N": "16s", "n": "4s", "Z": "64s"}
+    kinds = {
+        "Q": "Q",
+        "B": "B",
+        "H": "H",
+        "h": "h",
+        "f": "f",
+        "d": "d",
+        "c": "h",
+        "N": "16s",
+        "n": "4s",
+        "Z": "64s",
+    }
     return struct.pack("<BBB" + "".join(kinds[c] for c in codes), 0xA3, 0x95, number, *values)
 
 
@@ -206,7 +220,11 @@ def binary(log: Log, path: Path, quantised: bool = False) -> Path:
         10: ("XKQ", "QBffff" if quantised else "QBdddd", "TimeUS,C,Q1,Q2,Q3,Q4"),
         11: ("XKF1", f"QB{wide * 6}", "TimeUS,C,VN,VE,VD,PN,PE,PD"),
         12: ("RATE", f"Q{wide * 3}", "TimeUS,R,P,Y"),
-        13: ("RCOU", "Q" + ("H" if quantised else "d") * 8, "TimeUS," + ",".join(f"C{i + 1}" for i in range(8))),
+        13: (
+            "RCOU",
+            "Q" + ("H" if quantised else "d") * 8,
+            "TimeUS," + ",".join(f"C{i + 1}" for i in range(8)),
+        ),
     }
     sizes = {"Q": 8, "B": 1, "f": 4, "d": 8, "H": 2}
     out = [_df(128, "BBnNZ", [128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns"])]
@@ -313,7 +331,9 @@ def netcdf(log: Log, path: Path) -> Path:
     with netCDF4.Dataset(path, "w") as file:
         file.createDimension("time", None)
         for name, column in _arrays(log.runs[0]).items():
-            variable = file.createVariable("time" if name == "t" else name, "f8", ("time",), fill_value=-9999.0)
+            variable = file.createVariable(
+                "time" if name == "t" else name, "f8", ("time",), fill_value=-9999.0
+            )
             variable[:] = np.where(np.isnan(column), -9999.0, column)
     return path
 
@@ -329,7 +349,9 @@ def alog(log: Log, path: Path) -> Path:
         rows = {"NAV_X": run.position[i, 1], "NAV_Y": run.position[i, 0], "NAV_DEPTH": run.position[i, 2],
                 "NAV_HEADING": np.degrees(euler[i, 2]) % 360.0, "NAV_PITCH": euler[i, 1], "NAV_ROLL": euler[i, 0],
                 "NAV_SPEED": run.nu[i, 0], "DESIRED_THRUST": 100.0 * run.thrusters[i, 0]}  # fmt: skip
-        lines += [f"{t}   {name}   pNav   {value!r}" for name, value in ((n, float(v)) for n, v in rows.items())]
+        lines += [
+            f"{t}   {name}   pNav   {value!r}" for name, value in ((n, float(v)) for n, v in rows.items())
+        ]
         if i % 7 == 0:
             lines.append(f"{t}   APP_STATUS   pNav   all is well, a=1,b=2")
     path.write_text("\n".join(lines) + "\n")

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from auvnn.logs.known.rule import Rule, pwm_channels, triple
 
-_PWM = "{topic}: thrusters in the order of the motors, 1500 us neutral, 400 us full; give your thruster's span"
+_PWM = (
+    "{topic}: thrusters in the order of the motors, 1500 us neutral, 400 us full; give your thruster's span"
+)
 _OVER = {"over": {"from": "dt", "unit": "us"}}
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from auvnn.logs.known.rule import Rule, pwm_channels, triple
 
-_SERVO = "{topic}: thrusters in the order of the motors, 1500 us neutral, 400 us full; give your thruster's span"
+_SERVO = (
+    "{topic}: thrusters in the order of the motors, 1500 us neutral, 400 us full; give your thruster's span"
+)
 
 
 def _over(key: str = "time_delta_usec") -> dict[str, object]:

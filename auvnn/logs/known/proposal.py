@@ -10,8 +10,8 @@ import numpy as np
 
 from auvnn.logs.channels import EULER, POSITION, QUATERNION, VELOCITY, is_canonical
 from auvnn.logs.known.rule import BLOCKS, Rule
+from auvnn.logs.reading.suggest import likely
 from auvnn.logs.recording import Recording, Topic
-from auvnn.logs.suggest import likely
 
 _NEEDS = {
     "attitude": (QUATERNION, EULER),
@@ -103,7 +103,9 @@ def _guess(recording: Recording, columns: dict[str, Any]) -> list[str]:
     if not {*QUATERNION} & set(columns) and not {*EULER} & set(columns):
         wanted += [*EULER]
     for name in wanted:
-        found = next((p for p in paths if p.rsplit(".", 1)[-1] == name and not is_canonical(p)), None) or likely(name, paths)
+        found = next(
+            (p for p in paths if p.rsplit(".", 1)[-1] == name and not is_canonical(p)), None
+        ) or likely(name, paths)
         if found:
             columns[name] = found
             added.append(name)

@@ -125,4 +125,3 @@ LIES = [
     Lie(r"geometry_msgs/msg/Twist.*", r"gps_vel$|global_position/raw/gps_vel$",
         "it is the velocity over ground of the satellite receiver along the world's axes; use local_position/odom"),
 ]  # fmt: skip
-

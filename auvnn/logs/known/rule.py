@@ -12,7 +12,18 @@ import numpy as np
 from auvnn.logs.recording import Recording, Topic
 
 Columns = Mapping[str, Any]
-BLOCKS = ("attitude", "velocity", "rates", "position", "depth", "commands", "fins", "altitude", "voltage", "acceleration")
+BLOCKS = (
+    "attitude",
+    "velocity",
+    "rates",
+    "position",
+    "depth",
+    "commands",
+    "fins",
+    "altitude",
+    "voltage",
+    "acceleration",
+)
 
 
 @dataclass(frozen=True)
@@ -129,7 +140,11 @@ def pwm_channels(topic: Topic, pattern: str, recording: Recording, base: int = 0
         channels = []
         for number in range(1, 9):
             column = topic.columns.get(pattern.format(number - base))
-            values = np.zeros(0) if column is None else column[np.isfinite(column) & (column > 0) & (column < 65535)]
+            values = (
+                np.zeros(0)
+                if column is None
+                else column[np.isfinite(column) & (column > 0) & (column < 65535)]
+            )
             if len(values) == 0 or values.min() < 800 or values.max() > 2200:
                 break
             channels.append((number, 1.0))

@@ -7,7 +7,9 @@ from auvnn.logs.known.rule import Rule
 
 _KIND = "slocum"
 RULES = [
-    Rule("attitude", _KIND, present(("theta", "m_pitch", {}), ("phi", "m_roll", {}), ("psi", "m_heading", {}))),
+    Rule(
+        "attitude", _KIND, present(("theta", "m_pitch", {}), ("phi", "m_roll", {}), ("psi", "m_heading", {}))
+    ),
     Rule("depth", _KIND, present(("z", "m_depth", {}))),
     Rule("fins", _KIND, present(("fin_1", "m_fin", {}))),
     Rule("altitude", _KIND, present(("altitude", "m_altitude", {}))),

@@ -14,8 +14,8 @@ import numpy as np
 from auvnn.errors import InputError
 from auvnn.logs.readers.memory import refuse_more_than_memory
 from auvnn.logs.readers.recordings import RecordingReader
+from auvnn.logs.reading.repair import Repair
 from auvnn.logs.recording import Recording, Topic, Wanted
-from auvnn.logs.repair import Repair
 
 _START = re.compile(rb"^%%+[ \t]*LOGSTART[ \t]+([-+.0-9eE]+)", re.MULTILINE)
 _LONGEST_LINE = 100_000
@@ -79,7 +79,9 @@ class AlogReader(RecordingReader):
             raise InputError(f"{where}: holds no line of time, variable, source and number: no MOOS log")
         notes = []
         if bad:
-            notes.append(Repair("lines that are no `time variable source value` left out", where, bad, "warning"))
+            notes.append(
+                Repair("lines that are no `time variable source value` left out", where, bad, "warning")
+            )
         found = _START.search(head)
         start = _number(found[1]) if found else None
         topics = {}

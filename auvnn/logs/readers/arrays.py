@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import InputError
+from auvnn.logs.reading.repair import Repair
 from auvnn.logs.recording import Recording, Topic
-from auvnn.logs.repair import Repair
 
 _TIMES = ("t", "time", "Time", "timestamp", "Timestamp", "stamp", "times", "TIME", "time_s", "tout")
 _MOST_COLUMNS = 64
@@ -33,13 +33,17 @@ def to_recording(arrays: Mapping[str, NDArray], where: str, repairs: list[Repair
         if array.ndim in (1, 2) and max(array.shape, default=0) >= MIN_ROWS and array.dtype.kind in "iufb":
             groups.setdefault(group, {})[name] = array
     if not groups:
-        raise InputError(f"{where}: holds no arrays of numbers; save the signals as plain arrays, and their time as t")
+        raise InputError(
+            f"{where}: holds no arrays of numbers; save the signals as plain arrays, and their time as t"
+        )
     topics: dict[str, Topic] = {}
     left: list[str] = []
     for group, members in groups.items():
         topics |= _of_group(group, members, groups, left)
     if left:
-        words = f"arrays without a time of their length left out: {', '.join(left[:8])}" + (", ..." if len(left) > 8 else "")
+        words = f"arrays without a time of their length left out: {', '.join(left[:8])}" + (
+            ", ..." if len(left) > 8 else ""
+        )
         repairs.append(Repair(words, where, len(left), "info"))
     if not topics:
         raise InputError(

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from auvnn.errors import InputError
 from auvnn.logs.readers.packets import chain, columns
 from auvnn.logs.readers.recordings import RecordingReader
+from auvnn.logs.reading.repair import Repair
 from auvnn.logs.recording import Recording, Topic, Wanted
-from auvnn.logs.repair import Repair
 
 _HEAD = b"\xa3\x95\x80"
 _FMT, _FMT_LENGTH = 128, 89
@@ -80,7 +80,9 @@ class DataFlashReader(RecordingReader):
         notes: list[Repair] = []
         formats = _formats(data, where, notes)
         if not formats:
-            raise InputError(f"{where}: holds no description of its messages (FMT): no DataFlash log, or damaged")
+            raise InputError(
+                f"{where}: holds no description of its messages (FMT): no DataFlash log, or damaged"
+            )
         places, lost, breaks, unknown = _packets(data, formats)
         if not places:
             raise InputError(f"{where}: holds no messages: no DataFlash log, or damaged")
@@ -105,7 +107,9 @@ def _formats(data: NDArray[np.uint8], where: str, notes: list[Repair]) -> dict[i
             continue
         raw = data[at : at + _FMT_LENGTH].tobytes()
         number, length = raw[3], raw[4]
-        name, codes, labels = (raw[a:b].rstrip(b"\0").decode("latin-1") for a, b in ((5, 9), (9, 25), (25, 89)))
+        name, codes, labels = (
+            raw[a:b].rstrip(b"\0").decode("latin-1") for a, b in ((5, 9), (9, 25), (25, 89))
+        )
         names = tuple(label for label in labels.split(",") if label)
         if not re.fullmatch(r"[A-Za-z0-9_]{1,4}", name):
             continue
@@ -156,7 +160,11 @@ def _packets(
     while at < len(data):
         stop = min(at + _BLOCK, len(data))
         part = np.asarray(data[at:stop])
-        hit = np.flatnonzero((part[:-2] == 0xA3) & (part[1:-1] == 0x95)) if len(part) > 2 else np.zeros(0, np.int64)
+        hit = (
+            np.flatnonzero((part[:-2] == 0xA3) & (part[1:-1] == 0x95))
+            if len(part) > 2
+            else np.zeros(0, np.int64)
+        )
         kinds = part[hit + 2]
         described = lengths[kinds] > 0
         strange = np.bincount(kinds[~described], minlength=256)
@@ -194,7 +202,11 @@ def _say(where: str, size: int, lost: int, breaks: int, unknown: dict[int, int],
 
 class _Read:
     def __init__(
-        self, data: NDArray[np.uint8], formats: dict[int, Format], places: dict[int, NDArray[np.int64]], where: str
+        self,
+        data: NDArray[np.uint8],
+        formats: dict[int, Format],
+        places: dict[int, NDArray[np.int64]],
+        where: str,
     ) -> None:
         self.data, self.formats, self.places, self.where = data, formats, places, where
         self.cuts: list[int] = []
@@ -210,7 +222,11 @@ class _Read:
                 raw = self.values(number)
                 names = [n.decode("latin-1") if isinstance(n, bytes) else "" for n in raw["Name"].tolist()]
                 with np.errstate(all="ignore"):
-                    numbers = raw["Value"].astype(np.float64) if raw["Value"].dtype.kind in "fiu" else np.zeros(len(raw))
+                    numbers = (
+                        raw["Value"].astype(np.float64)
+                        if raw["Value"].dtype.kind in "fiu"
+                        else np.zeros(len(raw))
+                    )
                 return {n: float(v) for n, v in zip(names, numbers, strict=True) if np.isfinite(v)}
         return {}
 
@@ -225,7 +241,11 @@ class _Read:
         stamps = self._seconds(self.values(number), self.formats[number])
         back = np.flatnonzero(np.diff(stamps) < -_REBOOT) + 1
         # Damage makes single stamps jump; a reboot goes on from where it fell to.
-        back = [int(b) for b in back if np.median(stamps[b : b + 5]) < np.median(stamps[max(0, b - 5) : b]) - _REBOOT]
+        back = [
+            int(b)
+            for b in back
+            if np.median(stamps[b : b + 5]) < np.median(stamps[max(0, b - 5) : b]) - _REBOOT
+        ]
         self.first = float(np.median(stamps[:3]))
         edges = [0, *back, len(stamps)]
         parts = []
@@ -259,7 +279,9 @@ class _Read:
                 with np.errstate(all="ignore"):
                     found[label] = values.astype(np.float64) * _FACTORS.get(code, 1.0)
         label = next((n for n in _INSTANCES if n in found), None)
-        kinds = np.unique(found[label]) if label and form.codes[form.labels.index(label)] in "bB" else np.zeros(0)
+        kinds = (
+            np.unique(found[label]) if label and form.codes[form.labels.index(label)] in "bB" else np.zeros(0)
+        )
         if label is None or len(kinds) == 0 or len(kinds) > 16 or _once_each(found[label], kinds, form.name):
             return {form.name: Topic(form.name, "dataflash", t, found)}
         out = {}

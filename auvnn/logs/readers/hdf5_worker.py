@@ -26,7 +26,16 @@ def main(folder: str, memory: str, path: str) -> None:
     try:
         with h5py.File(path, "r") as file, (out / "arrays.bin").open("wb") as stream:
             _group(h5py, file, "", 0, entries, state, stream, limit, set())
-    except (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, OverflowError, AttributeError) as problem:
+    except (
+        OSError,
+        RuntimeError,
+        ValueError,
+        KeyError,
+        TypeError,
+        MemoryError,
+        OverflowError,
+        AttributeError,
+    ) as problem:
         words = f"is a damaged HDF5 file ({type(problem).__name__}: {' '.join(str(problem).split())[:150]})"
         (out / "index.json").write_text(json.dumps({"error": words}))
         return
@@ -59,7 +68,13 @@ def _group(h5py, group, prefix, depth, entries, state, stream, limit, seen):  # 
 def _dataset(item, full, entries, state, stream, limit):  # noqa: ANN001, ANN202
     import numpy as np
 
-    if item.dtype.kind not in "iufb" or item.dtype.itemsize > 8 or item.ndim > 3 or item.is_virtual or item.external:
+    if (
+        item.dtype.kind not in "iufb"
+        or item.dtype.itemsize > 8
+        or item.ndim > 3
+        or item.is_virtual
+        or item.external
+    ):
         return
     size = 8 * int(item.size)
     if not 0 < size <= limit or state["offset"] + size > limit:
@@ -80,7 +95,9 @@ def _dataset(item, full, entries, state, stream, limit):  # noqa: ANN001, ANN202
     for number, use in ((scale, "scale"), (offset, "offset")):
         if number is not None and np.asarray(number).size == 1 and np.asarray(number).dtype.kind in "iuf":
             value = float(np.asarray(number).reshape(-1)[0])
-            values = values.astype(np.float64) * value if use == "scale" else values.astype(np.float64) + value
+            values = (
+                values.astype(np.float64) * value if use == "scale" else values.astype(np.float64) + value
+            )
             whole = False
     kind = "<i8" if whole and values.dtype.kind == "i" else "<f8"
     data = np.ascontiguousarray(values, dtype=kind)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from auvnn.errors import InputError
 from auvnn.logs.readers.recordings import RecordingReader
+from auvnn.logs.reading.repair import Repair
 from auvnn.logs.recording import Recording, Topic, Wanted
-from auvnn.logs.repair import Repair
 
 _HEADER, _FOOTER = 20, 2
 _SYNC = 0xFE54
@@ -126,9 +126,13 @@ def _bytes(path: Path, where: str, notes: list[Repair]) -> NDArray[np.uint8]:
             worker = zlib.decompressobj(31)
             out += worker.decompress(rest, limit - len(out) + 1)
             if len(out) > limit:
-                raise InputError(f"{where}: unpacks to more than {limit / 1e6:.0f} MB: no log is packed so tightly")
+                raise InputError(
+                    f"{where}: unpacks to more than {limit / 1e6:.0f} MB: no log is packed so tightly"
+                )
             if not worker.eof:
-                notes.append(Repair("cut short: what could be unpacked is used", where, 1, "warning", "copy it again"))
+                notes.append(
+                    Repair("cut short: what could be unpacked is used", where, 1, "warning", "copy it again")
+                )
                 break
             rest = worker.unused_data
             if not rest.startswith(b"\x1f\x8b"):
@@ -165,14 +169,33 @@ def _from_xml(text: bytes) -> dict[int, tuple[str, str]]:
         fields = [(f.get("abbrev", ""), _KINDS.get(f.get("type", ""))) for f in message.findall("field")]
         simple = all(kind and re.fullmatch(r"[A-Za-z]\w*", label) for label, kind in fields)
         labels = {label for label, _ in fields}
-        if number.isdigit() and int(number) < 65536 and re.fullmatch(r"\w+", name) and fields and simple and len(labels) == len(fields):
+        if (
+            number.isdigit()
+            and int(number) < 65536
+            and re.fullmatch(r"\w+", name)
+            and fields
+            and simple
+            and len(labels) == len(fields)
+        ):
             found[int(number)] = name, " ".join(f"{label}={kind}" for label, kind in fields)
     return found
 
 
 def _record(fields: str, order: str) -> np.dtype:
-    own = [(name, kind if kind[1] == "1" else order + kind) for name, _, kind in (f.partition("=") for f in fields.split())]
-    head = [("_sync", "u2"), ("_id", "u2"), ("_size", "u2"), ("_time", "f8"), ("_src", "u2"), ("_ent", "u1"), ("_dst", "u2"), ("_dent", "u1")]
+    own = [
+        (name, kind if kind[1] == "1" else order + kind)
+        for name, _, kind in (f.partition("=") for f in fields.split())
+    ]
+    head = [
+        ("_sync", "u2"),
+        ("_id", "u2"),
+        ("_size", "u2"),
+        ("_time", "f8"),
+        ("_src", "u2"),
+        ("_ent", "u1"),
+        ("_dst", "u2"),
+        ("_dent", "u1"),
+    ]
     return np.dtype([(n, k if k == "u1" else order + k) for n, k in head] + own + [("_crc", order + "u2")])
 
 
@@ -233,7 +256,9 @@ def _topics(name: str, records: NDArray, begin: float) -> dict[str, Topic]:
         return {}
     if name == "EstimatedState":
         # Several estimators may run; the one that says most is the vehicle's own.
-        kinds = kinds[[int((by == k).sum()) for k in kinds].index(max(int((by == k).sum()) for k in kinds)) :][:1]
+        kinds = kinds[
+            [int((by == k).sum()) for k in kinds].index(max(int((by == k).sum()) for k in kinds)) :
+        ][:1]
         keep = by == kinds[0]
         return {name: Topic(name, "imc", t[keep], {n: v[keep] for n, v in columns.items()})}
     out = {}

@@ -37,17 +37,28 @@ def run_isolated(
         MissingExtra: a package is missing.
     """
     with tempfile.TemporaryDirectory(prefix="auvnn-read-") as folder:
-        command = [sys.executable, "-I", str(Path(__file__).with_name(worker)), folder, str(memory), *arguments]
+        command = [
+            sys.executable,
+            "-I",
+            str(Path(__file__).with_name(worker)),
+            folder,
+            str(memory),
+            *arguments,
+        ]
         environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         try:
-            ended = subprocess.run(command, capture_output=True, timeout=seconds, check=False, env=environment)
+            ended = subprocess.run(
+                command, capture_output=True, timeout=seconds, check=False, env=environment
+            )
         except subprocess.TimeoutExpired:
             raise InputError(f"{where}: cannot be read within {seconds:.0f} s: damaged?") from None
         index = Path(folder) / "index.json"
         if not index.is_file():
             code = ended.returncode
             how = signal.Signals(-code).name if code < 0 else f"status {code}"
-            raise InputError(f"{where}: is damaged: the library that reads it broke off ({how}); copy the file again")
+            raise InputError(
+                f"{where}: is damaged: the library that reads it broke off ({how}); copy the file again"
+            )
         told = json.loads(index.read_text())
         if "missing" in told:
             package, extra = told["missing"]

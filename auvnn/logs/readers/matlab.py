@@ -19,8 +19,8 @@ from auvnn.errors import InputError, one_line
 from auvnn.logs.readers.arrays import to_recording
 from auvnn.logs.readers.memory import refuse_more_than_memory
 from auvnn.logs.readers.recordings import RecordingReader
+from auvnn.logs.reading.repair import Repair
 from auvnn.logs.recording import Recording, Wanted
-from auvnn.logs.repair import Repair
 
 _HEADER = 128
 _MATRIX, _COMPRESSED = 14, 15
@@ -56,7 +56,9 @@ class MatlabReader(RecordingReader):
                 warnings.simplefilter("ignore")
                 found = loadmat(io.BytesIO(plain), simplify_cells=True, verify_compressed_data_integrity=True)
         except MemoryError:
-            raise InputError(f"{where}: is a damaged MATLAB file: it asks for more memory than there is") from None
+            raise InputError(
+                f"{where}: is a damaged MATLAB file: it asks for more memory than there is"
+            ) from None
         except Exception as problem:  # scipy raises what its parts raise
             raise InputError(f"{where}: is a damaged MATLAB file ({one_line(problem, 120)})") from None
         arrays: dict[str, Any] = {}
@@ -94,7 +96,9 @@ def _checked(raw: bytes, where: str, notes: list[Repair]) -> bytes:
         data = raw[at + 8 : at + 8 + size]
         at += 8 + size
         if len(data) < size:
-            notes.append(Repair("cut short: the last array left out", where, 1, "warning", "copy the file again"))
+            notes.append(
+                Repair("cut short: the last array left out", where, 1, "warning", "copy the file again")
+            )
             break
         if kind == _COMPRESSED:
             worker = zlib.decompressobj()
@@ -110,7 +114,9 @@ def _checked(raw: bytes, where: str, notes: list[Repair]) -> bytes:
             data = data[8:]
         total += len(data)
         if total > limit:
-            raise InputError(f"{where}: unpacks to more than {limit / 1e6:.0f} MB: no log is packed so tightly")
+            raise InputError(
+                f"{where}: unpacks to more than {limit / 1e6:.0f} MB: no log is packed so tightly"
+            )
         if kind != _MATRIX or size != len(data):
             bad += 1
             continue
@@ -122,7 +128,9 @@ def _checked(raw: bytes, where: str, notes: list[Repair]) -> bytes:
         else:
             out.append(struct.pack(order + "II", kind, len(data)) + data)
     if opaque:
-        words = "objects of MATLAB (timetable, timeseries, datetime, string) left out: only MATLAB can read them"
+        words = (
+            "objects of MATLAB (timetable, timeseries, datetime, string) left out: only MATLAB can read them"
+        )
         notes.append(Repair(words, where, opaque, "warning", "save their columns as plain arrays"))
     if bad:
         notes.append(Repair("damaged arrays left out", where, bad, "warning", "copy the file again"))

@@ -10,7 +10,7 @@ from auvnn.logs.readers.base import Reader, Table
 from auvnn.logs.recording import Recording, Wanted
 
 if TYPE_CHECKING:
-    from auvnn.logs.mapping import Mapping
+    from auvnn.logs.reading.mapping import Mapping
 
 
 class RecordingReader(Reader):
@@ -40,7 +40,7 @@ class RecordingReader(Reader):
         Raises:
             InputError: as `record`, or the known types hold no log.
         """
-        from auvnn.logs.mapping import Mapping
+        from auvnn.logs.reading.mapping import Mapping
 
         return self.mapped(path, Mapping())
 

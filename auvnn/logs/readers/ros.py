@@ -14,8 +14,8 @@ from auvnn.errors import InputError
 from auvnn.logs.readers import ros_definitions
 from auvnn.logs.readers.recordings import RecordingReader
 from auvnn.logs.readers.ros_layout import Decoder
+from auvnn.logs.reading.repair import Repair
 from auvnn.logs.recording import Recording, Topic, Wanted
-from auvnn.logs.repair import Repair
 
 _BATCH = 2_000
 _BATCH_BYTES = 8_000_000
@@ -132,7 +132,9 @@ class _Columns:
     def add(self, stamp: int, data: bytes) -> None:
         self.count += 1
         self.last = stamp
-        if self.decoder is None or (self.first is not None and self.decoded + len(self.waiting) >= self.first):
+        if self.decoder is None or (
+            self.first is not None and self.decoded + len(self.waiting) >= self.first
+        ):
             if self.decoder is None and len(self.arrivals) < _SURVEY:
                 self.arrivals.append(stamp)
             return
@@ -168,7 +170,9 @@ class _Columns:
         t = arrival
         if sec is not None and nano is not None and len(sec) == len(arrival):
             with np.errstate(invalid="ignore"):
-                whole = np.nan_to_num(sec).astype(np.int64) * 1_000_000_000 + np.nan_to_num(nano).astype(np.int64)
+                whole = np.nan_to_num(sec).astype(np.int64) * 1_000_000_000 + np.nan_to_num(nano).astype(
+                    np.int64
+                )
             if (whole != 0).any():
                 t = np.where(whole == 0, np.nan, (whole - epoch) * 1e-9)
         return Topic(self.channel.topic, self.channel.kind, t, columns, words, arrival, self.count)
@@ -184,6 +188,8 @@ def _clocks(topics: dict[str, Topic], where: str, notes: Notes) -> None:
             # The smallest difference is that of the quickest message: nearest to the offset of the clocks.
             offset = float(np.nanmin(topic.arrival - topic.t))
             topic.t = topic.t + offset
-            words = f"stamped by another clock, {behind:.3f} s from the recorder's: set to the time of recording"
+            words = (
+                f"stamped by another clock, {behind:.3f} s from the recorder's: set to the time of recording"
+            )
             cure = f"give its true offset in the mapping: clocks: {{{topic.name}: {{offset: auto}}}}"
             notes.append(Repair(words, f"{where}, {topic.name}", len(topic.t), "warning", cure))

@@ -12,7 +12,7 @@ from pathlib import Path
 from auvnn.errors import InputError
 from auvnn.logs.readers.ros import Channel, Message, Notes, RosReader
 from auvnn.logs.readers.unpack import LIMIT, unpack
-from auvnn.logs.repair import Repair
+from auvnn.logs.reading.repair import Repair
 
 MAGIC = b"#ROSBAG V2.0\n"
 _MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
@@ -46,7 +46,9 @@ class Ros1Reader(RosReader):
                 size = stream.seek(0, 2)
                 stream.seek(0)
                 if stream.read(len(MAGIC)) != MAGIC:
-                    raise InputError(f"{where}: is a ROS bag of another version than 2.0: `rosbag fix` can mend that")
+                    raise InputError(
+                        f"{where}: is a ROS bag of another version than 2.0: `rosbag fix` can mend that"
+                    )
                 end = size if most is None else min(size, most)
                 while (place := stream.tell()) < end:
                     try:
@@ -55,7 +57,9 @@ class Ros1Reader(RosReader):
                     except _Damage:
                         lost = 100.0 * (size - place) / size
                         words = f"cut short or damaged at byte {place}: the last {lost:.2g} % of the file left out"
-                        notes.append(Repair(words, where, 1, "warning", "copy it again, or `rosbag reindex` it"))
+                        notes.append(
+                            Repair(words, where, 1, "warning", "copy it again, or `rosbag reindex` it")
+                        )
                         break
                     kind = fields.get(b"op", b"\0")[:1]
                     if kind not in (b"\x02", b"\x05", b"\x07") or length > LIMIT:
@@ -99,7 +103,9 @@ def _header(data: bytes) -> dict[bytes, bytes]:
     return fields
 
 
-def _inside(data: bytes, channels: dict[int, Channel | None], wanted: Callable[[Channel], bool]) -> Iterator[Message]:
+def _inside(
+    data: bytes, channels: dict[int, Channel | None], wanted: Callable[[Channel], bool]
+) -> Iterator[Message]:
     at = 0
     while at < len(data):
         length = _length(data[at : at + 4], len(data) - at - 4)
@@ -111,7 +117,10 @@ def _inside(data: bytes, channels: dict[int, Channel | None], wanted: Callable[[
 
 
 def _one(
-    fields: dict[bytes, bytes], data: bytes, channels: dict[int, Channel | None], wanted: Callable[[Channel], bool]
+    fields: dict[bytes, bytes],
+    data: bytes,
+    channels: dict[int, Channel | None],
+    wanted: Callable[[Channel], bool],
 ) -> Iterator[Message]:
     kind = fields.get(b"op", b"\0")[0] if fields.get(b"op") else 0
     number = int.from_bytes(fields.get(b"conn", b""), "little")

@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from auvnn.errors import InputError, one_line
 from auvnn.logs.readers.ros import Channel, Message, Notes, RosReader
-from auvnn.logs.repair import Repair
+from auvnn.logs.reading.repair import Repair
 
 _LONGEST_MESSAGE = 100_000_000
 _PATIENCE = 5.0  # s that a damaged file may keep SQLite busy without yielding a message
@@ -73,7 +73,9 @@ class Ros2SqliteReader(RosReader):
 def _channels(bag: sqlite3.Connection, wanted: Callable[[Channel], bool], where: str) -> dict[int, Channel]:
     found = {r[0] for r in bag.execute("SELECT name FROM sqlite_master WHERE type='table'")}
     if not {"topics", "messages"} <= found:
-        raise InputError(f"{where}: is an SQLite file, but no ROS 2 bag: it has no tables 'topics' and 'messages'")
+        raise InputError(
+            f"{where}: is an SQLite file, but no ROS 2 bag: it has no tables 'topics' and 'messages'"
+        )
     texts = {}
     if "message_definitions" in found:
         rows = bag.execute("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")

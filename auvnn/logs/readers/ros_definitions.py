@@ -58,7 +58,16 @@ def parse(text: str, kind: str, idl: bool = False) -> dict[str, Any]:
         raise InputError(f"the definition of {kind} is longer than {_LONGEST} characters")
     try:
         return dict(get_types_from_idl(text) if idl else get_types_from_msg(text, kind))
-    except (TypesysError, RecursionError, ValueError, KeyError, TypeError, AttributeError, AssertionError, IndexError) as problem:
+    except (
+        TypesysError,
+        RecursionError,
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        AssertionError,
+        IndexError,
+    ) as problem:
         raise InputError(f"the definition of {kind} cannot be read: {one_line(problem, 120)}") from None
 
 

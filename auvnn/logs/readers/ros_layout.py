@@ -171,7 +171,9 @@ class Decoder:
         fields: paths that are wanted; None for all.
     """
 
-    def __init__(self, kind: str, definitions: Definitions, packed: bool, fields: set[str] | None = None) -> None:
+    def __init__(
+        self, kind: str, definitions: Definitions, packed: bool, fields: set[str] | None = None
+    ) -> None:
         self.kind, self.definitions, self.packed, self.wanted = kind, definitions, packed, fields
         self.layouts: dict[int, list[Layout]] = {}
         self.words: dict[str, str] = {}
@@ -190,7 +192,9 @@ class Decoder:
             self._block(block, rows, count, out)
         return out
 
-    def _block(self, block: NDArray[Any], rows: NDArray[Any], count: int, out: dict[str, NDArray[Any]]) -> None:
+    def _block(
+        self, block: NDArray[Any], rows: NDArray[Any], count: int, out: dict[str, NDArray[Any]]
+    ) -> None:
         left = np.ones(len(rows), dtype=bool)
         known = self.layouts.setdefault(block.shape[1], [])
         for found in known:
@@ -232,13 +236,20 @@ class Decoder:
         if names:
             kinds = [found.fields[n] for n in names]
             record = np.dtype(
-                {"names": names, "formats": [k for _, k in kinds], "offsets": [a for a, _ in kinds], "itemsize": found.size}
+                {
+                    "names": names,
+                    "formats": [k for _, k in kinds],
+                    "offsets": [a for a, _ in kinds],
+                    "itemsize": found.size,
+                }
             )
             values = np.ascontiguousarray(part).view(record)[:, 0]
             for name in names:
                 if name not in out:
                     whole = values.dtype[name].kind in "iu" and values.dtype[name].itemsize <= 4
-                    out[name] = np.zeros(count, np.int64) if whole and _stamp(name) else np.full(count, np.nan)
+                    out[name] = (
+                        np.zeros(count, np.int64) if whole and _stamp(name) else np.full(count, np.nan)
+                    )
                 out[name][where] = values[name]
         left &= ~fits
 

@@ -32,8 +32,12 @@ class SlocumReader(RecordingReader):
     def record(self, path: Path, wanted: Wanted | None = None, until: float | None = None) -> Recording:
         """Read the sensors that are wanted."""
         if importlib.util.find_spec("dbdreader") is None:
-            raise InputError(f"{path}: is a Slocum glider's file; reading it needs dbdreader (GPL-3): pip install dbdreader")
-        places = [p for p in (path.parent / "cac", path.parent / "CAC", path.parent.parent / "cac") if p.is_dir()]
+            raise InputError(
+                f"{path}: is a Slocum glider's file; reading it needs dbdreader (GPL-3): pip install dbdreader"
+            )
+        places = [
+            p for p in (path.parent / "cac", path.parent / "CAC", path.parent.parent / "cac") if p.is_dir()
+        ]
         lists = str(places[0]) if places else str(path.parent)
         arrays = run_isolated("slocum_worker.py", [str(path), lists], str(path), _MEMORY, _SECONDS)
         names = sorted({n.rsplit("|", 1)[0] for n in arrays})

@@ -33,7 +33,9 @@ def main(folder: str, memory: str, path: str, lists: str) -> None:
                     stream.write(memoryview(data).cast("B"))
                     offset += data.nbytes
     except BaseException as problem:
-        words = f"cannot be read by dbdreader ({type(problem).__name__}: {' '.join(str(problem).split())[:150]})"
+        words = (
+            f"cannot be read by dbdreader ({type(problem).__name__}: {' '.join(str(problem).split())[:150]})"
+        )
         (out / "index.json").write_text(json.dumps({"error": words}))
         return
     (out / "index.json").write_text(json.dumps({"arrays": entries}))

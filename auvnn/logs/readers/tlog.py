@@ -15,8 +15,8 @@ import numpy as np
 
 from auvnn.errors import InputError, MissingExtra
 from auvnn.logs.readers.recordings import RecordingReader
+from auvnn.logs.reading.repair import Repair
 from auvnn.logs.recording import Recording, Topic, Wanted
-from auvnn.logs.repair import Repair
 
 _V1, _V2 = 0xFE, 0xFD
 _EARLY, _LATE = 946_684_800_000_000, 4_102_444_800_000_000  # us: the years 2000 to 2100
@@ -114,7 +114,11 @@ class _Messages:
             value = getattr(message, field)
             if isinstance(value, (int, float)):
                 self.values.setdefault(field, []).append(value)
-            elif isinstance(value, (list, tuple)) and len(value) <= 32 and all(isinstance(v, (int, float)) for v in value):
+            elif (
+                isinstance(value, (list, tuple))
+                and len(value) <= 32
+                and all(isinstance(v, (int, float)) for v in value)
+            ):
                 for i, v in enumerate(value):
                     self.values.setdefault(f"{field}[{i}]", []).append(v)
 
@@ -133,7 +137,9 @@ class _Messages:
         for kind in kinds:
             keep = columns[str(field)] == kind
             own = f"{name}[{kind:g}]"
-            out[own] = Topic(own, "mavlink", arrival[keep], {k: v[keep] for k, v in columns.items()}, {}, arrival[keep])
+            out[own] = Topic(
+                own, "mavlink", arrival[keep], {k: v[keep] for k, v in columns.items()}, {}, arrival[keep]
+            )
         return out
 
 
@@ -206,7 +212,13 @@ def _boot_clock(topics: dict[str, Topic]) -> None:
     for name, topic in topics.items():
         for field, (scale, wrap) in _WRAP.items():
             ticks = topic.columns.get(field)
-            if ticks is not None and "@" not in name and len(ticks) and (ticks > 0).all() and ticks.max() < wrap:
+            if (
+                ticks is not None
+                and "@" not in name
+                and len(ticks)
+                and (ticks > 0).all()
+                and ticks.max() < wrap
+            ):
                 turns = np.cumsum(np.concatenate([[0], np.diff(ticks) < -0.5 * wrap]))
                 boot[name] = (ticks + turns * wrap) * scale
                 break

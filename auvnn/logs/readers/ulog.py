@@ -11,8 +11,8 @@ import numpy as np
 
 from auvnn.errors import InputError, MissingExtra
 from auvnn.logs.readers.recordings import RecordingReader
+from auvnn.logs.reading.repair import Repair
 from auvnn.logs.recording import Recording, Topic, Wanted
-from auvnn.logs.repair import Repair
 
 _MAGIC = b"ULog\x01\x12\x35"
 
@@ -41,7 +41,9 @@ class UlogReader(RecordingReader):
         except MemoryError:
             raise InputError(f"{where}: is a damaged ULog: it asks for more memory than there is") from None
         except Exception as problem:  # it indexes, unpacks and looks up what the file says
-            raise InputError(f"{where}: is a damaged ULog ({type(problem).__name__}); copy it again") from None
+            raise InputError(
+                f"{where}: is a damaged ULog ({type(problem).__name__}); copy it again"
+            ) from None
         notes: list[Repair] = []
         if log.file_corruption:
             notes.append(Repair("damaged parts left out", where, 1, "warning", "copy the log again"))
@@ -59,7 +61,11 @@ class UlogReader(RecordingReader):
                 topics[name] = topic
         if not topics and wanted is None:
             raise InputError(f"{where}: holds no messages")
-        facts = {"parameters": {k: float(v) for k, v in log.initial_parameters.items() if isinstance(v, (int, float))}}
+        facts = {
+            "parameters": {
+                k: float(v) for k, v in log.initial_parameters.items() if isinstance(v, (int, float))
+            }
+        }
         return Recording(topics, notes, facts)
 
 
