@@ -96,7 +96,8 @@ def _odometry(position: Any, xyzw: Any, nu: Any, stamp: int) -> dict[str, Any]:
         "child_frame_id": "base_link",
         "pose": {"pose": {"position": dict(zip(axes, position, strict=True)),
                           "orientation": dict(zip((*axes, "w"), xyzw, strict=True))}, "covariance": [0.0] * 36},
-        "twist": {"twist": {"linear": dict(zip(axes, nu[:3], strict=True)), "angular": dict(zip(axes, nu[3:], strict=True))},
+        "twist": {"twist": {"linear": dict(zip(axes, nu[:3], strict=True)),
+                            "angular": dict(zip(axes, nu[3:], strict=True))},
                   "covariance": [0.0] * 36},
     }  # fmt: skip
 
@@ -213,7 +214,7 @@ def _df(number: int, codes: str, values: list[Any]) -> bytes:
 
 
 def binary(log: Log, path: Path, quantised: bool = False) -> Path:
-    """DataFlash, put down by hand after ArduPilot's structure: quaternion and rates in floats, or as the firmware has them."""
+    """DataFlash, put down by hand after ArduPilot's structure: in doubles, or quantised as the firmware has it."""
     run = log.runs[0]
     wide = "f" if quantised else "d"
     formats = {

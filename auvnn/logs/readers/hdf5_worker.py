@@ -42,7 +42,7 @@ def main(folder: str, memory: str, path: str) -> None:
     (out / "index.json").write_text(json.dumps({"arrays": entries}))
 
 
-def _group(h5py, group, prefix, depth, entries, state, stream, limit, seen):  # noqa: ANN001, ANN202
+def _group(h5py, group, prefix, depth, entries, state, stream, limit, seen):
     if depth > MOST_DEPTH:
         return
     for name in group:
@@ -65,7 +65,7 @@ def _group(h5py, group, prefix, depth, entries, state, stream, limit, seen):  # 
             _dataset(item, full, entries, state, stream, limit)
 
 
-def _dataset(item, full, entries, state, stream, limit):  # noqa: ANN001, ANN202
+def _dataset(item, full, entries, state, stream, limit):
     import numpy as np
 
     if (

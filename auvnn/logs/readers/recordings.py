@@ -50,6 +50,6 @@ class RecordingReader(Reader):
         Raises:
             InputError: as `record`; a topic or field of the mapping is not there.
         """
-        from auvnn.logs.assemble import assemble
+        from auvnn.logs.reading.assemble import assemble
 
         return assemble(self, path, plan, until)

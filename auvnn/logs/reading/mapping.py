@@ -29,11 +29,10 @@ from numpy.typing import NDArray
 from auvnn.catalogue import unknown_name
 from auvnn.config import read_yaml
 from auvnn.errors import ConfigError, InputError
-from auvnn.logs import mapping_more
 from auvnn.logs.channels import EULER, FIXED, QUATERNION, RESET, is_canonical
-from auvnn.logs.mapping_more import Commands, Heading, More, TopicRule
 from auvnn.logs.readers.base import Table
-from auvnn.logs.reading import cores
+from auvnn.logs.reading import cores, mapping_more
+from auvnn.logs.reading.mapping_more import Commands, Heading, More, TopicRule
 from auvnn.logs.reading.repair import Repair
 from auvnn.logs.reading.validity import Validity
 

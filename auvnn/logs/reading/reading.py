@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import ConfigError, InputError
-from auvnn.logs import in_world, several_rates
 from auvnn.logs.channels import (
     ACCELERATION,
     EULER,
@@ -25,7 +24,17 @@ from auvnn.logs.channels import (
     numbered,
 )
 from auvnn.logs.readers import Table, choose
-from auvnn.logs.reading import attitude, clock, delays, frames, masks, plausible, required
+from auvnn.logs.reading import (
+    attitude,
+    clock,
+    delays,
+    frames,
+    in_world,
+    masks,
+    plausible,
+    required,
+    several_rates,
+)
 from auvnn.logs.reading.head import read_table
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.logs.reading.repair import Repair

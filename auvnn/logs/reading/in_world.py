@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from auvnn.errors import ConfigError
-from auvnn.logs import differences
 from auvnn.logs.channels import VELOCITY
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.logs.reading.repair import Repair
 from auvnn.logs.run import Run
+from auvnn.logs.signals import differences
 
 
 def settle(run: Run, plan: Mapping, where: str) -> tuple[Run, list[Repair]]:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.logs import differences, rates
 from auvnn.logs.channels import EULER, QUATERNION, VELOCITY, WRENCH
-from auvnn.logs.rates import Series
-from auvnn.logs.reading import attitude
+from auvnn.logs.reading import attitude, rates
 from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.rates import Series
 from auvnn.logs.reading.repair import Repair
+from auvnn.logs.signals import differences
 
 Array = NDArray[np.float64]
 

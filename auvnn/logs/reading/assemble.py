@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import ConfigError, InputError
-from auvnn.logs import differences, other_clocks, rates
 from auvnn.logs.channels import ACCELERATION, EULER, POSITION, QUATERNION, VELOCITY, WRENCH
 from auvnn.logs.known import lies, propose
-from auvnn.logs.rates import Series
 from auvnn.logs.readers.base import Table
-from auvnn.logs.reading import attitude, frames
+from auvnn.logs.reading import attitude, frames, other_clocks, rates
 from auvnn.logs.reading.mapping import Column, Mapping
+from auvnn.logs.reading.rates import Series
 from auvnn.logs.reading.repair import Repair
 from auvnn.logs.recording import PRIMARY, Recording, Topic, base_name, topic_of
+from auvnn.logs.signals import differences
 
 if TYPE_CHECKING:
     from auvnn.logs.readers.recordings import RecordingReader

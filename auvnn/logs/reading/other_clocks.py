@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import InputError
-from auvnn.logs import differences
 from auvnn.logs.channels import POSITION, QUATERNION, VELOCITY
 from auvnn.logs.reading.repair import Repair
-from auvnn.logs.signals import lags
+from auvnn.logs.signals import differences, lags
 
 if TYPE_CHECKING:
-    from auvnn.logs.mapping_more import TopicRule
-    from auvnn.logs.rates import Series
+    from auvnn.logs.reading.mapping_more import TopicRule
+    from auvnn.logs.reading.rates import Series
 
 Array = NDArray[np.float64]
 
