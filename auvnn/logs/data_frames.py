@@ -24,8 +24,8 @@ def from_dataframe(data: Any, mapping: Any = None, name: str = "data frame") -> 
     """Return what a log is made of: a table in memory, treated as a file of the same columns would be.
 
     Args:
-        data: a pandas or polars data frame, or a dict of arrays (N,); pandas' index is taken as a column if it has a name,
-            or as `t` if it holds times and there is no `t`.
+        data: a pandas or polars data frame, or a dict of arrays (N,); pandas' index is taken as a column if it
+            has a name, or as `t` if it holds times and there is no `t`.
         mapping: a mapping file's path or its content as a dict; None for canonical columns.
         name: of the log.
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from auvnn.logs.known.rule import Rule, pwm_channels, triple
+from auvnn.logs.recording import Recording, Topic
 
 _PWM = (
     "{topic}: thrusters in the order of the motors, 1500 us neutral, 400 us full; give your thruster's span"
@@ -14,16 +17,14 @@ def _core(name: str) -> str:
     return rf"^{name}(\[(0|primary)\])?$"
 
 
-def _of_primary(names: str, fields: str, **more: str) -> object:
+def _of_primary(names: str, fields: str, **more: str) -> Callable[[Recording, Topic], dict[str, object]]:
     """Return columns of the estimator's core in use, where it has several."""
 
-    def columns(_: object, topic: object) -> dict[str, object]:
-        base = str(topic.name).split("[")[0]  # type: ignore[attr-defined]
-        several = "[" in str(topic.name)  # type: ignore[attr-defined]
-        mark = "[primary]" if several else ""
-        have = topic.columns  # type: ignore[attr-defined]
+    def columns(_: Recording, topic: Topic) -> dict[str, object]:
+        base, bracket, _rest = topic.name.partition("[")
+        mark = "[primary]" if bracket else ""
         pairs = list(zip(names.split(), fields.split(), strict=True))
-        if not all(f in have for _, f in pairs):
+        if not all(f in topic.columns for _, f in pairs):
             return {}
         return {n: {"from": f"@{base}{mark}.{f}", **more} for n, f in pairs}
 

@@ -12,10 +12,12 @@ from auvnn.logs.recording import Recording, Topic
 
 
 def present(*names: tuple[str, str, dict[str, object]]) -> Callable[[Recording, Topic], dict[str, object]]:
-    """Return a rule's columns where each variable is a topic of its own: those that are there, if the first of them is."""
+    """Return a rule's columns where each variable is a topic of its own: those there are, if the first is."""
 
     def columns(recording: Recording, topic: Topic) -> dict[str, object]:
-        found = {c: {"from": f"@{v}", **more} for c, v, more in names if v in recording.topics}
+        found: dict[str, object] = {
+            c: {"from": f"@{v}", **more} for c, v, more in names if v in recording.topics
+        }
         return found if names[0][1] == topic.name else {}
 
     return columns

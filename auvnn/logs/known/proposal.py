@@ -66,6 +66,9 @@ def propose(
     names = set(columns)
     lacks = [b for b, groups in _NEEDS.items() if not any(set(g) <= names for g in groups)]
     mapping: dict[str, Any] = {"columns": columns}
+    runs = _best("runs", recording, rules, set(refused))
+    if runs is not None:
+        mapping["run"] = {"from": runs[2]["run"]}
     if topics:
         mapping["topics"] = topics
     if any(t.kind == "moos" for t in recording.topics.values()):

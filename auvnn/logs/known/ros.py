@@ -1,4 +1,4 @@
-"""ROS messages: axes of the body forward, left, up and of the world east, north, up (REP 103) unless they say otherwise."""
+"""ROS messages: body axes forward, left, up, world axes east, north, up (REP 103), unless they say otherwise."""
 
 from __future__ import annotations
 
@@ -50,6 +50,8 @@ def _joints(block: str) -> Any:
 
 
 def _block_of(name: str) -> str:
+    if name == "run":
+        return "runs"
     if name.startswith(("thruster_", "tau_")):
         return "commands"
     if name.startswith("fin_"):
@@ -108,6 +110,7 @@ RULES = [
     Rule("altitude", "sensor_msgs/msg/JointState", _joints("altitude"), 2, frame=_RAW),
     Rule("voltage", "sensor_msgs/msg/JointState", _joints("voltage"), 2, frame=_RAW),
     Rule("acceleration", "sensor_msgs/msg/JointState", _joints("acceleration"), 2, frame=_RAW),
+    Rule("runs", "sensor_msgs/msg/JointState", _joints("runs"), 1),
     Rule("commands", r"std_msgs/msg/Float(64|32)", _one_per_thruster, 3, frame=_RAW),
     Rule("commands", "std_msgs/msg/Float64MultiArray", lambda _, t: numbered_columns(t, "data[{}]", "thruster"), 4,
          "thruster|motor|actuator", frame=_RAW, note="{topic}: taken as thruster commands in the model's order"),

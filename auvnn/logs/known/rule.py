@@ -126,7 +126,8 @@ PWM = {"neutral": 1500, "span": 400}
 def pwm_channels(topic: Topic, pattern: str, recording: Recording, base: int = 0) -> dict[str, Any]:
     """Return thruster columns of a topic's pulse widths: those that the parameters call motors, else those in use.
 
-    The field of channel 1 is `pattern.format(1 - base)`. ArduPilot's functions 33 to 40 are motors 1 to 8; `MOT_n_DIRECTION` -1 turns the output of a motor round.
+    The field of channel 1 is `pattern.format(1 - base)`. ArduPilot's functions 33 to 40 are motors 1 to 8, and
+    `MOT_n_DIRECTION` -1 turns the output of a motor round.
     """
     parameters = recording.facts.get("parameters", {})
     motors: dict[int, int] = {}

@@ -1,4 +1,4 @@
-"""Files of named arrays (MATLAB, HDF5, NetCDF) seen as topics: arrays of one group that share a length share their times."""
+"""Files of named arrays (MATLAB, HDF5, NetCDF) seen as topics: arrays of a group that are as long share their times."""
 
 from __future__ import annotations
 

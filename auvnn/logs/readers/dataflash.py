@@ -246,12 +246,13 @@ class _Read:
             for b in back
             if np.median(stamps[b : b + 5]) < np.median(stamps[max(0, b - 5) : b]) - _REBOOT
         ]
-        self.first = float(np.median(stamps[:3]))
+        usual = float(np.median(stamps[:5]))
+        self.first = float(stamps[0]) if abs(stamps[0] - usual) < 10.0 else usual
         edges = [0, *back, len(stamps)]
         parts = []
         behind = 0.0
-        for a, b in zip(edges[1:-1], edges[2:], strict=True):
-            before = stamps[edges[edges.index(a) - 1] : a]
+        for begin, a, b in zip(edges, edges[1:], edges[2:], strict=False):
+            before = stamps[begin:a]
             behind += float(np.max(before)) - float(np.min(stamps[a:b])) + 10.0
             self.cuts.append(int(self.places[number][a]))
             self.shifts.append(behind)

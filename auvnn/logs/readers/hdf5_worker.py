@@ -102,7 +102,7 @@ def _dataset(item, full, entries, state, stream, limit):
     kind = "<i8" if whole and values.dtype.kind == "i" else "<f8"
     data = np.ascontiguousarray(values, dtype=kind)
     entries.append([full, kind, list(data.shape), state["offset"]])
-    stream.write(memoryview(data).cast("B"))
+    stream.write(data.tobytes())
     state["offset"] += data.nbytes
 
 

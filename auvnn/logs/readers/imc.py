@@ -26,8 +26,8 @@ _SYNC = 0xFE54
 _XML_LIMIT, _UNPACKED_LIMIT, _RATIO = 20_000_000, 4_000_000_000, 200
 _VECTOR = "time=f8 x=f8 y=f8 z=f8"
 _MESSAGES = {
-    350: ("EstimatedState", "lat=f8 lon=f8 height=f4 x=f4 y=f4 z=f4 phi=f4 theta=f4 psi=f4 u=f4 v=f4 w=f4 vx=f4 vy=f4 vz=f4 "
-          "p=f4 q=f4 r=f4 depth=f4 alt=f4"),
+    350: ("EstimatedState", "lat=f8 lon=f8 height=f4 x=f4 y=f4 z=f4 phi=f4 theta=f4 psi=f4 u=f4 v=f4 w=f4 vx=f4 vy=f4 "
+          "vz=f4 p=f4 q=f4 r=f4 depth=f4 alt=f4"),
     50: ("SimulatedState", "lat=f8 lon=f8 height=f4 x=f4 y=f4 z=f4 phi=f4 theta=f4 psi=f4 u=f4 v=f4 w=f4 p=f4 q=f4 r=f4 "
          "svx=f4 svy=f4 svz=f4"),
     351: ("EstimatedStreamVelocity", "x=f8 y=f8 z=f8"), 301: ("SetThrusterActuation", "id=u1 value=f4"),
@@ -47,10 +47,10 @@ _INVALID_BELOW_ZERO = {"EstimatedState": ("depth", "alt")}
 
 
 def _crc_table() -> NDArray[np.uint16]:
-    table = np.arange(256, dtype=np.uint16)
+    table = np.arange(256, dtype=np.int64)
     for _ in range(8):
-        table = np.where(table & 1, (table >> 1) ^ 0xA001, table >> 1).astype(np.uint16)
-    return table
+        table = np.where(table & 1, (table >> 1) ^ 0xA001, table >> 1)
+    return table.astype(np.uint16)
 
 
 _TABLE = _crc_table()
@@ -65,7 +65,7 @@ def crc16(packets: NDArray[np.uint8]) -> NDArray[np.uint16]:
 
 
 class ImcReader(RecordingReader):
-    """Messages of the vehicle that logged, actuators as `SetThrusterActuation[0]`, several sensors as `Voltage[entity]`."""
+    """Messages of the vehicle that logged, actuators as `SetThrusterActuation[0]`, sensors as `Voltage[entity]`."""
 
     name = "imc"
     suffixes = (".lsf", ".gz")

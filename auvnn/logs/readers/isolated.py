@@ -22,8 +22,8 @@ def run_isolated(
     """Return the arrays that a worker reads, by name.
 
     The worker is a file beside this one that imports nothing of auvnn. It writes `arrays.bin` and, last of all,
-    `index.json` (`{"arrays": [[name, type, shape, offset], ...]}` or `{"error": words}` or `{"missing": [package, extra]}`)
-    into the folder that is its first argument.
+    `index.json` (`{"arrays": [[name, type, shape, offset], ...]}` or `{"error": words}` or
+    `{"missing": [package, extra]}`) into the folder that is its first argument.
 
     Args:
         worker: its file's name.

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from auvnn.logs.readers.base import Reader, Table
 from auvnn.logs.recording import Recording, Wanted
 
 if TYPE_CHECKING:
-    from auvnn.logs.reading.mapping import Mapping
+    from auvnn.logs.reading.mapping import Mapping as Plan
 
 
 class RecordingReader(Reader):
     """A format of topics with times of their own."""
 
     in_parts: ClassVar[bool] = False
+    extra_definitions: Mapping[str, Any] = MappingProxyType({})
+    """Definitions of message types that the file does not carry."""
 
     @abstractmethod
     def record(self, path: Path, wanted: Wanted | None = None, until: float | None = None) -> Recording:
@@ -40,11 +44,11 @@ class RecordingReader(Reader):
         Raises:
             InputError: as `record`, or the known types hold no log.
         """
-        from auvnn.logs.reading.mapping import Mapping
+        from auvnn.logs.reading.mapping import Mapping as Changes
 
-        return self.mapped(path, Mapping())
+        return self.mapped(path, Changes())
 
-    def mapped(self, path: Path, plan: Mapping, share: float = 1.0, until: float | None = None) -> Table:
+    def mapped(self, path: Path, plan: Plan, share: float = 1.0, until: float | None = None) -> Table:
         """Return the canonical table that a mapping makes of the topics.
 
         Raises:
@@ -53,3 +57,15 @@ class RecordingReader(Reader):
         from auvnn.logs.reading.assemble import assemble
 
         return assemble(self, path, plan, until)
+
+    def mapped_rows(self, path: Path, plan: Plan, first: int, count: int) -> Table:
+        """Return some of the rows of the table that `mapped` makes of all.
+
+        Raises:
+            InputError: as `mapped`.
+        """
+        whole = self.mapped(path, plan)
+        part = slice(first, first + count)
+        columns = {name: column[part] for name, column in whole.columns.items()}
+        rows = len(range(*part.indices(whole.rows)))
+        return Table(columns, rows, {}, set(whole.seconds), list(whole.repairs), whole.rest)

@@ -90,7 +90,10 @@ class RosReader(RecordingReader):
         if not columns:
             if wanted is not None and not notes:
                 return Recording({}, notes)
-            raise InputError(f"{where}: holds no messages" + (f": {notes[0].what}" if notes else ""))
+            raise InputError(
+                f"{where}: is a {self.name} recording and holds no messages"
+                + (f": {notes[0].what}" if notes else "")
+            )
         epoch = begin or 0
         topics: dict[str, Topic] = {}
         for found in columns.values():
@@ -101,7 +104,7 @@ class RosReader(RecordingReader):
         return Recording(topics, notes)
 
     def _decoder(self, channel: Channel, where: str, notes: Notes) -> Decoder | None:
-        definitions = dict(ros_definitions.common()) | self.extra_definitions
+        definitions = {**ros_definitions.common(), **self.extra_definitions}
         if channel.definition:
             try:
                 definitions |= ros_definitions.parse(channel.definition, channel.kind, channel.idl)
@@ -113,8 +116,6 @@ class RosReader(RecordingReader):
             notes.append(Repair(words, f"{where}, {channel.topic}", 1, "info", cure))
             return None
         return Decoder(channel.kind, definitions, self.packed)
-
-    extra_definitions: dict[str, Any] = {}  # noqa: RUF012 - replaced, never changed
 
 
 class _Columns:
@@ -157,7 +158,7 @@ class _Columns:
             notes.append(Repair(words, f"{where}, {self.channel.topic}", self.decoder.bad, "warning"))
 
     def topic(self, epoch: int) -> Topic:
-        arrival = (np.array(self.arrivals, dtype=np.int64) - epoch) * 1e-9
+        arrival = ((np.array(self.arrivals, dtype=np.int64) - epoch) * 1e-9).astype(np.float64)
         names = list(dict.fromkeys(name for part in self.parts for name in part))[:_FIELDS]
         columns = {}
         for name in names:
@@ -174,7 +175,7 @@ class _Columns:
                     np.int64
                 )
             if (whole != 0).any():
-                t = np.where(whole == 0, np.nan, (whole - epoch) * 1e-9)
+                t = np.where(whole == 0, np.nan, (whole - epoch) * 1e-9).astype(np.float64)
         return Topic(self.channel.topic, self.channel.kind, t, columns, words, arrival, self.count)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
+from textwrap import dedent
 from typing import Any
 
 from auvnn.errors import InputError, MissingExtra, one_line
@@ -14,19 +15,64 @@ _LONGEST = 200_000  # characters of one definition
 # Bags of ROS 2 Humble and older in sqlite3 hold no definitions. Those of ROS itself come with rosbags; these are of
 # mavros and of marine sensors: the field names and types of the published interfaces.
 _MORE = {
-    "mavros_msgs/msg/RCOut": "std_msgs/Header header\nuint16[] channels\n",
-    "mavros_msgs/msg/RCIn": "std_msgs/Header header\nuint8 rssi\nuint16[] channels\n",
-    "mavros_msgs/msg/OverrideRCIn": "uint16[18] channels\n",
-    "mavros_msgs/msg/ManualControl": "std_msgs/Header header\nfloat32 x\nfloat32 y\nfloat32 z\nfloat32 r\nuint16 buttons\n",
-    "mavros_msgs/msg/VfrHud": "std_msgs/Header header\nfloat32 airspeed\nfloat32 groundspeed\nint16 heading\nfloat32 throttle\n"
-    "float32 altitude\nfloat32 climb\n",
-    "mavros_msgs/msg/State": "std_msgs/Header header\nbool connected\nbool armed\nbool guided\nbool manual_input\nstring mode\n"
-    "uint8 system_status\n",
-    "marine_acoustic_msgs/msg/Dvl": "std_msgs/Header header\nuint8 velocity_mode\nuint8 dvl_type\ngeometry_msgs/Vector3 velocity\n"
-    "float64[9] velocity_covar\nfloat64 altitude\ngeometry_msgs/Vector3 course_gnd\nfloat64 speed_gnd\nuint8 num_good_beams\n"
-    "float64 sound_speed\nbool beam_ranges_valid\nbool beam_velocities_valid\ngeometry_msgs/Vector3[4] beam_unit_vec\n"
-    "float64[4] range\nfloat64[4] range_covar\nfloat64[4] beam_quality\nfloat64[4] beam_velocity\n"
-    "float64[4] beam_velocity_covar\n",
+    "mavros_msgs/msg/RCOut": """
+        std_msgs/Header header
+        uint16[] channels
+    """,
+    "mavros_msgs/msg/RCIn": """
+        std_msgs/Header header
+        uint8 rssi
+        uint16[] channels
+    """,
+    "mavros_msgs/msg/OverrideRCIn": """
+        uint16[18] channels
+    """,
+    "mavros_msgs/msg/ManualControl": """
+        std_msgs/Header header
+        float32 x
+        float32 y
+        float32 z
+        float32 r
+        uint16 buttons
+    """,
+    "mavros_msgs/msg/VfrHud": """
+        std_msgs/Header header
+        float32 airspeed
+        float32 groundspeed
+        int16 heading
+        float32 throttle
+        float32 altitude
+        float32 climb
+    """,
+    "mavros_msgs/msg/State": """
+        std_msgs/Header header
+        bool connected
+        bool armed
+        bool guided
+        bool manual_input
+        string mode
+        uint8 system_status
+    """,
+    "marine_acoustic_msgs/msg/Dvl": """
+        std_msgs/Header header
+        uint8 velocity_mode
+        uint8 dvl_type
+        geometry_msgs/Vector3 velocity
+        float64[9] velocity_covar
+        float64 altitude
+        geometry_msgs/Vector3 course_gnd
+        float64 speed_gnd
+        uint8 num_good_beams
+        float64 sound_speed
+        bool beam_ranges_valid
+        bool beam_velocities_valid
+        geometry_msgs/Vector3[4] beam_unit_vec
+        float64[4] range
+        float64[4] range_covar
+        float64[4] beam_quality
+        float64[4] beam_velocity
+        float64[4] beam_velocity_covar
+    """,
 }
 
 
@@ -78,7 +124,7 @@ def common() -> dict[str, Any]:
     # A later distribution keeps the types of the earlier ones that logs hold.
     found = dict(typesys.get_typestore(typesys.Stores.ROS2_HUMBLE).fielddefs)
     for kind, text in _MORE.items():
-        found.update(parse(text, kind))
+        found.update(parse(dedent(text).strip() + "\n", kind))
     return found
 
 

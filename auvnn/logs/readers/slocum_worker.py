@@ -18,7 +18,7 @@ def main(folder: str, memory: str, path: str, lists: str) -> None:
     entries: list[list[object]] = []
     offset = 0
     try:
-        import dbdreader
+        import dbdreader  # pyright: ignore[reportMissingImports]
 
         log = dbdreader.DBD(path, cacheDir=lists)
         with (out / "arrays.bin").open("wb") as stream:
@@ -30,7 +30,7 @@ def main(folder: str, memory: str, path: str, lists: str) -> None:
                 for mark, values in (("t", t), ("v", v)):
                     data = np.ascontiguousarray(values, dtype="<f8")
                     entries.append([f"{name}|{mark}", "<f8", list(data.shape), offset])
-                    stream.write(memoryview(data).cast("B"))
+                    stream.write(data.tobytes())
                     offset += data.nbytes
     except BaseException as problem:
         words = (

@@ -1,4 +1,7 @@
-"""PX4's ULog, read by pyulog. https://docs.px4.io/main/en/dev_log/ulog_file_format.html"""
+"""PX4's ULog, read by pyulog.
+
+https://docs.px4.io/main/en/dev_log/ulog_file_format.html
+"""
 
 from __future__ import annotations
 

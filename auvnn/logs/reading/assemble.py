@@ -1,4 +1,4 @@
-"""From a recording of many topics to one table under canonical names, by a mapping or by what is known of the messages."""
+"""From a recording of many topics to one table under canonical names, by a mapping or by known messages."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def assemble(reader: RecordingReader, path: Path, plan: Mapping, until: float | 
             known and there is no mapping.
     """
     where = str(path)
-    if plan.definitions is not None and hasattr(reader, "extra_definitions"):
+    if plan.definitions is not None:
         from auvnn.logs.readers.ros_definitions import of_folder
 
         reader.extra_definitions = of_folder(Path(plan.definitions).expanduser())
@@ -57,11 +57,11 @@ def assemble(reader: RecordingReader, path: Path, plan: Mapping, until: float | 
         proposed = Mapping.read(proposal.mapping) if proposal.mapping.get("columns") else None
         if proposed is None:
             raise InputError(
-                f"{where}: nothing in it is known to be what a log needs; `auvnn check log={path.name}` lists its topics, "
+                f"{where}: nothing in it is known to be what a log needs; `auvnn check log={path.name}` lists topics, "
                 "and a mapping (mapping=) says which is which"
             )
         plan = replace(
-            proposed, where="the known message types", heading=plan.heading, run=plan.run,
+            proposed, where="the known message types", heading=plan.heading, run=plan.run or proposed.run,
             topics=proposed.topics | plan.topics, commands=plan.commands if plan.commands.longest else proposed.commands,
         )  # fmt: skip
         notes = [Repair(words, where, 1, "info") for words in proposal.notes]
@@ -95,6 +95,8 @@ def _flat(recording: Recording, plan: Mapping, where: str) -> Table:
 def sources(plan: Mapping) -> list[str]:
     """Return the paths of a recording that a mapping takes values from."""
     found: dict[str, None] = {}
+    if plan.run not in (None, "file"):
+        found[str(plan.run)] = None
     for column in plan.columns.values():
         each = [column.source, column.more.over, *column.cores, column.by]
         each += [c for c, _ in column.more.mix]
@@ -143,6 +145,17 @@ def from_recording(recording: Recording, plan: Mapping, where: str) -> Table:
             series += _series(
                 [n for n, _, _ in found], [v for _, _, v in found], found[0][1], delay, plan, times, where
             )
+    if plan.run not in (None, "file"):
+        numbers, field = recording.find(str(plan.run), where, plan.where)
+        series.append(
+            Series(
+                ("run",),
+                times.of(numbers),
+                numbers.columns[field].astype(np.float64)[:, None],
+                numbers.name,
+                numbers.arrival,
+            )
+        )
     if plan.core is not None:
         words = "core: belongs to tables; of a recording take the instance, XKF1[primary].VN"
         raise ConfigError(f"{plan.where}: {words}")
@@ -159,7 +172,9 @@ def from_recording(recording: Recording, plan: Mapping, where: str) -> Table:
                 result.columns.setdefault(name, np.full(result.rows, np.nan))
     world = tuple(n for n in VELOCITY[:3] if n in plan.columns and plan.columns[n].more.world)
     rest = {n: Column(n, more=plan.columns[n].more) for n in world}
-    result.rest = Mapping(columns=rest, heading=plan.heading, where=plan.where, run=plan.run)
+    result.rest = Mapping(
+        columns=rest, heading=plan.heading, where=plan.where, run="file" if plan.run == "file" else None
+    )
     result.seconds.add("t")
     return result
 
@@ -206,7 +221,7 @@ def _values(
     words = lies(topic)
     rule = plan.topics.get(topic.name)
     if words and not (rule and rule.trust):
-        raise InputError(f"{where}: '{topic.name}' is refused as a source of '{name}': {words}; where yours is right, say "
+        raise InputError(f"{where}: '{topic.name}' is refused as a source of '{name}': {words}; if yours is right, say "
                          f"topics: {{{topic.name}: {{trust: true}}}} in the mapping")  # fmt: skip
     raw = topic.columns[field]
     if column.more.over is not None:
@@ -371,14 +386,14 @@ def _merged(series: list[Series], recording: Recording, plan: Mapping, where: st
         if mine is None or len(mine.t) < 2:
             continue
         columns, notes = rates.merge(part, mine, where, plan.commands.between, plan.commands.longest)
-        columns["run"] = np.full(len(columns["t"]), float(number + 1))
+        columns.setdefault("run", np.full(len(columns["t"]), float(number + 1)))
         pieces.append(columns)
         result.repairs += [n for n in notes if n.what not in {r.what for r in result.repairs}]
     if not pieces:
         raise InputError(f"{where}: the topics of the mapping hold no two samples with a time")
     names = list(dict.fromkeys(n for p in pieces for n in p))
     for name in names:
-        if name == "run" and len(pieces) == 1:
+        if name == "run" and len(pieces) == 1 and plan.run is None:
             continue
         parts = [p.get(name, np.full(len(p["t"]), np.nan)) for p in pieces]
         result.columns[name] = np.concatenate(parts)

@@ -1,4 +1,4 @@
-"""What a mapping leaves to be done with whole runs: headings set right, velocities turned from the world into the body."""
+"""What a mapping leaves to be done with whole runs: headings set right, velocities turned into the body."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ class Column:
     cores: tuple[str, ...] = ()
     by: str | None = None
     valid: Validity | None = None
-    more: More = More()
+    more: More = field(default_factory=More)
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Mapping:
     core: tuple[str, str] | None = None
     topics: dict[str, TopicRule] = field(default_factory=dict)
     rows: str | None = None
-    commands: Commands = Commands()
+    commands: Commands = field(default_factory=Commands)
     heading: Heading | None = None
     definitions: str | None = None
 

@@ -3,7 +3,8 @@
 Of a column, beside `from`, `scale`, `offset`, `curve`, `delay`, `valid` and `by`:
 
 - `unit: deg` the unit of the file by its name, turned into SI before anything else;
-- `mix: [{from: RCIN.C5, weight: 0.7}, {from: RCIN.C6, weight: -0.7}]` a weighed sum of inputs in the place of `from`, each after the `curve`;
+- `mix: [{from: RCIN.C5, weight: 0.7}, {from: RCIN.C6, weight: -0.7}]` a weighed sum of inputs,
+  each after the `curve`, in the place of `from`;
 - `over: VISO.dt` (or `{from: VISO.dt, unit: us}`) divides a displacement by the time that it took;
 - `difference: true` the derivative of what is there, a velocity of positions;
 - `in: world` a velocity along north, east, down in the place of the body's axes, turned with the attitude;

@@ -65,7 +65,7 @@ def _offset(mine: Sequence[Series], others: Sequence[Series]) -> tuple[float, fl
 
 
 def _speeds(series: Sequence[Series]) -> dict[str, tuple[Array, Array]]:
-    """Return times and speeds of turning, rad/s, and of moving, m/s, that series say, measured ones before derived ones."""
+    """Return times and speeds of turning, rad/s, and of moving, m/s, measured ones before derived."""
     found: dict[str, tuple[Array, Array]] = {}
     for one in series:
         one = one.sorted()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from auvnn.errors import InputError
 from auvnn.logs.readers import READERS, choose
+from auvnn.logs.readers.ros2_folder import ros2_files
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.logs.reading.reading import Collector, collect
 from auvnn.logs.run import Run
@@ -81,7 +82,9 @@ def log_files(places: Iterable[str | Path]) -> list[Path]:
     known = tuple(s for name in READERS.names() for s in READERS.get(name).suffixes)
     found: list[Path] = []
     for place in map(Path, places):
-        if place.is_dir():
+        if place.is_dir() and (place / "metadata.yaml").is_file():
+            found += ros2_files(place)
+        elif place.is_dir():
             inside = sorted(p for p in place.iterdir() if p.is_file() and p.suffix.lower() in known)
             if not inside:
                 raise InputError(

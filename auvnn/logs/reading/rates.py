@@ -155,7 +155,7 @@ def _at(
         return np.full((len(t), len(one.names)), np.nan)
     if is_command(one.names[0]):
         return _commands(one, t, step, between, longest, where, repairs)
-    if one.names[0] == RESET:
+    if one.names[0] in (RESET, "run"):
         return one.values[np.clip(np.searchsorted(one.t, t + _SAME, side="right") - 1, 0, None)]
     if len(one.t) == len(t) and np.abs(one.t - t).max() <= _SAME:
         return one.values

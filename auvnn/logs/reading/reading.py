@@ -24,6 +24,7 @@ from auvnn.logs.channels import (
     numbered,
 )
 from auvnn.logs.readers import Table, choose
+from auvnn.logs.readers.ros2_folder import ros2_files
 from auvnn.logs.reading import (
     attitude,
     clock,
@@ -73,7 +74,8 @@ def read(
         InputError: a file cannot be read or its content must not be trusted.
         ConfigError: the mapping is wrong, or no file is named.
     """
-    paths = [Path(p) for p in ([path] if isinstance(path, (str, Path)) else path)]
+    named = [Path(p) for p in ([path] if isinstance(path, (str, Path)) else path)]
+    paths = [f for p in named for f in (ros2_files(p) if (p / "metadata.yaml").is_file() else [p])]
     if not paths:
         raise ConfigError("no log file is named; log= takes a path or a list of paths")
     doubled = {str(p) for p in paths if paths.count(p) > 1}
