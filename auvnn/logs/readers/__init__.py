@@ -56,8 +56,9 @@ def choose(path: Path) -> tuple[Reader, list[Repair]]:
     for reader in fitting:
         if suffix in reader.suffixes:
             return reader, []
+    certain = [reader for reader in fitting if reader.name != "csv"]
     for magic, what in _FOREIGN.items():
-        if head.startswith(magic):
+        if head.startswith(magic) and not certain:
             raise InputError(f"{path}: is {what}")
     if not fitting:
         what = "zeros only" if not head.strip(b"\0") else "neither text nor a known format"

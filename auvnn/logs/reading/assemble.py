@@ -136,11 +136,13 @@ def from_recording(recording: Recording, plan: Mapping, where: str) -> Table:
             if plan.columns[name].source is None and not plan.columns[name].more.mix:
                 constants[name] = plan.columns[name].value
         asked = [n for n in names if n not in constants]
-        by_place: dict[tuple[str, float], list[tuple[str, Topic, Array]]] = {}
+        by_place: _Places = {}
         for name in asked:
             column = plan.columns[name]
             topic, values = _values(name, column, recording, plan, where, result)
             by_place.setdefault((topic.name, column.delay), []).append((name, topic, values))
+        if group == EULER and len(by_place) > 1:
+            by_place = _together(by_place, times)
         for (_, delay), found in by_place.items():
             series += _series(
                 [n for n, _, _ in found], [v for _, _, v in found], found[0][1], delay, plan, times, where
@@ -177,6 +179,27 @@ def from_recording(recording: Recording, plan: Mapping, where: str) -> Table:
     )
     result.seconds.add("t")
     return result
+
+
+def _together(places: _Places, times: _Times) -> _Places:
+    """Return angles of several topics as if they were of one, that with the most messages: turns cannot be told singly."""
+    base = max(places, key=lambda p: len(places[p][0][1].t))
+    topic = places[base][0][1]
+    t = times.of(topic) - base[1]
+    joined = list(places[base])
+    for place, found in places.items():
+        for name, other, values in found if place != base else ():
+            own = times.of(other) - place[1]
+            good = np.flatnonzero(np.isfinite(own) & np.isfinite(values))
+            order = good[np.argsort(own[good], kind="stable")]
+            if len(order):
+                inside = np.interp(t, own[order], np.unwrap(values[order]), left=np.nan, right=np.nan)
+                joined.append((name, topic, inside))
+    return {base: joined}
+
+
+_Places = dict[tuple[str, float], list[tuple[str, Topic, Array]]]
+"""By topic and delay the columns, their topic and their values."""
 
 
 class _Times:
