@@ -61,3 +61,23 @@ def table_thrust(command: PerPart, command_grid: Knots, thrust_grid: Knots) -> P
         own = torch.take_along_dim(pieces[(None,) * (rank - pieces.dim())], index, -2).squeeze(-2)
     start, low, slope = own.unbind(-1)
     return low + slope * (c - start)
+
+
+def clamped_table_thrust(command: PerPart, command_grid: Knots, thrust_grid: Knots) -> PerPart:
+    """Return the thrust of a table as a sum of clamps: T_0 + sum_k s_k (clamp(c, c_k, c_k+1) - c_k).
+
+    The same function as `table_thrust` to rounding, without an index that depends on the command, so that it can be
+    written as straight-line code.
+
+    Args:
+        command: (...).
+        command_grid: rising commands of the table, (k,), k >= 2.
+        thrust_grid: thrust at these commands, N, (k,).
+
+    Returns:
+        (...), N.
+    """
+    left, right = command_grid[:-1], command_grid[1:]
+    slope = (thrust_grid[1:] - thrust_grid[:-1]) / (right - left)
+    inside = torch.minimum(torch.maximum(command.unsqueeze(-1), left), right) - left
+    return thrust_grid[0] + (slope * inside).sum(-1)
