@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from auvnn.effects import Effect
 from auvnn.errors import ConfigError
 from auvnn.models.actuators import Actuators
-from auvnn.physics.thrusters import clamped_table_thrust, quadratic_thrust
+from auvnn.physics.thrusters import summed_table_thrust, quadratic_thrust
 
 PADE = 3
 """States per actuator that stand for a delay in continuous time."""
@@ -82,14 +82,14 @@ class ActuatorStates(nn.Module):
         return [f"{block}.{place}" for block in blocks for place in places]
 
     def static(self, command: Tensor) -> Tensor:
-        """Return the settled thrust of commands (..., n), N; tables as sums of clamps, without an index."""
+        """Return the settled thrust of commands (..., n), N; tables as sums of kinks, without an index."""
         own = self.actuators
         if own.actuation == "wrench" or not own.tables:
             return own.static(command)
         columns = list(quadratic_thrust(command, own.max_forward, own.max_reverse).unbind(-1))
         for index in own.tables:
             grid, thrust = (own.get_buffer(f"table_{n}_{index}") for n in ("command", "thrust"))
-            columns[index] = clamped_table_thrust(command[..., index], grid, thrust)
+            columns[index] = summed_table_thrust(command[..., index], grid, thrust)
         return torch.stack(columns, dim=-1)
 
     def settled(self, command: Tensor) -> Tensor:

@@ -63,11 +63,12 @@ def table_thrust(command: PerPart, command_grid: Knots, thrust_grid: Knots) -> P
     return low + slope * (c - start)
 
 
-def clamped_table_thrust(command: PerPart, command_grid: Knots, thrust_grid: Knots) -> PerPart:
-    """Return the thrust of a table as a sum of clamps: T_0 + sum_k s_k (clamp(c, c_k, c_k+1) - c_k).
+def summed_table_thrust(command: PerPart, command_grid: Knots, thrust_grid: Knots) -> PerPart:
+    """Return the thrust of a table as a sum of kinks: T = (T_0 + T_n) / 2 + sum_k (s_k - s_k-1) / 2 |c - c_k|.
 
-    The same function as `table_thrust` to rounding, without an index that depends on the command, so that it can be
-    written as straight-line code.
+    s_k is the slope of the piece after the point k, zero before the first point and after the last. The same function
+    as `table_thrust` to rounding, without an index that depends on the command, so that it can be written as
+    straight-line code; at a point of the table its slope is the mean of both sides.
 
     Args:
         command: (...).
@@ -77,7 +78,8 @@ def clamped_table_thrust(command: PerPart, command_grid: Knots, thrust_grid: Kno
     Returns:
         (...), N.
     """
-    left, right = command_grid[:-1], command_grid[1:]
-    slope = (thrust_grid[1:] - thrust_grid[:-1]) / (right - left)
-    inside = torch.minimum(torch.maximum(command.unsqueeze(-1), left), right) - left
-    return thrust_grid[0] + (slope * inside).sum(-1)
+    slope = (thrust_grid[1:] - thrust_grid[:-1]) / (command_grid[1:] - command_grid[:-1])
+    level = torch.zeros_like(slope[:1])
+    kink = 0.5 * (torch.cat((slope, level)) - torch.cat((level, slope)))
+    away = (command.unsqueeze(-1) - command_grid).abs()
+    return 0.5 * (thrust_grid[0] + thrust_grid[-1]) + (kink * away).sum(-1)

@@ -12,7 +12,7 @@ from auvnn.models import GreyBox, Inputs, load
 from auvnn.models.actuator_states import ActuatorStates
 from auvnn.models.state_space import StateSpace
 from auvnn.physics.kinematics import eta6_to_eta7, eta7_to_eta6
-from auvnn.physics.thrusters import clamped_table_thrust, table_thrust
+from auvnn.physics.thrusters import summed_table_thrust, table_thrust
 from auvnn.testing import example_vehicle
 from auvnn.vehicle import load_vehicle
 
@@ -196,11 +196,11 @@ def test_steps_can_be_differentiated_through():
     assert bool((slope.abs() > 0).any())
 
 
-def test_a_table_as_clamps_is_the_table():
+def test_a_table_as_kinks_is_the_table():
     grid = torch.tensor([-1.0, -0.2, 0.1, 0.6, 1.0], dtype=DOUBLE)
     thrust = torch.tensor([-30.0, -2.0, 0.0, 12.0, 38.0], dtype=DOUBLE)
     c = torch.linspace(-1.5, 1.5, 3001, dtype=DOUBLE)
-    assert float((clamped_table_thrust(c, grid, thrust) - table_thrust(c, grid, thrust)).abs().max()) < 1e-13
+    assert float((summed_table_thrust(c, grid, thrust) - table_thrust(c, grid, thrust)).abs().max()) < 1e-13
 
 
 def test_an_effect_that_remembers_without_saying_how_is_refused():
