@@ -172,42 +172,45 @@ def decomposed(program: Any) -> Any:
 
 
 ARITHMETIC = {
-    aten.add.Tensor: (1, aten.add.Tensor), aten.sub.Tensor: (1, aten.sub.Tensor), aten.mul.Tensor: (1, aten.mul.Tensor),
-    aten.div.Tensor: (1, aten.div.Tensor), aten.remainder.Scalar: (1, aten.remainder.Tensor),
-    aten.rsub.Scalar: (1, aten.sub.Tensor), aten.where.ScalarOther: (2, aten.where.self),
-    aten.where.ScalarSelf: (1, aten.where.self),
-}  # fmt: skip
-"""Operations in which a plain number matters to its last digit: its place, and what takes a tensor there."""
+    **{op.Tensor: op.Tensor for op in (aten.add, aten.sub, aten.mul, aten.div)},
+    aten.remainder.Scalar: aten.remainder.Tensor,
+}
+"""Operations in which a plain number matters to its last digit, and what takes a tensor in its place."""
 
 
 def _widen(module: Any) -> None:
     """Write plain numbers as sums of such as single precision holds, which the exporter makes of each of them."""
-    graph = module.graph
-    for node in list(graph.nodes):
+    for node in list(module.graph.nodes):
         value = node.meta.get("val") if node.op == "call_function" else None
-        if node.target not in ARITHMETIC or value is None or value.dtype != torch.float64:
+        if getattr(value, "dtype", None) != torch.float64:
             continue
-        place, taken = ARITHMETIC[node.target]
-        other = node.args[place]
-        if not isinstance(other, float) or other == _single(other):
-            continue
-        with graph.inserting_before(node), value.fake_mode:
-            made, rest = None, other
-            for _ in range(3):
-                share = _single(rest)
-                part = graph.call_function(aten.full.default, ([], share), {"dtype": torch.float64})
-                part.meta["val"] = torch.full((), share, dtype=torch.float64)
-                if made is not None:
-                    total = graph.call_function(aten.add.Tensor, (made, part))
-                    total.meta["val"] = part.meta["val"]
-                    part = total
-                made, rest = part, rest - share
-                if rest == 0.0:
-                    break
-        given = [made if k == place else a for k, a in enumerate(node.args)]
-        node.args = tuple(reversed(given[:2])) if node.target is aten.rsub.Scalar else tuple(given)
-        node.target = taken
+        if node.target is aten.scalar_tensor.default and _wide(node.args[0]):
+            node.replace_all_uses_with(_summed(module.graph, node, node.args[0]))
+        elif node.target in ARITHMETIC and any(map(_wide, node.args[:2])):
+            node.args = tuple(_summed(module.graph, node, a) if _wide(a) else a for a in node.args)
+            node.target = ARITHMETIC[node.target]
+    module.graph.eliminate_dead_code()
     module.recompile()
+
+
+def _wide(value: Any) -> bool:
+    return isinstance(value, float) and value != _single(value)
+
+
+def _summed(graph: Any, before: Any, number: float) -> Any:
+    """Return a node that is a number in double precision."""
+    made, rest = None, number
+    with graph.inserting_before(before), before.meta["val"].fake_mode:
+        while made is None or rest != 0.0:
+            share = _single(rest)
+            part = graph.call_function(aten.full.default, ([], share), {"dtype": torch.float64})
+            part.meta["val"] = torch.full((), share, dtype=torch.float64)
+            if made is not None:
+                total = graph.call_function(aten.add.Tensor, (made, part))
+                total.meta["val"] = part.meta["val"]
+                part = total
+            made, rest = part, rest - share
+    return made
 
 
 def _single(value: float) -> float:
