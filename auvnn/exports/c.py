@@ -33,9 +33,13 @@ class CTarget(Target):
         write_text(folder / f"{name}.h", header(system, precision))
         write_text(folder / f"{name}.c", source(system, precision))
         write_text(folder / f"{name}_test.c", tests(system, precision))
-        operations = f"{system.rate.operations} operations a derivative, {system.jacobian.operations} a Jacobian"
+        operations = (
+            f"{system.rate.operations} operations a derivative, {system.jacobian.operations} a Jacobian"
+        )
         build = f"cc -std=c99 -O2 {name}_test.c {name}.c -lm -o {name}_test && ./{name}_test"
-        return Written(system.lost(), [*system.notes(), operations, f"test it with: {build}"], agreement(system))
+        return Written(
+            system.lost(), [*system.notes(), operations, f"test it with: {build}"], agreement(system)
+        )
 
 
 def header(system: System, precision: str) -> str:
@@ -52,7 +56,11 @@ def header(system: System, precision: str) -> str:
         if same
         else f"A step is of {upper}_STEP seconds: with any other h nothing is done, and 1 is returned."
     )
-    other = "" if same else f" *\n * State s of the steps, in which the delay is exact:\n{listed(steps.state_names())}\n"
+    other = (
+        ""
+        if same
+        else f" *\n * State s of the steps, in which the delay is exact:\n{listed(steps.state_names())}\n"
+    )
     return f"""/* {name}: equations of motion of an underwater vehicle, written by auvnn {__version__}.
  *
  * SI units and radians; positions in NED, velocities in the body frame x forward, y starboard, z down;
@@ -151,7 +159,9 @@ def source(system: System, precision: str) -> str:
 def _risen(system: System) -> bool:
     """Return whether the thrust changes within a step."""
     n = system.flow.actuators.size
-    return any(system.actuator_step.scalars.value(node) != 0.0 for node in system.actuator_step.results[n : 2 * n])
+    return any(
+        system.actuator_step.scalars.value(node) != 0.0 for node in system.actuator_step.results[n : 2 * n]
+    )
 
 
 def _step(system: System, say: Dialect, risen: bool) -> str:
@@ -184,7 +194,9 @@ def _step(system: System, say: Dialect, risen: bool) -> str:
         *([f"for (int i = 0; i < {m}; i++) next[{SIZE} + i] = after[i];"] if m else []),
         "return 0;",
     ]
-    return block(f"int {name}_step({real} t, {real} h, const {real} *s, const {real} *u, {real} *next)", lines)
+    return block(
+        f"int {name}_step({real} t, {real} h, const {real} *s, const {real} *u, {real} *next)", lines
+    )
 
 
 def tests(system: System, precision: str) -> str:

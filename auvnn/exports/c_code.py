@@ -122,7 +122,11 @@ class Dialect:
                 lines.append(line)
                 line = "   "
             line += f" {text},"
-        return f"{qualifier} {self.type} {name}[{max(len(texts), 1)}] = {{\n" + "\n".join([*lines, line]) + "\n};\n"
+        return (
+            f"{qualifier} {self.type} {name}[{max(len(texts), 1)}] = {{\n"
+            + "\n".join([*lines, line])
+            + "\n};\n"
+        )
 
 
 def block(head: str, lines: Iterable[str]) -> str:

@@ -32,7 +32,9 @@ def agreement(system: System) -> dict[str, float]:
         held = [system._advanced(x[13:], u, h) for x, u, h in zip(a["s"], a["u"], a["h"], strict=True)]
         found = {
             "rate": relative(evaluate(system.rate, a), rate),
-            "actuators": relative(evaluate(system.actuator_step, {**a, "a": a["s"][:, 13:]}), torch.stack(held)),
+            "actuators": relative(
+                evaluate(system.actuator_step, {**a, "a": a["s"][:, 13:]}), torch.stack(held)
+            ),
         }
     n = system.flow.actuators.size
     inputs = system.flow.split(a["u"])

@@ -56,7 +56,18 @@ class Export(Answer):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
-        names = ("model", "to", "precision", "dt", "files", "lost", "notes", "states", "step_states", "inputs")
+        names = (
+            "model",
+            "to",
+            "precision",
+            "dt",
+            "files",
+            "lost",
+            "notes",
+            "states",
+            "step_states",
+            "inputs",
+        )
         return {
             "schema": "auvnn/export/1",
             **{name: plain(getattr(self, name)) for name in names},
@@ -112,10 +123,14 @@ def export(
         written = target.write(system, staged, precision)
         for function, error in written.agreement.items():
             if not error <= DISAGREES[precision]:
-                raise ConfigError(f"to={to}: {function} differs from the model by {error:.2g}: nothing was written")
+                raise ConfigError(
+                    f"to={to}: {function} differs from the model by {error:.2g}: nothing was written"
+                )
         if strict and written.lost:
             more = f" (and {len(written.lost) - 1} more)" if len(written.lost) > 1 else ""
-            raise ConfigError(f"strict=true and to={to} loses something: {written.lost[0]}{more}; use another target")
+            raise ConfigError(
+                f"strict=true and to={to} loses something: {written.lost[0]}{more}; use another target"
+            )
         files = sorted(str(f.relative_to(staged)) for f in staged.rglob("*") if f.is_file())
         answer = Export(
             system.model.vehicle.name, to, precision, dt, tuple(files), tuple(written.lost), tuple(written.notes),

@@ -94,7 +94,9 @@ def plain(graph: Graph) -> Graph:
             found[node] = apply(new, name, [found[n] for n in operands])
     made = Graph(new, graph.arguments, tuple(found[n] for n in graph.results))
     if made.operations > LARGEST:
-        raise ConfigError(f"the model takes {made.operations} scalar operations, too many to write out; use to=torch")
+        raise ConfigError(
+            f"the model takes {made.operations} scalar operations, too many to write out; use to=torch"
+        )
     return made
 
 

@@ -139,7 +139,10 @@ def _atan2(y: Tensor, x: Tensor) -> Tensor:
 
 OWN: dict[Any, Callable[..., Any]] = {
     aten.linalg_inv.default: _inverse,
-    aten.linalg_inv_ex.default: lambda x, check_errors=False: (_inverse(x), torch.zeros(x.shape[:-2], dtype=torch.int32)),
+    aten.linalg_inv_ex.default: lambda x, check_errors=False: (
+        _inverse(x),
+        torch.zeros(x.shape[:-2], dtype=torch.int32),
+    ),
     aten.atan2.default: _atan2,
     aten.atan.default: _atan,
     aten.expm1.default: lambda x: torch.where(x.abs() < 1e-2, _expm1(x), torch.exp(x) - 1.0),

@@ -45,7 +45,9 @@ class System:
         self.model = copy.deepcopy(model).double().cpu().eval().requires_grad_(False)
         self.name = identifier(model.vehicle.name) if name is None else name
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,60}", self.name) or self.name in RESERVED:
-            raise ConfigError(f"name={self.name}: give a name of letters, digits and _, that starts with a letter")
+            raise ConfigError(
+                f"name={self.name}: give a name of letters, digits and _, that starts with a letter"
+            )
         self.dt = dt
         with torch.no_grad():
             self.flow, self.steps = StateSpace(self.model), StateSpace(self.model, dt)

@@ -40,7 +40,9 @@ class TorchTarget(Target):
         return written
 
 
-def programs(system: System, precision: str) -> dict[str, tuple[Any, torch.nn.Module, tuple[torch.Tensor, ...]]]:
+def programs(
+    system: System, precision: str
+) -> dict[str, tuple[Any, torch.nn.Module, tuple[torch.Tensor, ...]]]:
     """Return per function the exported program, its module, and arguments (N, ...) to compare them at."""
     a = system.samples(COUNT, seed=5)
     kind = torch.float32 if precision == "float" else torch.float64
@@ -53,7 +55,9 @@ def programs(system: System, precision: str) -> dict[str, tuple[Any, torch.nn.Mo
         given = tuple(a[n].to(kind) for n in arguments)
         with torch.no_grad():
             ready = _typed(module, kind)
-            program = torch.export.export(ready, given, dynamic_shapes=tuple({0: batch} for _ in given), strict=False)
+            program = torch.export.export(
+                ready, given, dynamic_shapes=tuple({0: batch} for _ in given), strict=False
+            )
         found[name] = (program, module, given)
     return found
 

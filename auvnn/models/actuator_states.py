@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from auvnn.effects import Effect
 from auvnn.errors import ConfigError
 from auvnn.models.actuators import Actuators
-from auvnn.physics.thrusters import summed_table_thrust, quadratic_thrust
+from auvnn.physics.thrusters import quadratic_thrust, summed_table_thrust
 
 PADE = 3
 """States per actuator that stand for a delay in continuous time."""
