@@ -12,6 +12,7 @@ from torch import Tensor
 
 from auvnn.compiled.program import Program, recorded
 from auvnn.compiled.recorder import CannotCompile, Recorder
+from auvnn.compiled.rules import apply as rule
 from auvnn.compiled.scalars import FUNCTIONS, Scalars
 from auvnn.errors import ConfigError
 from auvnn.exports.slopes import partials
@@ -52,7 +53,7 @@ def traced(function: Callable[..., Tensor], samples: Mapping[str, Tensor]) -> Gr
         ConfigError: it does something that cannot be written as straight-line code.
     """
     scalars = Scalars()
-    recorder = Recorder(scalars)
+    recorder = Recorder(scalars, rule)
     leaves = []
     for name, value in samples.items():
         leaf = value.detach().clone(memory_format=torch.contiguous_format)
