@@ -17,6 +17,7 @@ def walk(page, shot) -> None:
     page.wait_for_selector("#compare:not([disabled])", timeout=120_000)
     settled(page)
     drawn(page, 5)
+    page.wait_for_selector(".step.done")
     shot("1_log")
     page.click("#compare")
     title(page, "Where it fails")
@@ -54,6 +55,8 @@ def main(out: Path) -> None:
         first.page.goto(address)
 
         def shot(name: str, page=first.page, kind: str = "1280_light") -> None:
+            page.evaluate("window.scrollTo(0, 0)")
+            page.wait_for_timeout(150)
             page.screenshot(path=out / f"{name}_{kind}.png", full_page=True)
 
         walk(first.page, shot)

@@ -15,15 +15,15 @@ export function againstHorizon(rows, horizons = HORIZONS) {
   const values = rows.flatMap(([, , errors]) => there.map((x) => errors[x])).filter((v) => Number.isFinite(v) && v > 0);
   if (!values.length) return h("p", { class: "soft" }, "No horizon fits into this log.");
   const low = Math.floor(Math.log10(Math.min(...values)) * 2) / 2, high = Math.ceil(Math.log10(Math.max(...values)) * 2) / 2;
-  const W = 440, H = 230, left = 46, right = 14, top = 12, bottom = 34;
+  const W = 440, H = 230, left = 46, right = 20, top = 12, bottom = 34;
   const x = (k) => left + (W - left - right) * (there.length > 1 ? k / (there.length - 1) : 0.5);
   const y = (v) => top + (H - top - bottom) * (1 - (Math.log10(v) - low) / Math.max(high - low, 0.5));
   const ticks = [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30].filter((v) => Math.log10(v) >= low - 0.01 && Math.log10(v) <= high + 0.01);
   const words = rows.map(([, name, errors]) => `${name}: ${there.map((t) => `${t === "full" ? "whole run" : `${t} s`} ${number(errors[t])}`).join(", ")}`).join(". ");
   return s("svg", { class: "chart", viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": `Error against horizon. ${words}` },
     ticks.map((v) => s("g", { class: "tick" }, s("line", { x1: left, x2: W - right, y1: y(v), y2: y(v) }), s("text", { x: left - 6, y: y(v) + 3.5, "text-anchor": "end" }, v))),
-    there.map((t, k) => s("text", { x: x(k), y: H - 16, "text-anchor": "middle", class: "label" }, t === "full" ? "whole run" : t)),
-    s("text", { x: (left + W - right) / 2, y: H - 2, "text-anchor": "middle", class: "label" }, "free running, s"),
+    there.map((t, k) => s("text", { x: x(k), y: H - 16, "text-anchor": "middle", class: "label" }, t === "full" ? "whole" : t)),
+    s("text", { x: (left + W - right) / 2, y: H - 2, "text-anchor": "middle", class: "label" }, "seconds of free running"),
     rows.map(([kind, , errors]) => line(there.map((t, k) => (Number.isFinite(errors[t]) && errors[t] > 0 ? [x(k).toFixed(1), y(errors[t]).toFixed(1)] : null)), kind)));
 }
 

@@ -101,10 +101,11 @@ export class LogScreen {
       return { t: parts[0].t, series: Object.assign({}, ...parts.map((p) => p.series)) };
     });
     const group = this.group;
-    const plots = groups.map(([name, names]) => h("figure", {},
-      h("figcaption", {}, TITLES[name], name === "commands" ? h("span", { class: "soft" }, log.overview.kind === "wrench" ? " N, N m" : " −1 to 1") : ""),
-      group.add({ label: `${TITLES[name]} over time: ${names.join(", ")}`, unit: UNITS[name], height: 118,
-        series: names.slice(0, 8).map((n, k) => ({ key: n, label: n.replace("thruster_", "T").replace("tau_", ""), look: SEVERAL[k] })) })));
+    const plots = groups.map(([name, names]) => group.add({
+      title: [TITLES[name], name === "commands" ? h("span", { class: "soft" }, log.overview.kind === "wrench" ? " N, N m" : " −1 to 1") : ""],
+      label: `${TITLES[name]} over time: ${names.join(", ")}`, unit: UNITS[name], height: 124,
+      series: names.slice(0, 8).map((n, k) => ({ key: n, label: n.replace("thruster_", "T").replace("tau_", ""), look: SEVERAL[k] })),
+    }));
     const element = card("Traces",
       h("div", { class: "row spread" },
         runs.length > 1 ? choice("Run", runs.map((r) => [r.number, `${r.number} (${duration(r.end - r.begin)})`]), this.run, (value) => { this.run = Number(value); group.mark([]); group.zoom(null); }) : h("span", {}),

@@ -52,7 +52,7 @@ export class MissingScreen {
       done.stale && h("p", { class: "note" }, "This is the diagnosis of the earlier model. ", h("button", { type: "button", class: "small", onclick: (e) => this.app.start("diagnose", [], e.target) }, "Look again")),
       h("section", { class: `verdict ${tone}`, "aria-label": "Verdict" },
         h("p", { class: "word" }, words, named.length ? ": " : ".", named.length > 0 && h("b", {}, named.join(answer.verdict === "ambiguous" ? " or " : ", "))),
-        (answer.story || []).map((line) => h("p", {}, line)),
+        (answer.story || []).map((line) => h("p", {}, line.replaceAll(" +- ", " ± "))),
         this.next(named, done)),
       h("div", { class: "two" }, this.left(), this.costs(), this.drive()),
       answer.warnings.length > 0 && h("details", { class: "note" }, h("summary", {}, `${answer.warnings.length} ${answer.warnings.length === 1 ? "warning" : "warnings"}`), h("ul", {}, answer.warnings.map((w) => h("li", {}, w)))),
@@ -94,7 +94,7 @@ export class MissingScreen {
         Number.isFinite(left.cost) && h("p", { class: "soft" }, `It costs ${number(left.cost)} of the error of 5 s free running.`));
     }
     return card("Left without a name",
-      h("p", {}, this.answer.verdict === "adequate" ? "What is left looks like noise." : `${percent(this.answer.unexplained)} of the residual's energy above the noise is explained by nothing in the catalogue.`),
+      h("p", {}, this.answer.verdict === "adequate" ? "What is left looks like noise." : `${percent(this.answer.unexplained).replace("<", "Less than ")} of the residual's energy above the noise is explained by nothing in the catalogue.`),
       this.answer.acts_in && Object.keys(this.answer.acts_in).length > 0 && h("p", { class: "soft" }, `It acts in ${Object.keys(this.answer.acts_in).join(", ")}.`),
       (this.answer.nearest || []).length > 0 && h("p", { class: "soft" }, `Nearest: ${this.answer.nearest.join(", ")}.`),
       depends.length > 0 && h("p", { class: "soft" }, "It depends on: ", depends.map(([axis, shares]) => { const top = Object.entries(shares).sort((a, b) => b[1] - a[1])[0]; return top ? `${axis} on ${top[0]} (${percent(top[1])})` : null; }).filter(Boolean).join(", ")));

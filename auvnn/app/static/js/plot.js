@@ -8,9 +8,10 @@ let groups = 0;
 export function ink(name) { return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim(); }
 
 const LOOKS = {
-  measured: { colour: "measured", width: 1.2 },
+  measured: { colour: "measured", width: 1 },
   given: { colour: "given", width: 1.3, dash: [5, 3] },
-  after: { colour: "after", width: 1.5 },
+  after: { colour: "after", width: 2 },
+  residual: { colour: "after", width: 1.1 },
   refitted: { colour: "refitted", width: 1.3, dash: [9, 3, 2, 3] },
   one: { colour: "after", width: 1.2 }, two: { colour: "given", width: 1.2 }, three: { colour: "third", width: 1.2 },
   four: { colour: "measured", width: 1 }, five: { colour: "refitted", width: 1 }, six: { colour: "sixth", width: 1 },
@@ -31,16 +32,21 @@ export class Group {
     this.onzoom = null;
   }
 
-  add({ label, unit, series, height = 150, legend = true, zero = false }) {
+  // Returns a figure: a caption, a key that gives the values under the cursor, and the plot.
+  add({ title, label, unit, series, height = 150, zero = false, named = true }) {
     const holder = h("div", { class: "plot", role: "img", "aria-label": label });
-    const plot = { holder, label, unit, series, height, legend, zero, chart: null };
+    const said = series.map(() => h("span", { class: "value" }));
+    const at = h("span", { class: "value" });
+    const plot = { holder, label, unit, series, height, zero, chart: null, said, at };
     this.plots.push(plot);
+    const legend = h("ul", { class: "key live" }, h("li", {}, at), series.map((one, k) =>
+      h("li", {}, h("span", { class: `swatch ${one.look}`, "aria-hidden": "true" }), named ? one.label : null, said[k])));
     new ResizeObserver(() => {
       const width = holder.clientWidth;
       if (plot.chart && width > 40 && Math.abs(width - plot.chart.width) > 1) plot.chart.setSize({ width, height });
       else if (!plot.chart && width > 40 && this.data) this.draw(plot);
     }).observe(holder);
-    return holder;
+    return h("figure", {}, h("figcaption", {}, h("span", {}, title), legend), holder);
   }
 
   controls() {
@@ -104,6 +110,8 @@ export class Group {
       plot.chart.batch(() => {
         plot.chart.setData(columns, false);
         plot.chart.setScale("x", { min, max });
+        // Where the range has not changed, setting it draws nothing.
+        plot.chart.redraw(true, false);
       });
       return;
     }
@@ -117,28 +125,32 @@ export class Group {
         x: { time: false, min, max },
         y: { range: (u, low, high) => plot.zero ? uPlot.rangeNum(Math.min(low, 0), Math.max(high, 0), 0.1, true) : uPlot.rangeNum(low, high, 0.1, false) },
       },
-      legend: { show: plot.legend, live: plot.legend },
+      legend: { show: false },
       cursor: {
         sync: { key: this.key, setSeries: false }, drag: { x: true, y: false, setScale: false },
         bind: { dblclick: () => () => { group.zoom(null); return null; } },
         points: { size: 5 },
       },
       axes: [
-        { ...axis, size: 28, space: 70, values: (u, ticks) => ticks.map((v) => number(v, 6)) },
-        { ...axis, size: 52, space: 26, label: plot.unit, labelSize: 15, labelGap: 0, values: (u, ticks) => ticks.map((v) => number(v, 4)) },
+        { ...axis, size: 26, space: 70, values: (u, ticks) => ticks.map((v) => number(v, 6)) },
+        { ...axis, size: 50, space: 20, label: plot.unit, labelSize: 15, labelGap: 0, values: (u, ticks) => ticks.map((v) => number(v, 4)) },
       ],
       series: [
-        { label: "t", value: (u, v) => (v === null || v === undefined ? "" : `${v.toFixed(2)} s`) },
+        { label: "t" },
         ...plot.series.map((one) => {
           const look = LOOKS[one.look];
           return {
             label: one.label, stroke: () => ink(look.colour), width: look.width, dash: look.dash, spanGaps: false, points: { show: false },
-            value: (u, v) => (v === null || v === undefined ? "" : number(v, 4)),
           };
         }),
       ],
       hooks: {
         drawClear: [(u) => group.shade(u)],
+        setCursor: [(u) => {
+          const at = u.cursor.idx, here = at !== null && at !== undefined && u.cursor.left >= 0;
+          plot.at.textContent = here ? `${u.data[0][at].toFixed(2)} s` : "";
+          plot.said.forEach((place, k) => { const v = here ? u.data[k + 1][at] : null; place.textContent = v === null || v === undefined ? "" : number(v, 3); });
+        }],
         setSelect: [(u) => {
           if (u.select.width < 4) return;
           const range = [u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x")];

@@ -69,11 +69,10 @@ export class ResultScreen {
     });
     this.chooser = h("span", {});
     const group = this.group;
-    const plots = DOF.map((d) => h("figure", {}, h("figcaption", {}, `${d.velocity}, ${d.word}`),
-      group.add({ label: `${d.word} velocity ${d.velocity} on held-out data: measured, before, after`, unit: d.unit, height: 128, legend: false,
-        series: [{ key: d.velocity, label: "measured", look: "measured" }, { key: `${d.velocity}_before`, label: "before", look: "given" }, { key: `${d.velocity}_after`, label: "after", look: "after" }] })));
+    const plots = DOF.map((d) => group.add({ title: `${d.velocity}, ${d.word}`, label: `${d.word} velocity ${d.velocity} on held-out data: measured, before, after`, unit: d.unit, height: 132, named: false,
+        series: [{ key: `${d.velocity}_before`, label: "as given", look: "given" }, { key: `${d.velocity}_after`, label: "after", look: "after" }, { key: d.velocity, label: "measured", look: "measured" }] }));
     requestAnimationFrame(() => attempt(() => group.refresh()));
-    return card("Held-out data: before and after", h("div", { class: "row spread" }, this.chooser, group.controls()), key(["measured", "measured"], ["given", "as given"], ["after", "after"]), h("div", { class: "six" }, plots));
+    return card("Held-out data: before and after", h("div", { class: "row spread" }, this.chooser, group.controls()), key(["measured", "measured"], ["given", "as given"], ["after", "after"]), h("div", { class: "plots" }, plots));
   }
 
   table() {

@@ -16,7 +16,6 @@ export class TryScreen {
     this.group = null;
     this.pending = false;
     this.again = false;
-    this.timings = [];
   }
 
   async update(state) {
@@ -64,9 +63,8 @@ export class TryScreen {
       return { t: this.base.t, series: { ...this.base.series, ...(this.last || {}) } };
     });
     const group = this.group;
-    const plots = DOF.map((d) => h("figure", {}, h("figcaption", {}, `${d.velocity}, ${d.word}`, h("span", { class: "soft", "data-error": d.velocity })),
-      group.add({ label: `${d.word} velocity ${d.velocity}: measured, as given, and with these effects`, unit: d.unit, height: 128, legend: false,
-        series: [{ key: d.velocity, label: "measured", look: "measured" }, { key: `${d.velocity}0`, label: "as it stands", look: "given" }, { key: `${d.velocity}1`, label: "tried", look: "after" }] })));
+    const plots = DOF.map((d) => group.add({ title: [`${d.velocity}, ${d.word}`, h("span", { class: "soft", "data-error": d.velocity })], label: `${d.word} velocity ${d.velocity}: measured, as it stands, and with these effects`, unit: d.unit, height: 132, named: false,
+        series: [{ key: `${d.velocity}0`, label: "as it stands", look: "given" }, { key: `${d.velocity}1`, label: "tried", look: "after" }, { key: d.velocity, label: "measured", look: "measured" }] }));
     show(this.element,
       h("div", { class: "two try" },
         h("div", { class: "stack" }, card("Effects", this.list, h("div", { class: "next left" },
@@ -78,7 +76,7 @@ export class TryScreen {
               choice("Starts anew", [["full", "never"], ["30", "every 30 s"], ["5", "every 5 s"]], this.horizon, (v) => { this.horizon = v; this.follow(); })),
             group.controls()),
             key(["measured", "measured"], ["given", "model as it stands"], ["after", "with these effects"]),
-            h("div", { class: "six" }, plots)))));
+            h("div", { class: "plots" }, plots)))));
     this.toggles();
     this.outcome();
     requestAnimationFrame(() => attempt(() => group.refresh()));
@@ -162,8 +160,7 @@ export class TryScreen {
     if (found.traces.t.length === base.t.length) this.group.set({ t: base.t, series: { ...base.series, ...series } });
     else this.again = true;
     this.gauge(found);
-    this.timings.push(performance.now() - began);
-    window.auvnnTimings = this.timings;
+    document.dispatchEvent(new CustomEvent("redrawn", { detail: performance.now() - began }));
   }
 
   gauge(found) {

@@ -90,10 +90,10 @@ export class WhereScreen {
     this.group.plots = [];
     const wrench = this.answer.residual_wrench[dof.axis];
     show(this.plots,
-      h("figure", {}, h("figcaption", {}, `${dof.velocity}, ${dof.word}`, key(["measured", "measured"], ["given", "model"])),
-        this.group.add({ label: `${dof.word} velocity ${dof.velocity}, measured and model`, unit: dof.unit, height: 210, series: [{ key: dof.velocity, label: "measured", look: "measured" }, { key: `${dof.velocity}_model`, label: "model", look: "given" }] })),
-      h("figure", {}, h("figcaption", {}, `${dof.axis}: what the model lacks; rms ${number(wrench.rms)} ${dof.force}, noise floor ${number(wrench.noise_floor)} ${dof.force}`),
-        this.group.add({ label: `Residual ${dof.axis} over time`, unit: dof.force, height: 150, zero: true, series: [{ key: dof.axis, label: "residual", look: "after" }] })));
+      this.group.add({ title: `${dof.velocity}, ${dof.word}`, label: `${dof.word} velocity ${dof.velocity}, measured and model`, unit: dof.unit, height: 210,
+        series: [{ key: `${dof.velocity}_model`, label: "model", look: "given" }, { key: dof.velocity, label: "measured", look: "measured" }] }),
+      this.group.add({ title: `${dof.axis}, what the model lacks: rms ${number(wrench.rms)} ${dof.force}, noise floor ${number(wrench.noise_floor)} ${dof.force}`, label: `Residual ${dof.axis} over time`, unit: dof.force, height: 150, zero: true,
+        series: [{ key: dof.axis, label: "residual", look: "residual" }] }));
     attempt(() => this.group.refresh());
     this.paint();
   }
@@ -127,14 +127,17 @@ export class WhereScreen {
   cells() {
     const place = this.map.regimes[this.regime];
     const bins = place.count.length;
+    const all = DOF.flatMap((d, row) => place.rms[row].map((rms) => (rms !== null && this.map.floor[d.axis] > 0 ? rms / this.map.floor[d.axis] : 0)));
+    const most = Math.max(...all, 10);
     const cell = (d, row, k) => {
       const rms = place.rms[row][k], floor = this.map.floor[d.axis];
       const ratio = rms !== null && floor > 0 ? rms / floor : null;
       const button = h("button", { type: "button", class: "cell", "data-row": row, "data-bin": k, "aria-label": `${d.word}, ${this.regime} ${number(place.edges[k])} to ${number(place.edges[k + 1])} ${place.unit}: ${ratio === null ? "no samples" : `${number(ratio, 2)} times the noise floor`}`,
         disabled: ratio === null, tabindex: row === 0 && k === 0 ? "0" : "-1", onclick: () => this.choose(d, k), onkeydown: (e) => move(e) }, ratio === null ? "–" : number(ratio, 2));
-      const strength = ratio === null ? 0 : Math.min(Math.max((ratio - 1) / 5, 0), 1);
-      button.style.setProperty("--heat", `${Math.round(100 * strength)}%`);
-      if (strength > 0.55) button.classList.add("hot");
+      // By powers: a residual of twice its floor is to be seen beside one of forty times.
+      const strength = ratio === null || ratio <= 1 ? 0 : Math.min(Math.log(ratio) / Math.log(most), 1);
+      button.style.setProperty("--heat", `${Math.round(100 * strength ** 1.4)}%`);
+      if (strength ** 1.4 > 0.62) button.classList.add("hot");
       return h("td", {}, button);
     };
     const move = (event) => {
@@ -144,15 +147,14 @@ export class WhereScreen {
       const next = this.grid.querySelector(`[data-row="${Number(event.target.dataset.row) + step[0]}"][data-bin="${Number(event.target.dataset.bin) + step[1]}"]`);
       if (next) { event.target.tabIndex = -1; next.tabIndex = 0; next.focus(); }
     };
-    for (const button of this.element.querySelectorAll("[data-regime]")) button.setAttribute("aria-pressed", String(button.dataset.regime === this.regime));
     show(this.grid, h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": `Residual by ${this.regime}` }, h("table", { class: "heat" },
       h("thead", {}, h("tr", {}, h("th", { scope: "col" }, `${this.regime}, ${place.unit}`), Array.from({ length: bins }, (_, k) => h("th", { scope: "col" }, `${number(place.edges[k], 2)} – ${number(place.edges[k + 1], 2)}`)))),
       h("tbody", {}, DOF.map((d, row) => h("tr", {}, h("th", { scope: "row" }, `${d.axis} ${d.word}`), Array.from({ length: bins }, (_, k) => cell(d, row, k))))))));
-    for (const button of this.element.querySelectorAll("[data-regime]")) button.setAttribute("aria-pressed", String(button.dataset.regime === this.regime));
     this.paint();
   }
 
   paint() {
+    for (const button of this.element.querySelectorAll("[data-regime]")) button.setAttribute("aria-pressed", String(button.dataset.regime === this.regime));
     for (const button of this.element.querySelectorAll(".cell")) button.setAttribute("aria-pressed", String(Boolean(this.cell) && this.cell.regime === this.regime && Number(button.dataset.bin) === this.cell.bin && DOF[Number(button.dataset.row)].axis === this.dof.axis));
   }
 
