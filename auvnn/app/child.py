@@ -51,7 +51,9 @@ class Child:
                 process.stdin.flush()
             except OSError as problem:
                 self._process = None
-                raise AuvnnError(f"the worker process has ended ({problem}); press the button again") from None
+                raise AuvnnError(
+                    f"the worker process has ended ({problem}); press the button again"
+                ) from None
 
     def stop(self) -> None:
         """End the process at once; whatever it was writing stays beside its place and is never moved there."""

@@ -53,7 +53,9 @@ def buttons(where: str, what: str, cure: str) -> list[dict[str, Any]]:
         before = re.match(r"((?:[a-z]+, )*[a-z]+) are stamped", what)
         names = before[1].split(", ") if before else [delay[1]]
         names = [n for n in names if is_canonical(n)] or [delay[1]]
-        offer(f"Shift {', '.join(names)} by {float(delay[2]):g} s", delay=dict.fromkeys(names, float(delay[2])))
+        offer(
+            f"Shift {', '.join(names)} by {float(delay[2]):g} s", delay=dict.fromkeys(names, float(delay[2]))
+        )
     for effect in re.findall(r"effect ([a-z_]+)", cure) + re.findall(r"\((velocity_misalignment)\)", cure):
         found.append({"label": f"Try {effect}", "effect": effect})
     return found

@@ -12,12 +12,12 @@ from auvnn.app.traces import intervals, part, thin
 from auvnn.errors import AuvnnError
 from auvnn.logs import Log, Run
 from auvnn.logs.channels import is_canonical, unit
-from auvnn.logs.mapping import Mapping
-from auvnn.logs.quality import Quality
+from auvnn.logs.quality.quality import Quality
+from auvnn.logs.quality.situations import find
 from auvnn.logs.readers import choose
-from auvnn.logs.segments import default_gap
-from auvnn.logs.situations import find
-from auvnn.logs.suggest import likely
+from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.suggest import likely
+from auvnn.logs.signals.segments import default_gap
 
 SPARK = 60
 HEAD = 400
@@ -102,7 +102,10 @@ def overview(log: Log) -> dict[str, Any]:
         "samples": log.samples,
         "duration": log.duration,
         "kind": log.kind,
-        "runs": [{"number": r.number, "samples": r.samples, "begin": float(r.t[0]), "end": float(r.t[-1])} for r in log.runs],
+        "runs": [
+            {"number": r.number, "samples": r.samples, "begin": float(r.t[0]), "end": float(r.t[-1])}
+            for r in log.runs
+        ],
         "groups": {group: [n for n, _ in series_of(log.runs[0], group)] for group in GROUPS},
         "rate": float(np.median([1.0 / r.dt for r in log.runs])),
     }
@@ -142,7 +145,11 @@ def findings(quality: Quality) -> list[dict[str, Any]]:
         marks: list[dict[str, Any]] = []
         for kind, where in places.items():
             if kind == finding.where or (kind in _WORDS and _WORDS[kind] in finding.what):
-                marks += [m for m in where if not finding.where.startswith("run ") or f"run {m['run']}" == finding.where]
+                marks += [
+                    m
+                    for m in where
+                    if not finding.where.startswith("run ") or f"run {m['run']}" == finding.where
+                ]
         entry = {**finding.to_dict(), "marks": marks[:200]}
         entry["buttons"] = buttons(finding.where, finding.what, finding.cure)
         found.append(entry)
@@ -154,7 +161,14 @@ _WORDS = {"gap": "gaps in time", "restart": "the pose starts afresh"}
 
 
 def _places(log: Log) -> dict[str, list[dict[str, Any]]]:
-    found: dict[str, list[dict[str, Any]]] = {"gap": [], "restart": [], "spikes": [], "missing": [], "situation": [], "current": []}
+    found: dict[str, list[dict[str, Any]]] = {
+        "gap": [],
+        "restart": [],
+        "spikes": [],
+        "missing": [],
+        "situation": [],
+        "current": [],
+    }
 
     def add(kind: str, run: Run, spans: list[list[float]]) -> None:
         found[kind] += [{"run": run.number, "from": a, "to": b} for a, b in spans]

@@ -72,7 +72,9 @@ def serve(
     if not 0 <= port < 65536:
         raise ConfigError(f"port={port}: choose from 0 (any that is free) to 65535")
     with contextlib.ExitStack() as stack:
-        work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="auvnn-app-", ignore_cleanup_errors=True)))
+        work = Path(
+            stack.enter_context(tempfile.TemporaryDirectory(prefix="auvnn-app-", ignore_cleanup_errors=True))
+        )
         session = Session(work, out, model)
         stack.callback(session.close)
         if log:
@@ -108,5 +110,7 @@ def _bound(port: int) -> socket.socket:
         listening.bind(("127.0.0.1", port))
     except OSError as problem:
         listening.close()
-        raise InputError(f"port={port}: cannot be used ({problem.strerror}); choose another, or leave it out") from None
+        raise InputError(
+            f"port={port}: cannot be used ({problem.strerror}); choose another, or leave it out"
+        ) from None
     return listening

@@ -133,7 +133,9 @@ class Session:
         """
         from auvnn.models import load
 
-        load(source, actuation=None if self.source is None or self.source.log is None else self.source.log.kind)
+        load(
+            source, actuation=None if self.source is None or self.source.log is None else self.source.log.kind
+        )
         with self.lock:
             self.refuse_busy()
             self.history, self.taken_back = [Step(source, "as given")], []
@@ -218,7 +220,10 @@ class Session:
             if job is None or job.state != "running":
                 return
             if "ended" in report:
-                job.state, job.error = "failed", f"the worker process ended with status {report['ended']}; try again"
+                job.state, job.error = (
+                    "failed",
+                    f"the worker process ended with status {report['ended']}; try again",
+                )
             elif report.get("job") != job.number:
                 return
             elif "progress" in report:

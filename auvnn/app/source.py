@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from auvnn.app.logview import columns, findings, guesses, overview, raw_columns
 from auvnn.app.division import split
+from auvnn.app.logview import columns, findings, guesses, overview, raw_columns
 from auvnn.errors import AuvnnError, one_line
 from auvnn.logs import Log
-from auvnn.logs.mapping import Mapping
+from auvnn.logs.reading.mapping import Mapping
 
 
 @dataclass
@@ -64,7 +64,9 @@ class Source:
         if self.log is None:
             return
         quality = self.log.quality()
-        self.sizes = {k: v for k, v in quality.metrics.items() if k in ("errors", "warnings", "repairs", "gaps")}
+        self.sizes = {
+            k: v for k, v in quality.metrics.items() if k in ("errors", "warnings", "repairs", "gaps")
+        }
         self.findings = findings(quality)
 
     def order(self) -> dict[str, Any]:
@@ -95,4 +97,7 @@ class Source:
 
 
 def _runs(log: Log) -> list[dict[str, Any]]:
-    return [{"number": r.number, "samples": r.samples, "begin": float(r.t[0]), "end": float(r.t[-1])} for r in log.runs]
+    return [
+        {"number": r.number, "samples": r.samples, "begin": float(r.t[0]), "end": float(r.t[-1])}
+        for r in log.runs
+    ]

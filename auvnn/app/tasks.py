@@ -13,10 +13,12 @@ import torch
 
 from auvnn.answers import Answer, plain, write_text
 from auvnn.app.division import split
-from auvnn.diagnosis import add, compare, diagnose
-from auvnn.diagnosis.compare import write_predictions
-from auvnn.diagnosis.gains import noise_floor
+from auvnn.comparison import compare
+from auvnn.comparison.compare import write_predictions
+from auvnn.diagnosis import diagnose
 from auvnn.errors import AuvnnError
+from auvnn.improvement import add
+from auvnn.improvement.gains import noise_floor
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import HORIZONS, NAMES, roll, scale_of
 from auvnn.models import GreyBox, load
@@ -42,7 +44,12 @@ class Tasks:
         Raises:
             AuvnnError: what the user gave cannot be used.
         """
-        kinds = {"compare": self._compare, "diagnose": self._diagnose, "add": self._add, "example": self._example}
+        kinds = {
+            "compare": self._compare,
+            "diagnose": self._diagnose,
+            "add": self._add,
+            "example": self._example,
+        }
         out = Path(order["out"])
         beside = out.with_name(f".{out.name}.part")
         shutil.rmtree(beside, ignore_errors=True)
@@ -95,7 +102,9 @@ class Tasks:
         floors: dict[str, float | None] = {}
         for horizon in HORIZONS:
             rolled = roll(model, log, horizon, scale, engine="firm")
-            floors[horizon] = None if rolled is None else noise_floor(model, rolled, log, scale, engine="firm")
+            floors[horizon] = (
+                None if rolled is None else noise_floor(model, rolled, log, scale, engine="firm")
+            )
         more = {
             "regimes": comparison.regimes,
             "wrench_floor": comparison.noise_floor,
@@ -105,7 +114,11 @@ class Tasks:
         _write(comparison, out, more)
         write_predictions(comparison.series, out / "predictions.parquet")
         five = comparison.rollout.get("5", {})
-        return {"total": five.get("total"), "persistence": five.get("persistence"), "floor": floors.get("5")}, comparison
+        return {
+            "total": five.get("total"),
+            "persistence": five.get("persistence"),
+            "floor": floors.get("5"),
+        }, comparison
 
     def _diagnose(self, order: dict[str, Any], out: Path, say: Say) -> tuple[dict[str, Any], Answer]:
         log, _ = self._logs(order, say)
@@ -123,7 +136,11 @@ class Tasks:
         more = {"held_out_words": order["log"]["words"], "effects_in_model": better.model.effect_names}
         _write(better, out, more)
         names = {"measured": "measured", "before": "before", "refitted": "refitted", "after": "after"}
-        arrays = {f"{s['run']}:{key}": np.asarray(s[key], dtype=np.float64) for s in better.series for key in ("t", *names)}
+        arrays = {
+            f"{s['run']}:{key}": np.asarray(s[key], dtype=np.float64)
+            for s in better.series
+            for key in ("t", *names)
+        }
         with (out / "series.npz").open("wb") as stream:
             np.savez(stream, **arrays)
         return {"accepted": better.accepted, "waterfall": better.waterfall, "gain": better.gain}, better

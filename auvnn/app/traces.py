@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.logs.segments import default_gap
+from auvnn.logs.signals.segments import default_gap
 
 Array = NDArray[np.float64]
 POINTS = 1600

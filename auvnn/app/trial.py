@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from auvnn.app.traces import part, thin
-from auvnn.diagnosis.compare import stitch
+from auvnn.comparison.compare import stitch
 from auvnn.effects import EFFECTS, effect_class
 from auvnn.errors import InputError
 from auvnn.logs import Log
@@ -44,7 +44,13 @@ class Trial:
         self._given: dict[str, Rolled] = {}
 
     def run(
-        self, effects: Effects, horizon: str, number: int | None, low: float | None, high: float | None, points: int
+        self,
+        effects: Effects,
+        horizon: str,
+        number: int | None,
+        low: float | None,
+        high: float | None,
+        points: int,
     ) -> dict[str, Any]:
         """Run the model free with these effects and no others.
 
@@ -118,7 +124,9 @@ class Trial:
         windows = self._windows[horizon]
         if windows is None:
             if needed:
-                raise InputError(f"no stretch of {self.log.name} is {horizon} s long without a gap: choose a shorter one")
+                raise InputError(
+                    f"no stretch of {self.log.name} is {horizon} s long without a gap: choose a shorter one"
+                )
             return None
         return roll_windows(model, windows, self.scale, engine="firm")
 

@@ -53,7 +53,9 @@ class Pages:
             "answer": lambda asked: self.session.answer(str(asked.get("kind"))),
             "where": lambda asked: self.where().map(),
             "where-traces": lambda asked: self.where().traces(*_span(asked)),
-            "where-marks": lambda asked: self.where().marks(str(asked.get("regime")), int(asked.get("bin", -1))),
+            "where-marks": lambda asked: self.where().marks(
+                str(asked.get("regime")), int(asked.get("bin", -1))
+            ),
             "held-traces": self.held_traces,
             "effects": self.effects,
             "script": self.script,
@@ -91,7 +93,10 @@ class Pages:
 
     async def upload(self, request: Request) -> Response:
         """Take a file that was dropped on the page: a log, a held-out log, or a model's YAML file."""
-        name = re.sub(r"[^\w.+-]", "_", Path(request.query_params.get("name", "log")).name)[-120:].lstrip(".") or "log"
+        name = (
+            re.sub(r"[^\w.+-]", "_", Path(request.query_params.get("name", "log")).name)[-120:].lstrip(".")
+            or "log"
+        )
         folder = Path(tempfile.mkdtemp(dir=self.session.work))
         path, beside = folder / name, folder / ".part"
         try:
@@ -277,7 +282,9 @@ def _said(call: Callable[[Asked], Any], asked: Asked) -> Response:
     except (ValueError, TypeError, KeyError) as error:
         if os.environ.get("AUVNN_DEBUG") == "1":
             raise
-        return _refused(f"a fault of the program, not of your input ({type(error).__name__}: {one_line(error, 300)})", 500)
+        return _refused(
+            f"a fault of the program, not of your input ({type(error).__name__}: {one_line(error, 300)})", 500
+        )
 
 
 def _refused(words: str, status: int = 400) -> Response:
@@ -297,4 +304,9 @@ def _span(asked: Asked) -> tuple[int | None, float | None, float | None, int]:
             raise ConfigError(f"{key}={value} is no number") from None
 
     run, points = number("run"), number("points")
-    return None if run is None else int(run), number("from"), number("to"), int(min(max(points or 1600, 16), 8000))
+    return (
+        None if run is None else int(run),
+        number("from"),
+        number("to"),
+        int(min(max(points or 1600, 16), 8000)),
+    )

@@ -10,7 +10,7 @@ import numpy as np
 
 from auvnn.app.logview import run_of
 from auvnn.app.traces import intervals, part, thin
-from auvnn.diagnosis.locate import AXES, WORDS, members
+from auvnn.comparison.locate import AXES, WORDS, members
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import NAMES
@@ -38,7 +38,9 @@ class Where:
             rows = table.filter(pl.col("run") == run.number)
             self._runs[run.number] = {name: rows[name].cast(pl.Float64).to_numpy() for name in rows.columns}
 
-    def traces(self, number: int | None, low: float | None, high: float | None, points: int) -> dict[str, Any]:
+    def traces(
+        self, number: int | None, low: float | None, high: float | None, points: int
+    ) -> dict[str, Any]:
         """Return measured and predicted velocities and the residual wrench of a run between two times, thinned."""
         run = run_of(self.log, number)
         columns = self._runs[run.number]
@@ -75,7 +77,9 @@ class Where:
         return {"runs": spans, "count": places[regime]["count"][number]}
 
 
-def held_out_traces(folder: Path, number: int | None, low: float | None, high: float | None, points: int) -> dict[str, Any]:
+def held_out_traces(
+    folder: Path, number: int | None, low: float | None, high: float | None, points: int
+) -> dict[str, Any]:
     """Return the held-out traces of an improvement: measured, before, refitted and after, thinned.
 
     Raises:
@@ -89,7 +93,12 @@ def held_out_traces(folder: Path, number: int | None, low: float | None, high: f
         t = arrays[f"{chosen}:t"]
         piece = part(t, low, high)
         series = {}
-        for key, suffix in (("measured", ""), ("before", "_before"), ("refitted", "_refitted"), ("after", "_after")):
+        for key, suffix in (
+            ("measured", ""),
+            ("before", "_before"),
+            ("refitted", "_refitted"),
+            ("after", "_after"),
+        ):
             values = arrays[f"{chosen}:{key}"][piece]
             series.update({f"{name}{suffix}": values[:, k] for k, name in enumerate(NAMES)})
     return {**thin(t[piece], series, points), "runs": runs, "run": chosen}

@@ -51,7 +51,9 @@ def main() -> None:
         try:
             for drawn in tasks.draw_all():
                 report(drawn=drawn)
-            summary = tasks.do(order, lambda words, job=number: report(job=job, progress=one_line(words, 200)))
+            summary = tasks.do(
+                order, lambda words, job=number: report(job=job, progress=one_line(words, 200))
+            )
             report(job=number, done=summary)
         except AuvnnError as error:
             report(job=number, error=one_line(error))
@@ -59,7 +61,9 @@ def main() -> None:
             import traceback
 
             traceback.print_exc()
-            words = f"a fault of the program, not of your input ({type(error).__name__}: {one_line(error, 300)})"
+            words = (
+                f"a fault of the program, not of your input ({type(error).__name__}: {one_line(error, 300)})"
+            )
             report(job=number, error=words, fault=True)
 
 

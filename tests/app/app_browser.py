@@ -34,7 +34,11 @@ def why_not() -> str:
         import uvicorn  # noqa: F401
     except ModuleNotFoundError:
         return "the page's server is not installed: pip install 'auvnn[app]'"
-    return "" if CHROMIUM.exists() else f"no chromium at {CHROMIUM}: apt-get install chromium, or set AUVNN_CHROMIUM"
+    return (
+        ""
+        if CHROMIUM.exists()
+        else f"no chromium at {CHROMIUM}: apt-get install chromium, or set AUVNN_CHROMIUM"
+    )
 
 
 def axe() -> Path | None:
@@ -102,7 +106,9 @@ class Watched:
         self.complaints: list[str] = []
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.on("console", lambda said: self.complaints.append(said.text) if said.type == "error" else None)
+        self.page.on(
+            "console", lambda said: self.complaints.append(said.text) if said.type == "error" else None
+        )
 
     @property
     def strangers(self) -> list[str]:
@@ -116,7 +122,9 @@ class Watched:
 
 def title(page: Any, words: str, seconds: float = 120) -> None:
     """Wait until a screen is in view."""
-    page.wait_for_function("w => document.querySelector('main h1')?.textContent === w", arg=words, timeout=1000 * seconds)
+    page.wait_for_function(
+        "w => document.querySelector('main h1')?.textContent === w", arg=words, timeout=1000 * seconds
+    )
 
 
 def drawn(page: Any, count: int = 1, seconds: float = 60) -> None:

@@ -6,7 +6,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from app_browser import Watched, browser, drawn, served, settled, title, why_not
+from tests.app.app_browser import Watched, browser, drawn, served, settled, title, why_not
 
 
 def walk(page, shot) -> None:
@@ -62,7 +62,13 @@ def main(out: Path) -> None:
         walk(first.page, shot)
         for width, theme in ((1280, "dark"), (800, "light"), (800, "dark")):
             view = Watched(running, width, 900, theme)
-            for name, screen in (("1_log", "log"), ("2_where", "where"), ("3_missing", "missing"), ("4_try", "try"), ("5_result", "result")):
+            for name, screen in (
+                ("1_log", "log"),
+                ("2_where", "where"),
+                ("3_missing", "missing"),
+                ("4_try", "try"),
+                ("5_result", "result"),
+            ):
                 view.page.goto(f"{address}#{screen}")
                 view.page.wait_for_load_state("networkidle")
                 view.page.wait_for_timeout(900)
