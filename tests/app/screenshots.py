@@ -1,4 +1,4 @@
-"""Screenshots of the five screens, light and dark, at 1280 and at 800 pixels: `python tests/app/screenshots.py FOLDER`."""
+"""Screenshots of the five screens, light and dark, 1280 and 800 pixels: `python -m tests.app.screenshots FOLDER`."""
 
 from __future__ import annotations
 
