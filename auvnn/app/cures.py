@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import yaml
@@ -11,7 +12,7 @@ import yaml
 from auvnn.logs.channels import is_canonical
 
 NUMBER = r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?"
-OFFERED = "Did you mean (mapping file): "
+OFFERS = ("Did you mean (mapping file): ", "Mapping: ")
 
 
 def buttons(where: str, what: str, cure: str) -> list[dict[str, Any]]:
@@ -61,21 +62,35 @@ def buttons(where: str, what: str, cure: str) -> list[dict[str, Any]]:
     return found
 
 
-def offered(error: str) -> dict[str, Any] | None:
-    """Return the mapping that an error about missing columns offers to copy, or None."""
-    if OFFERED not in error:
+def offered(error: str, mapping: dict[str, Any], names: Sequence[str] = ()) -> dict[str, Any] | None:
+    """Return the mapping with what an error about columns or units offers to put into it, or None.
+
+    Args:
+        error: why a file could not be read.
+        mapping: with which it was read.
+        names: the file's columns; what is offered for one thruster counts for all.
+    """
+    text = next((error.split(offer, 1)[1] for offer in OFFERS if offer in error), None)
+    if text is None:
         return None
-    text = error.split(OFFERED, 1)[1]
-    parts = re.split(r";\s+(?=(?:angles|rates|time|quaternion|frame): )", text)
-    found: dict[str, Any] = {}
-    for one in parts:
+    new, some = copy.deepcopy(mapping), False
+    for one in re.split(r";\s+(?=(?:angles|rates|time|quaternion|frame): )", text):
         try:
             read = yaml.safe_load(one)
         except yaml.YAMLError:
-            return found or None
-        if isinstance(read, dict):
-            found.update(read)
-    return found or None
+            continue
+        if not isinstance(read, dict):
+            continue
+        for name, column in dict(read.pop("columns", None) or {}).items():
+            several = [n for n in names if re.fullmatch(r"thruster_[0-9]+", n)] if name.startswith("thruster_") else []
+            for each in several or [name]:
+                there = new.setdefault("columns", {}).get(each, {"from": each})
+                source = there["from"] if column.get("from") == "..." else column.get("from", each)
+                new["columns"][each] = {**there, **column, "from": source}
+                some = True
+        new.update(read)
+        some = some or bool(read)
+    return new if some else None
 
 
 def changed(mapping: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:

@@ -129,11 +129,13 @@ def run_of(log: Log, number: int | None) -> Run:
     return log.runs[0] if number is None else log.select(number).runs[0]
 
 
-def traces(log: Log, number: int | None, group: str, low: float | None, high: float | None) -> dict[str, Any]:
+def traces(
+    log: Log, number: int | None, group: str, low: float | None, high: float | None, points: int
+) -> dict[str, Any]:
     """Return the traces of one group of a run between two times, thinned."""
     run = run_of(log, number)
     piece = part(run.t, low, high)
-    return thin(run.t[piece], {name: values[piece] for name, values in series_of(run, group)})
+    return thin(run.t[piece], {name: values[piece] for name, values in series_of(run, group)}, points)
 
 
 def findings(quality: Quality) -> list[dict[str, Any]]:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import torch
 
-from auvnn.app.traces import part, thin
+from auvnn.app.logview import run_of
+from auvnn.app.traces import POINTS, part, thin
 from auvnn.comparison.compare import stitch
 from auvnn.effects import EFFECTS, effect_class
 from auvnn.errors import InputError
@@ -47,10 +48,11 @@ class Trial:
         self,
         effects: Effects,
         horizon: str,
-        number: int | None,
-        low: float | None,
-        high: float | None,
-        points: int,
+        number: int | None = None,
+        low: float | None = None,
+        high: float | None = None,
+        points: int = POINTS,
+        whole: bool = True,
     ) -> dict[str, Any]:
         """Run the model free with these effects and no others.
 
@@ -61,34 +63,41 @@ class Trial:
             low: s, begin of the traces.
             high: s, end of the traces.
             points: about how many samples to return.
+            whole: also return what was measured and what the model as it stands gives, which no slider moves.
 
         Returns:
-            `traces` of the run (`NAMES`, and as given `NAMES` with a trailing 0), `error` and `given`: totals and
-            each velocity's error at the horizon of 5 s, `persistence`, and how many windows diverged.
+            `traces` of the run: `NAMES` with a trailing 1 as tried, with a trailing 0 as the model stands, and as
+            measured; `error` and `given`: totals and each velocity's error at the horizon of 5 s, with persistence;
+            `horizon` of these errors, and how many windows diverged.
+
+        Raises:
+            InputError: no stretch of the log is that long.
+            ConfigError: an unknown effect, or a value out of bounds.
         """
         with self._lock, torch.no_grad():
             model = self._tried(effects)
-            shown = self._rolled(model, horizon)
-            judged = shown if horizon == JUDGED else self._rolled(model, JUDGED, needed=False)
-            given, before = self._as_given(horizon), self._as_given(JUDGED, needed=False)
-        run = self.log.runs[0] if number is None else self.log.select(number).runs[0]
+            shown, given = self._rolled(model, horizon), self._as_given(horizon)
+            if shown is None or given is None:
+                raise InputError(
+                    f"no stretch of {self.log.name} is {horizon} s long without a gap: choose a shorter one"
+                )
+            judged = shown if horizon == JUDGED else self._rolled(model, JUDGED)
+            before = self._as_given(JUDGED)
+        run = run_of(self.log, number)
         piece = part(run.t, low, high)
-        series = {}
-        for rolled, suffix in ((shown, ""), (given, "0")):
-            assert rolled is not None
-            trace = stitch(rolled, run.number, run.nu)[piece]
-            series.update({f"{name}{suffix}": trace[:, k] for k, name in enumerate(NAMES)})
+        kinds = {"1": stitch(shown, run.number, run.nu)}
+        if whole:
+            kinds |= {"0": stitch(given, run.number, run.nu), "": run.nu}
+        series = {f"{name}{kind}": trace[piece, k] for kind, trace in kinds.items() for k, name in enumerate(NAMES)}
         return {
             "traces": thin(run.t[piece], series, points),
             "error": self._errors(judged or shown),
             "given": self._errors(before or given),
             "horizon": JUDGED if judged is not None else horizon,
-            "diverged": int(shown.diverged.sum()) if shown is not None else 0,
+            "diverged": int(shown.diverged.sum()),
         }
 
-    def _errors(self, rolled: Rolled | None) -> dict[str, float | None]:
-        if rolled is None:
-            return {}
+    def _errors(self, rolled: Rolled) -> dict[str, float | None]:
         each = rolled.nrmse(self.scale)
         found = {name: float(each[k]) for k, name in enumerate(NAMES)}
         found["total"] = rolled.total(self.scale)
@@ -110,25 +119,19 @@ class Trial:
             mine.theta.data.copy_(new.theta.data)
         return model
 
-    def _as_given(self, horizon: str, needed: bool = True) -> Rolled | None:
+    def _as_given(self, horizon: str) -> Rolled | None:
         if horizon not in self._given:
-            rolled = self._rolled(self.model, horizon, needed)
+            rolled = self._rolled(self.model, horizon)
             if rolled is None:
                 return None
             self._given[horizon] = rolled
         return self._given[horizon]
 
-    def _rolled(self, model: GreyBox, horizon: str, needed: bool = True) -> Rolled | None:
+    def _rolled(self, model: GreyBox, horizon: str) -> Rolled | None:
         if horizon not in self._windows:
             self._windows[horizon] = horizon_windows(self.log, horizon, model.actuation)
         windows = self._windows[horizon]
-        if windows is None:
-            if needed:
-                raise InputError(
-                    f"no stretch of {self.log.name} is {horizon} s long without a gap: choose a shorter one"
-                )
-            return None
-        return roll_windows(model, windows, self.scale, engine="firm")
+        return None if windows is None else roll_windows(model, windows, self.scale, engine="firm")
 
 
 def catalogue(model: GreyBox, log: Log) -> list[dict[str, Any]]:

@@ -77,7 +77,8 @@ class Pages:
     def log(self, asked: Asked) -> Any:
         """Columns, mapping and extent of the log."""
         source = self._source()
-        return {**source.described(), "error": source.error, "offered": offered(source.error)}
+        names = [str(c["name"]) for c in source.raw]
+        return {**source.described(), "error": source.error, "offered": offered(source.error, source.mapping, names)}
 
     def findings(self, asked: Asked) -> Any:
         """Findings of the quality report, null until they are there."""
@@ -89,7 +90,7 @@ class Pages:
         log = self._source().log
         if log is None:
             raise ConfigError("there is no log that could be drawn")
-        return traces(log, number, str(asked.get("group", "velocity")), low, high) if points else {}
+        return traces(log, number, str(asked.get("group", "velocity")), low, high, points)
 
     async def upload(self, request: Request) -> Response:
         """Take a file that was dropped on the page: a log, a held-out log, or a model's YAML file."""
@@ -224,7 +225,7 @@ class Pages:
         horizon = str(asked.get("horizon", "full"))
         if horizon not in HORIZONS:
             raise ConfigError(f"horizon {horizon}: choose {', '.join(HORIZONS)}")
-        return self.trial().run(effects, horizon, number, low, high, points)
+        return self.trial().run(effects, horizon, number, low, high, points, asked.get("whole") is not False)
 
     # --- taking home ---------------------------------------------------------------------------------------------
 

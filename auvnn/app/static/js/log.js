@@ -88,7 +88,7 @@ export class LogScreen {
   trouble(log) {
     return card("This file cannot be read as a log yet",
       h("p", { class: "bad" }, log.error),
-      log.offered && h("p", {}, h("button", { type: "button", class: "primary", id: "offered", onclick: () => this.map({ ...log.mapping, ...log.offered, columns: { ...(log.mapping.columns || {}), ...(log.offered.columns || {}) } }) }, "Use the names that are offered")),
+      log.offered && h("p", {}, h("button", { type: "button", class: "primary", id: "offered", onclick: () => this.map(log.offered) }, "Read it so")),
       h("p", { class: "soft" }, "Below, each channel can be taken from a column of the file."));
   }
 

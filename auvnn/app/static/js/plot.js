@@ -41,6 +41,7 @@ export class Group {
     this.plots.push(plot);
     const legend = h("ul", { class: "key live" }, h("li", {}, at), series.map((one, k) =>
       h("li", {}, h("span", { class: `swatch ${one.look}`, "aria-hidden": "true" }), named ? one.label : null, said[k])));
+    if (!named) legend.classList.add("bare");
     new ResizeObserver(() => {
       const width = holder.clientWidth;
       if (plot.chart && width > 40 && Math.abs(width - plot.chart.width) > 1) plot.chart.setSize({ width, height });

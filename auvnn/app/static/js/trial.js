@@ -55,13 +55,7 @@ export class TryScreen {
     this.meter = h("div", { class: "gauges", role: "status" });
     this.fitPlace = h("div", { class: "stack" });
     if (this.group) this.group.destroy();
-    this.group = new Group(async (from, to, points) => {
-      const data = await get("traces", { group: "velocity", run: this.run, from, to, points });
-      const rates = await get("traces", { group: "rates", run: this.run, from, to, points });
-      this.base = { t: data.t, series: { ...data.series, ...rates.series } };
-      this.follow();
-      return { t: this.base.t, series: { ...this.base.series, ...(this.last || {}) } };
-    });
+    this.group = new Group((from, to, points) => this.whole(from, to, points));
     const group = this.group;
     const plots = DOF.map((d) => group.add({ title: [`${d.velocity}, ${d.word}`, h("span", { class: "soft", "data-error": d.velocity })], label: `${d.word} velocity ${d.velocity}: measured, as it stands, and with these effects`, unit: d.unit, height: 132, named: false,
         series: [{ key: `${d.velocity}0`, label: "as it stands", look: "given" }, { key: `${d.velocity}1`, label: "tried", look: "after" }, { key: d.velocity, label: "measured", look: "measured" }] }));
@@ -72,8 +66,8 @@ export class TryScreen {
           h("p", { class: "soft" }, "Fit finds the values with the uncertain coefficients, and judges by the held-out data."))), this.fitPlace),
         h("div", { class: "stack" }, this.meter,
           card("Free run", h("div", { class: "row spread" },
-            h("div", { class: "row" }, runs.length > 1 ? choice("Run", runs.map((r) => [r.number, `${r.number} (${duration(r.end - r.begin)})`]), this.run, (v) => { this.run = Number(v); this.last = null; group.zoom(null); }) : null,
-              choice("Starts anew", [["full", "never"], ["30", "every 30 s"], ["5", "every 5 s"]], this.horizon, (v) => { this.horizon = v; this.follow(); })),
+            h("div", { class: "row" }, runs.length > 1 ? choice("Run", runs.map((r) => [r.number, `${r.number} (${duration(r.end - r.begin)})`]), this.run, (v) => { this.run = Number(v); group.zoom(null); }) : null,
+              choice("Starts anew", [["full", "never"], ["30", "every 30 s"], ["5", "every 5 s"]], this.horizon, (v) => { this.horizon = v; attempt(() => group.refresh()); })),
             group.controls()),
             key(["measured", "measured"], ["given", "model as it stands"], ["after", "with these effects"]),
             h("div", { class: "plots" }, plots)))));
@@ -113,7 +107,7 @@ export class TryScreen {
     const low = Math.max(p.low, p.null - reach), high = Math.min(p.high, p.null + reach);
     const step = (high - low) / 1000;
     const id = `${entry.effect.name}-${p.name}`;
-    const shown = h("input", { type: "number", step: "any", class: "narrow", "aria-label": `${p.name} of ${entry.effect.name}, ${p.unit === "1" ? "a pure number" : p.unit}`, value: Number(value.toPrecision(5)) });
+    const shown = h("input", { type: "number", step: "any", class: "narrow", "aria-label": `${p.name} of ${entry.effect.name}, ${p.unit === "1" ? "a pure number" : p.unit}`, value: Number(value.toPrecision(4)) });
     const range = h("input", { type: "range", id, min: low, max: high, step, value, "data-effect": entry.effect.name, "data-parameter": p.name, "aria-valuetext": `${number(value, 4)} ${p.unit === "1" ? "" : p.unit}` });
     const set = (v) => {
       const now = Math.min(Math.max(v, p.low), p.high);
@@ -121,12 +115,27 @@ export class TryScreen {
       range.setAttribute("aria-valuetext", `${number(now, 4)} ${p.unit === "1" ? "" : p.unit}`);
       this.follow();
     };
-    range.addEventListener("input", () => { set(range.valueAsNumber); shown.value = Number(range.valueAsNumber.toPrecision(5)); });
+    range.addEventListener("input", () => { set(range.valueAsNumber); shown.value = Number(range.valueAsNumber.toPrecision(4)); });
     shown.addEventListener("change", () => { if (Number.isFinite(shown.valueAsNumber)) { set(shown.valueAsNumber); range.value = entry.values[p.name]; } });
-    const back = known && Number.isFinite(known.value) && h("button", { type: "button", class: "link small", onclick: () => { range.value = known.value; set(known.value); shown.value = Number(known.value.toPrecision(5)); } }, `${fitted ? "fitted" : "estimate"} ${measured(known.value, known.std, p.unit)}`);
+    const back = known && Number.isFinite(known.value) && h("button", { type: "button", class: "link small", onclick: () => { range.value = known.value; set(known.value); shown.value = Number(known.value.toPrecision(4)); } }, `${fitted ? "fitted" : "estimate"} ${measured(known.value, known.std, p.unit)}`);
     return h("div", { class: "slider" },
       h("label", { for: id }, p.name, h("span", { class: "soft" }, p.unit === "1" ? "" : ` ${p.unit}`)), range, shown,
       h("p", { class: "soft" }, back || `${number(low)} to ${number(high)}`));
+  }
+
+  asked(more) {
+    return { effects: Object.fromEntries(this.chosen().map((e) => [e.effect.name, e.values])), horizon: this.horizon, run: this.run, ...more };
+  }
+
+  // What was measured, the model as it stands, and the free run with these effects, over what is in view.
+  async whole(from, to, points) {
+    this.view = null;
+    const view = { from, to, points };
+    const found = await post("try", this.asked(view));
+    this.view = view;
+    this.base = found.traces.series;
+    this.gauge(found);
+    return found.traces;
   }
 
   // One free run at a time; while one is under way only the last wish is remembered.
@@ -145,20 +154,15 @@ export class TryScreen {
     }
   }
 
+  // The same view at the same times: only what was tried is asked for anew.
   async redraw() {
-    if (!this.base) return;
+    const view = this.view;
+    if (!view) return;
     const began = performance.now();
-    const effects = Object.fromEntries(this.chosen().map((e) => [e.effect.name, e.values]));
-    const [from, to] = this.group.range || [null, null];
-    const width = Math.max(...this.group.plots.map((p) => p.holder.clientWidth), 400);
-    const base = this.base;
-    const found = await post("try", { effects, horizon: this.horizon, run: this.run, from, to, points: Math.min(2 * width, 2400) });
-    if (base !== this.base) { this.again = true; return; }
-    const series = {};
-    for (const d of DOF) { series[`${d.velocity}0`] = found.traces.series[`${d.velocity}0`]; series[`${d.velocity}1`] = found.traces.series[d.velocity]; }
-    this.last = series;
-    if (found.traces.t.length === base.t.length) this.group.set({ t: base.t, series: { ...base.series, ...series } });
-    else this.again = true;
+    const found = await post("try", this.asked({ ...view, whole: false }));
+    if (view !== this.view) return;
+    this.base = { ...this.base, ...found.traces.series };
+    this.group.set({ t: found.traces.t, series: this.base });
     this.gauge(found);
     document.dispatchEvent(new CustomEvent("redrawn", { detail: performance.now() - began }));
   }
