@@ -31,11 +31,13 @@ class Child:
         self.hear = hear
         self._lock = threading.Lock()
         self._process: subprocess.Popen[str] | None = None
+        self._closed = False
 
     def warm(self) -> None:
         """Start the process, so that it has loaded what it needs when the first order comes."""
         with self._lock:
-            self._started()
+            if not self._closed:
+                self._started()
 
     def order(self, order: dict[str, Any]) -> None:
         """Send an order.
@@ -44,6 +46,8 @@ class Child:
             AuvnnError: the process cannot be reached.
         """
         with self._lock:
+            if self._closed:
+                raise AuvnnError("the page is being closed: start auvnn app again")
             process = self._started()
             assert process.stdin is not None
             try:
@@ -63,6 +67,12 @@ class Child:
             with contextlib.suppress(OSError):
                 process.kill()
             process.wait()
+
+    def close(self) -> None:
+        """End the process for good."""
+        with self._lock:
+            self._closed = True
+        self.stop()
 
     def _started(self) -> subprocess.Popen[str]:
         if self._process is not None and self._process.poll() is None:

@@ -348,5 +348,5 @@ class Session:
 
     def close(self) -> None:
         """End the child process and take the work folder away."""
-        self.child.stop()
+        self.child.close()
         shutil.rmtree(self.work, ignore_errors=True)
