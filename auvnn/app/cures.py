@@ -82,7 +82,11 @@ def offered(error: str, mapping: dict[str, Any], names: Sequence[str] = ()) -> d
         if not isinstance(read, dict):
             continue
         for name, column in dict(read.pop("columns", None) or {}).items():
-            several = [n for n in names if re.fullmatch(r"thruster_[0-9]+", n)] if name.startswith("thruster_") else []
+            several = (
+                [n for n in names if re.fullmatch(r"thruster_[0-9]+", n)]
+                if name.startswith("thruster_")
+                else []
+            )
             for each in several or [name]:
                 there = new.setdefault("columns", {}).get(each, {"from": each})
                 source = there["from"] if column.get("from") == "..." else column.get("from", each)

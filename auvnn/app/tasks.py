@@ -135,11 +135,9 @@ class Tasks:
         better.model.save(out / "model")
         more = {"held_out_words": order["log"]["words"], "effects_in_model": better.model.effect_names}
         _write(better, out, more)
-        names = {"measured": "measured", "before": "before", "refitted": "refitted", "after": "after"}
-        arrays = {
-            f"{s['run']}:{key}": np.asarray(s[key], dtype=np.float64)
-            for s in better.series
-            for key in ("t", *names)
+        parts = ("t", "measured", "before", "refitted", "after")
+        arrays: dict[str, Any] = {
+            f"{s['run']}:{key}": np.asarray(s[key], float) for s in better.series for key in parts
         }
         with (out / "series.npz").open("wb") as stream:
             np.savez(stream, **arrays)

@@ -88,7 +88,9 @@ class Trial:
         kinds = {"1": stitch(shown, run.number, run.nu)}
         if whole:
             kinds |= {"0": stitch(given, run.number, run.nu), "": run.nu}
-        series = {f"{name}{kind}": trace[piece, k] for kind, trace in kinds.items() for k, name in enumerate(NAMES)}
+        series = {
+            f"{name}{kind}": trace[piece, k] for kind, trace in kinds.items() for k, name in enumerate(NAMES)
+        }
         return {
             "traces": thin(run.t[piece], series, points),
             "error": self._errors(judged or shown),

@@ -78,7 +78,11 @@ class Pages:
         """Columns, mapping and extent of the log."""
         source = self._source()
         names = [str(c["name"]) for c in source.raw]
-        return {**source.described(), "error": source.error, "offered": offered(source.error, source.mapping, names)}
+        return {
+            **source.described(),
+            "error": source.error,
+            "offered": offered(source.error, source.mapping, names),
+        }
 
     def findings(self, asked: Asked) -> Any:
         """Findings of the quality report, null until they are there."""

@@ -37,7 +37,9 @@ def accessible(page, where: str) -> None:
     if script is None:
         return
     page.evaluate(script.read_text(encoding="utf-8"))
-    found = page.evaluate("axe.run().then(r => r.violations.map(v => [v.impact, v.id, v.nodes.map(n => n.html).slice(0, 3)]))")
+    found = page.evaluate(
+        "axe.run().then(r => r.violations.map(v => [v.impact, v.id, v.nodes.map(n => n.html).slice(0, 3)]))"
+    )
     assert not [v for v in found if v[0] in ("serious", "critical")], f"{where}: {found}"
 
 
@@ -109,11 +111,20 @@ def test_the_whole_loop_by_clicks(running, demo_file, tmp_path):
         title(page, "Result")
         drawn(page, 6)
         accessible(page, "result")
-        page.wait_for_function("fetch('api/state').then(r => r.json()).then(s => Object.values(s.answers).every(a => a.report))", timeout=60_000)
+        page.wait_for_function(
+            "fetch('api/state').then(r => r.json()).then(s => Object.values(s.answers).every(a => a.report))",
+            timeout=60_000,
+        )
         page.click("#save")
         page.wait_for_selector("#told p")
         folder = Path(page.inner_text("#told p").removeprefix("Saved: "))
-        assert {p.name for p in folder.iterdir()} >= {"model", "report.html", "comparison.html", "diagnosis.html", "loop.py"}
+        assert {p.name for p in folder.iterdir()} >= {
+            "model",
+            "report.html",
+            "comparison.html",
+            "diagnosis.html",
+            "loop.py",
+        }
         page.screenshot(path=tmp_path / "end.png")
         assert not watched.complaints and not watched.strangers, (watched.complaints, watched.strangers)
         watched.close()
@@ -123,7 +134,9 @@ def test_the_whole_loop_by_clicks(running, demo_file, tmp_path):
         model = auvnn.load(folder / "model")
         assert model.effect_names == ["ocean_current"]
         values = model.effect("ocean_current").values()
-        assert values["v_north"] == pytest.approx(0.15, abs=0.005) and values["v_east"] == pytest.approx(-0.10, abs=0.005)
+        assert values["v_north"] == pytest.approx(0.15, abs=0.005) and values["v_east"] == pytest.approx(
+            -0.10, abs=0.005
+        )
     assert process.returncode == 0, "Ctrl-C is how it ends"
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
@@ -209,7 +222,11 @@ def test_nothing_is_wider_than_the_window(running, server, width):
 
 def test_another_page_is_refused(running, server, tmp_path):
     """A page from elsewhere in the same browser gets nothing, with the token or without."""
-    for headers in ({"Origin": "http://evil.example"}, {"Host": "evil.example"}, {"Sec-Fetch-Site": "cross-site"}):
+    for headers in (
+        {"Origin": "http://evil.example"},
+        {"Host": "evil.example"},
+        {"Sec-Fetch-Site": "cross-site"},
+    ):
         with pytest.raises(urllib.error.HTTPError) as refused:
             urllib.request.urlopen(urllib.request.Request(f"{server}api/state", headers=headers))
         assert refused.value.code == 403
@@ -222,7 +239,9 @@ def test_another_page_is_refused(running, server, tmp_path):
         )
         assert "TypeError" in told, "its own policy forbids it to ask"
         watched.page.goto("about:blank")
-        answer = watched.page.evaluate("url => fetch(url).then(r => r.status, e => String(e))", f"{server}api/state")
+        answer = watched.page.evaluate(
+            "url => fetch(url).then(r => r.status, e => String(e))", f"{server}api/state"
+        )
         assert "TypeError" in str(answer)
         watched.close()
 
@@ -250,7 +269,9 @@ def test_a_slider_moves_and_the_free_run_follows(running, tmp_path):
 
     hidden = {"ocean_current": {"v_north": 0.15, "v_east": -0.1}}
     # Two runs: the second is held out, the first one is ten minutes at 20 Hz.
-    simulate(load("rov95"), "multisine", "realistic", hidden, 0, runs=2, duration=600.0).log.write(tmp_path / "long.parquet")
+    simulate(load("rov95"), "multisine", "realistic", hidden, 0, runs=2, duration=600.0).log.write(
+        tmp_path / "long.parquet"
+    )
     with served(tmp_path, "model=rov95", f"log={tmp_path / 'long.parquet'}") as (address, _):
         watched = Watched(running)
         page = watched.page
@@ -265,7 +286,8 @@ def test_a_slider_moves_and_the_free_run_follows(running, tmp_path):
           const times = [];
           for (let k = 0; k < 50; k++) {
             const began = performance.now();
-            const drawn = new Promise((done) => document.addEventListener("redrawn", () => requestAnimationFrame(() => done()), { once: true }));
+            const after = (done) => () => requestAnimationFrame(() => done());
+            const drawn = new Promise((done) => document.addEventListener("redrawn", after(done), { once: true }));
             slider.value = 0.005 * k;
             slider.dispatchEvent(new Event("input", { bubbles: true }));
             await drawn;

@@ -15,7 +15,9 @@ def _written(path, change):
     import polars as pl
 
     log = make_log(2)
-    pl.concat([change(frame(run).with_columns(pl.lit(run.number).alias("run"))) for run in log.runs]).write_parquet(path)
+    pl.concat(
+        [change(frame(run).with_columns(pl.lit(run.number).alias("run"))) for run in log.runs]
+    ).write_parquet(path)
     return path
 
 
@@ -27,14 +29,14 @@ def test_a_whole_log_asks_for_nothing(tmp_path):
     assert not _errors(Log.read(_written(tmp_path / "a.parquet", lambda f: f)))
 
 
-@pytest.mark.parametrize(
-    ("name", "factor"), [("r", -1.0), ("u", 100.0), ("z", -1.0), ("rates", 180 / np.pi)]
-)
+@pytest.mark.parametrize(("name", "factor"), [("r", -1.0), ("u", 100.0), ("z", -1.0), ("rates", 180 / np.pi)])
 def test_the_button_mends_what_was_broken(tmp_path, name, factor):
     import polars as pl
 
     columns = ["p", "q", "r"] if name == "rates" else [name]
-    path = _written(tmp_path / "broken.parquet", lambda f: f.with_columns([pl.col(c) * factor for c in columns]))
+    path = _written(
+        tmp_path / "broken.parquet", lambda f: f.with_columns([pl.col(c) * factor for c in columns])
+    )
     mapping: dict = {}
     try:
         log = Log.read(path)
@@ -77,7 +79,9 @@ def test_what_the_cures_offer():
         assert len(buttons("z", "is odd", cure)) == count, cure
     (turned,) = buttons("attitude", "", "scale: -1 for qx, qy and qz in the mapping")
     assert turned["change"] == {"scale": {"qx": -1.0, "qy": -1.0, "qz": -1.0}}
-    (late,) = buttons("clock", "u, v are stamped by another clock", "give them the delay in the mapping, u: {delay: 0.3}")
+    (late,) = buttons(
+        "clock", "u, v are stamped by another clock", "give them the delay in the mapping, u: {delay: 0.3}"
+    )
     assert late["change"] == {"delay": {"u": 0.3, "v": 0.3}}
 
 
@@ -95,9 +99,13 @@ def test_an_offered_mapping_can_be_read(tmp_path):
 
 
 def test_what_is_offered_for_one_thruster_counts_for_all():
-    error = "dive.csv: thruster_1 reaches 1900. Mapping: columns: {thruster_1: {from: ..., curve: {neutral: 1500, span: 400}}}"
+    offer = "columns: {thruster_1: {from: ..., curve: {neutral: 1500, span: 400}}}"
+    error = f"dive.csv: thruster_1 reaches 1900. Mapping: {offer}"
     mapping = offered(error, {"columns": {"thruster_2": {"from": "pwm"}}}, ["t", "thruster_1", "thruster_2"])
     curve = {"neutral": 1500, "span": 400}
     assert mapping == {
-        "columns": {"thruster_1": {"from": "thruster_1", "curve": curve}, "thruster_2": {"from": "pwm", "curve": curve}}
+        "columns": {
+            "thruster_1": {"from": "thruster_1", "curve": curve},
+            "thruster_2": {"from": "pwm", "curve": curve},
+        }
     }

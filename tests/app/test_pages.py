@@ -157,7 +157,9 @@ def test_the_loop_by_addresses(asker, dive, tmp_path):
     assert asker.get(f"where-marks?regime={name}&bin=99")[0] == 400
 
     # Tried by hand with the truth the error is next to none, and the report says what compare says.
-    tried = asker.post("try", effects={"ocean_current": {"v_north": 0.3, "v_east": -0.2}}, horizon="full", points=400)
+    tried = asker.post(
+        "try", effects={"ocean_current": {"v_north": 0.3, "v_east": -0.2}}, horizon="full", points=400
+    )
     assert tried["given"]["total"] == pytest.approx(wanted.rollout["5"]["total"], rel=1e-6)
     assert tried["error"]["total"] < 0.05 * tried["given"]["total"]
     np.testing.assert_allclose(tried["traces"]["series"]["u1"], tried["traces"]["series"]["u"], atol=5e-3)
@@ -179,7 +181,9 @@ def test_the_loop_by_addresses(asker, dive, tmp_path):
 
     folder = tmp_path / "mine"
     saved = asker.post("save", folder=str(folder))
-    assert {"model/", "log.parquet", "test.parquet", "improvement.json", "loop.py", "commands.sh"} <= set(saved["holds"])
+    assert {"model/", "log.parquet", "test.parquet", "improvement.json", "loop.py", "commands.sh"} <= set(
+        saved["holds"]
+    )
     assert auvnn.load(folder / "model").effect_names == ["ocean_current"]
     assert asker.post("save", folder=str(folder))[0] == 400, "nothing that is there is replaced"
     assert not [p for p in tmp_path.iterdir() if p.name.startswith(".")], "nothing half-written is left"
@@ -196,13 +200,19 @@ def test_a_stopped_job_leaves_nothing_and_the_next_one_runs(asker, dive):
     asker.post("stop")
     state = asker.get("state")
     assert state["job"]["state"] == "stopped" and "diagnosis" not in state["answers"]
-    assert not list((asker.session.work / "answers").glob("*")) if (asker.session.work / "answers").exists() else True
+    assert (
+        not list((asker.session.work / "answers").glob("*"))
+        if (asker.session.work / "answers").exists()
+        else True
+    )
     asker.post("start", kind="compare")
     assert asker.wait()["job"]["state"] == "done"
 
 
 def test_the_child_ends_when_its_server_is_gone():
-    child = subprocess.Popen([sys.executable, "-m", "auvnn.app.worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    child = subprocess.Popen(
+        [sys.executable, "-m", "auvnn.app.worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
     assert child.stdin is not None
     child.stdin.close()
     assert child.wait(60) == 0
@@ -211,7 +221,9 @@ def test_the_child_ends_when_its_server_is_gone():
 def test_the_saved_script_is_python_and_names_what_was_done():
     from auvnn.app.script import Told, commands, python
 
-    told = Told("my rov.yaml", "thrusters", (("ocean_current",), ("net_buoyancy", "thruster_lag")), True, True)
+    told = Told(
+        "my rov.yaml", "thrusters", (("ocean_current",), ("net_buoyancy", "thruster_lag")), True, True
+    )
     compile(python(told), "loop.py", "exec")
     assert python(told).count("auvnn.add(") == 2
     lines = commands(told, Path("/data/a dive"))
