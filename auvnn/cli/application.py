@@ -159,7 +159,12 @@ def _run(verb: Verb, composer: Composer, config: DictConfig, out: Path) -> None:
         for key in verb.reads:
             if options[key] is not None:
                 say(f"would read   {key}={options[key]}")
-        say(f"would write  {', '.join(verb.writes)} in {out}")
+        if verb.writes:
+            say(f"would write  {', '.join(verb.writes)} in {out}")
+        return
+    if not verb.writes:
+        # It writes what its user asks for while it runs, and nothing of its own.
+        say.answer(verb.run(Job(options, out, out, say)).to_dict())
         return
     with written(out, overwrite=options["overwrite"]) as folder:
         answer = verb.run(Job(options, out, folder, say))

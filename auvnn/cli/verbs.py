@@ -17,6 +17,7 @@ VERBS = Catalogue(
         "adapt": "auvnn.cli.adapt:VERB",
         "fleet": "auvnn.cli.fleet:VERB",
         "demo": "auvnn.cli.demo:VERB",
+        "app": "auvnn.cli.app:VERB",
         "study": "auvnn.cli.study:VERB",
         "benchmark": "auvnn.cli.benchmark:VERB",
     },

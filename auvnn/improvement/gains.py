@@ -31,7 +31,9 @@ def paired_gain(before: Rolled, after: Rolled, scale: Scale) -> tuple[float, flo
     return value, float(np.sqrt((n - 1) / n * np.sum((np.array(without) - np.mean(without)) ** 2)))
 
 
-def noise_floor(model: GreyBox, rolled: Rolled, log: Log, scale: Scale, seed: int = 0) -> float:
+def noise_floor(
+    model: GreyBox, rolled: Rolled, log: Log, scale: Scale, seed: int = 0, engine: str = "torch"
+) -> float:
     """Return the free-running error that a perfect model would show: noise of the outputs and of the start.
 
     The model's own predictions stand for the truth; they are started again from states with noise as large
@@ -51,8 +53,8 @@ def noise_floor(model: GreyBox, rolled: Rolled, log: Log, scale: Scale, seed: in
         axis=1,
     )
     with torch.no_grad():
-        true = predict(model, windows, states)[1].numpy()
-        started = predict(model, windows, moved(states, torch.as_tensor(kick)))[1].numpy()
+        true = predict(model, windows, states, engine=engine)[1].numpy()
+        started = predict(model, windows, moved(states, torch.as_tensor(kick)), engine=engine)[1].numpy()
     error = true + rng.normal(size=true.shape) * noise_nu - started
     mask = windows.mask[..., 6:12].numpy().copy()
     mask[:, 0] = 0.0
