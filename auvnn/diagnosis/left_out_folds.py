@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from auvnn.diagnosis.explain import FOLDS
 from auvnn.errors import InputError
-from auvnn.logs import Log
+from auvnn.logs import Log, Run
 
 # Runs are left out one at a time up to so many; beyond that, so many groups of runs.
 MOST_FOLDS = 8
@@ -37,7 +38,7 @@ def folds_of(log: Log, most: int = MOST_FOLDS) -> list[Fold]:
     Raises:
         InputError: a single run is too short for that.
     """
-    runs = log.runs
+    runs: tuple[Run, ...] = tuple(log.runs)
     if len(runs) > 1:
         groups = np.arange(len(runs)) % min(most, len(runs))
         return [
@@ -51,12 +52,13 @@ def folds_of(log: Log, most: int = MOST_FOLDS) -> list[Fold]:
             )
             for k in np.unique(groups)
         ]
-    run, found = runs[0], []
+    run = runs[0]
+    found: list[Fold] = []
     edges = np.searchsorted(run.t, run.t[0] + run.duration * np.arange(1, FOLDS) / FOLDS)
     edges = [0, *edges.tolist(), run.samples]
     if min(np.diff(edges)) < 3:
         raise InputError(f"{log.name} has {run.samples} samples: too few to leave out a fifth of them")
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         rest = [slice(0, a), slice(b, run.samples)]
         kept = [run.cut(s, number=run.number + k) for k, s in enumerate(rest) if s.stop - s.start > 2]
         found.append(
