@@ -113,9 +113,10 @@ def any_force(explanation: Explanation, windows: Windows, sigma: Array) -> Unnam
     model = fitted.model
     times = windows.times[:, windows.warmup :]
     probe = AnyForce(model, float((times[:, -1] - times[:, 0]).max()))
-    asked = GreyBox(model.vehicle, [*model.copied_effects(), probe], model.damping, model.actuation)
+    asked = model.beside(probe)
     names = [*explanation.names, str(probe.name)]
     sums, _, _ = reduce(windows, answers(asked, windows, fitted.initial, names), sigma)
+    sums = sums.finite()
     known = len(fitted.theta)
     # What is known takes its share first: the fit weighed the channels otherwise.
     prior = fitted.priors.precision

@@ -6,7 +6,8 @@ Forward, one effect at a time; and backward: what was taken before must still be
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from auvnn.diagnosis.score import Score, inflation
 from auvnn.effects import effect_class
 from auvnn.metrics.windows import Windows
 from auvnn.training.free_parameters import parameters_of, set_parameters
+from auvnn.training.prediction_error import FitError
 
 Array = NDArray[np.float64]
 ALPHA = 0.05
@@ -39,12 +41,14 @@ class Choice:
         best: the explanation that is taken; None where none pays.
         tried: all that were refitted.
         rivals: where ambiguous, the explanations between which the log cannot decide; the first is the one taken.
+        failed: effects whose fit failed, and why, in words.
     """
 
     verdict: str
     best: Explanation | None
     tried: list[Explanation]
     rivals: list[Explanation]
+    failed: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -86,7 +90,19 @@ class Chooser:
         # Evidence counts an effect of many parameters low while it is small; a test that is clear even among
         # all the others lets it be judged by what it does on runs left out.
         clear = {s.effect for s in significant if s.p_value < ALPHA / len(scores)}
-        tried = [self._refitted(s, at, base, chosen, current) for s in leading]
+        tried, failed = [], {}
+        for candidate in leading:
+            try:
+                tried.append(self._refitted(candidate, at, base, chosen, current))
+            except FitError as problem:
+                failed[candidate.effect] = f"its fit failed: {problem}"
+        found = self._among(tried, clear, at, base, current)
+        return replace(found, failed=failed)
+
+    def _among(
+        self, tried: list[Explanation], clear: set[str], at: Layout, base: list[str], current: Explanation
+    ) -> Choice:
+        """Weigh explanations that have been fitted, and take the one that explains best."""
         if not tried:
             return Choice("unknown", None, [], [])
         factor = min(self._factor(e) for e in tried)
@@ -123,10 +139,13 @@ class Chooser:
         more = [s for s in significant if s not in leading and s.gain - most > chi2.isf(ALPHA_NEEDED, s.degrees)]
         return sorted(more, key=lambda s: s.degrees - s.gain)[:1]
 
-    def _settled(self, best: Explanation, at: Layout, base: list[str]) -> Explanation:
+    def _settled(self, best: Explanation, at: Layout, base: Sequence[str]) -> Explanation:
         """Return an explanation refitted with the weights that follow from the errors that it leaves."""
         guess = replace(at, model=best.fitted.model)
-        return explain(self.layout, self.windows, base, best.effects, start=best.fitted, guess=guess)
+        try:
+            return explain(self.layout, self.windows, base, best.effects, start=best.fitted, guess=guess)
+        except FitError:
+            return best
 
     def _instead(
         self, taken: Explanation, base: Sequence[str], name: str, other: Explanation
@@ -164,7 +183,11 @@ class Chooser:
         name = group[0].effects[-1]
         others = tuple(e for e in taken.effects if e != name)
         first = replace(taken, effects=(*others, name))
-        members = [first, *(self._instead(taken, base, name, e) for e in group[1:])]
+        members = [first]
+        for other in group[1:]:
+            # One that cannot be fitted beside what was found since is no rival any more.
+            with suppress(FitError):
+                members.append(self._instead(taken, base, name, other))
         factor = min(self._factor(e) for e in members)
         best, *more = sorted((weigh(self.layout, e, factor) for e in members), key=lambda e: -e.evidence)
         left = [best, *(e for e in more if not self.rivals.told_apart(best, e))]
@@ -172,11 +195,7 @@ class Chooser:
         left.sort(key=lambda e: e.effects[-1] not in plainer)
         if left[0].effects[-1] == name:
             return left
-        guess = replace(self.layout, model=left[0].fitted.model)
-        return [
-            explain(self.layout, self.windows, base, left[0].effects, start=left[0].fitted, guess=guess),
-            *left[1:],
-        ]
+        return [self._settled(left[0], self.layout, list(base)), *left[1:]]
 
     def _joined(
         self, best: Explanation, other: Explanation, at: Layout, base: list[str], factor: float
@@ -185,18 +204,14 @@ class Chooser:
 
         Of two effects that are both missing, one alone may do as badly as the other.
         """
-        both = self.rivals.together(best, other, at, base)
+        try:
+            both = self.rivals.together(best, other, at, base)
+        except FitError:
+            return None
         gain = weigh(self.layout, both, factor).evidence - best.evidence
         if gain < ODDS or not pays(both, best):
             return None
-        return explain(
-            self.layout,
-            self.windows,
-            base,
-            both.effects,
-            start=both.fitted,
-            guess=replace(at, model=both.fitted.model),
-        )
+        return self._settled(both, at, base)
 
     def withdrawn(self, taken: Explanation, base: Sequence[str]) -> tuple[Explanation, list[str]]:
         """Return the explanation without those effects that it no longer needs, and their names.
@@ -214,28 +229,25 @@ class Chooser:
             self.say(f"asking whether {name} is still needed")
             model = taken.fitted.model.rebuilt(taken.fitted.model.copied_effects())
             set_parameters(model, [name], self.layout.means[name])
-            without = explain(
-                self.layout,
-                self.windows,
-                base,
-                left,
-                start=taken.fitted,
-                guess=replace(self.layout, model=model),
-                sigma=taken.fitted.sigma,
-                iterations=6,
-            )
-            factor = self._factor(taken)
-            needed = weigh(self.layout, taken, factor).evidence > weigh(self.layout, without, factor).evidence
-            if not needed or not pays(taken, without):
-                gone.append(name)
-                taken = explain(
+            try:
+                without = explain(
                     self.layout,
                     self.windows,
                     base,
                     left,
-                    start=without.fitted,
-                    guess=replace(self.layout, model=without.fitted.model),
+                    start=taken.fitted,
+                    guess=replace(self.layout, model=model),
+                    sigma=taken.fitted.sigma,
+                    iterations=6,
                 )
+            except FitError:
+                # What cannot be fitted without it needs it.
+                continue
+            factor = self._factor(taken)
+            needed = weigh(self.layout, taken, factor).evidence > weigh(self.layout, without, factor).evidence
+            if not needed or not pays(taken, without):
+                gone.append(name)
+                taken = self._settled(without, self.layout, base)
         return taken, gone
 
     def without(self, taken: Explanation, base: Sequence[str], names: Sequence[str]) -> Explanation:
@@ -255,22 +267,30 @@ class Chooser:
         guess = at.model.rebuilt(at.model.copied_effects())
         known = parameters_of(at.model, [name])
         start, shape = begun(self.layout, name, candidate.estimate), shapes(self.layout, name)
+        found: Explanation | None = None
+        problem: FitError | None = None
         for share in SHARES:
             begin = np.where(shape, start, known + share * (start - known))
             set_parameters(guess, [name], begin)
-            found = explain(
-                self.layout,
-                self.windows,
-                base,
-                [*chosen, name],
-                start=current.fitted,
-                guess=replace(at, model=guess),
-                sigma=current.fitted.sigma,
-                iterations=6,
-            )
+            try:
+                found = explain(
+                    self.layout,
+                    self.windows,
+                    base,
+                    [*chosen, name],
+                    start=current.fitted,
+                    guess=replace(at, model=guess),
+                    sigma=current.fitted.sigma,
+                    iterations=6,
+                )
+            except FitError as fault:
+                problem = fault
+                continue
             # It holds the fit without the effect: one that is worse than that has gone astray.
             if found.fitted.cost <= current.fitted.cost:
                 break
+        if found is None:
+            raise problem or FitError(f"{name} has nowhere to begin")
         return found
 
     def _without(self, after: Explanation, base: list[str], current: Explanation) -> Explanation:
@@ -281,15 +301,18 @@ class Chooser:
         effect = after.effects[-1]
         if effect not in base:
             return current
-        return explain(
-            self.layout,
-            self.windows,
-            [n for n in base if n != effect],
-            after.effects[:-1],
-            start=current.fitted,
-            sigma=current.fitted.sigma,
-            iterations=6,
-        )
+        try:
+            return explain(
+                self.layout,
+                self.windows,
+                [n for n in base if n != effect],
+                after.effects[:-1],
+                start=current.fitted,
+                sigma=current.fitted.sigma,
+                iterations=6,
+            )
+        except FitError:
+            return current
 
     @staticmethod
     def _factor(explanation: Explanation) -> float:

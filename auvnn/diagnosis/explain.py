@@ -13,7 +13,7 @@ from auvnn.diagnosis.score import inflation
 from auvnn.diagnosis.strays import fit_with_strays
 from auvnn.metrics.windows import Windows
 from auvnn.training.free_parameters import Priors
-from auvnn.training.prediction_error import Fitted, fit
+from auvnn.training.prediction_error import Fitted
 from auvnn.training.window_sums import Statistics
 
 Array = NDArray[np.float64]
@@ -120,15 +120,15 @@ def explain(
         guess: a layout whose model holds values to start from.
         sigma: fixed weights; estimated where absent.
         iterations: at most this many steps of the fit.
+
+    Raises:
+        FitError: the fit has nowhere to begin.
     """
     names = tuple(dict.fromkeys([*base, *effects]))
     held = priors(layout, names, free=effects)
     model = (guess or layout).model
-    if start is None and sigma is None:
-        fitted = fit_with_strays(model, windows, names, held, iterations=iterations)
-    else:
-        initial = None if start is None else start.initial
-        fitted = fit(model, windows, names, held, initial=initial, sigma=sigma, iterations=iterations)
+    initial = None if start is None else start.initial
+    fitted = fit_with_strays(model, windows, names, held, iterations=iterations, initial=initial, sigma=sigma)
     judged = plausible(layout, names, effects, held, fitted.theta)
     cost = left_out(fitted.statistics, fitted.theta, judged, folds(windows.run))
     count = fitted.statistics.count[:, np.isfinite(fitted.sigma)].sum(1)

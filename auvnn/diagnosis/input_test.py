@@ -96,14 +96,14 @@ def _by_part(
     """
     fitted = explanation.fitted
     model, known = fitted.model, len(fitted.theta)
-    asked = GreyBox(model.vehicle, [*model.copied_effects(), probe], model.damping, model.actuation)
+    asked = model.beside(probe)
     columns = [np.concatenate([np.arange(known), known + probe.columns(i)]) for i in range(6)]
     begin = 0
     for answer in answers(asked, windows, fitted.initial, [*explanation.names, str(probe.name)]):
         part = windows.pick(slice(begin, begin + len(answer.error)))
         begin += len(answer.error)
         each = [Response(answer.error, answer.state, answer.parameters[..., c]) for c in columns]
-        yield [reduce(part, [one], sigma)[0] for one in each]
+        yield [reduce(part, [one], sigma)[0].finite() for one in each]
 
 
 class _Sums:

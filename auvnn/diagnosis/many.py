@@ -191,7 +191,7 @@ def layout_with(under_way: Search, names: Sequence[str]) -> Layout:
     keep = [*under_way.base, *names]
     effects = [e for e in whole.model.copied_effects() if str(e.name) in keep]
     bare = [e for e in effects if str(e.name) not in names or str(e.name) in under_way.base]
-    model = GreyBox(whole.model.vehicle, bare, whole.model.damping, whole.model.actuation)
+    model = whole.model.sharing(bare)
     laid = lay_out(model, names, whole.spreads.get("learned_drag"))
     # What was stated of each stays what was stated, whatever has been fitted since.
     means = {n: whole.means[n] for n in laid.names}

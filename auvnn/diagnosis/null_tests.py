@@ -95,7 +95,7 @@ class NullTests:
             answers(asked.layout.model, self.windows, found.fitted.initial, asked.layout.model.effect_names),
             found.fitted.sigma,
         )
-        return sums, at, asked
+        return sums.finite(), at, asked
 
     def _closer(
         self,

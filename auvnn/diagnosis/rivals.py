@@ -13,6 +13,7 @@ from auvnn.diagnosis.nuisance import Layout
 from auvnn.effects import effect_class
 from auvnn.metrics.windows import Windows
 from auvnn.training.free_parameters import parameters_of, set_parameters
+from auvnn.training.prediction_error import FitError
 
 # Odds of a hundred to one: below that two explanations are not told apart. Several of them compete in every log, and
 # at twenty to one a wrong one wins now and then by chance.
@@ -70,7 +71,10 @@ class Rivals:
         extra = len(self.layout.columns[other.effects[-1]])
         if best.misfit - other.misfit <= chi2.isf(ALPHA_REFUTED, extra):
             return False
-        both = weigh(self.layout, self.together(other, best, at, base), factor)
+        try:
+            both = weigh(self.layout, self.together(other, best, at, base), factor)
+        except FitError:
+            return False
         own = len(self.layout.columns[best.effects[-1]])
         return bool(other.misfit - both.misfit < chi2.isf(ALPHA_NEEDED, own))
 

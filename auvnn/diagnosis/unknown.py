@@ -41,9 +41,10 @@ def depends_on(explanation: Explanation, windows: Windows) -> dict[str, dict[str
         return found
     probe = InputForces(fitted.model, windows)
     model = fitted.model
-    asked = GreyBox(model.vehicle, [*model.copied_effects(), probe], model.damping, model.actuation)
+    asked = model.beside(probe)
     names = [*explanation.names, str(probe.name)]
     sums, _, _ = reduce(windows, answers(asked, windows, fitted.initial, names), fitted.sigma)
+    sums = sums.finite()
     known = len(fitted.theta)
     scale = np.array([p.scale for p in probe.parameters_of])
     chosen = list(range(known))

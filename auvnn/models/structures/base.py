@@ -43,17 +43,23 @@ class Structure(GreyBox):
         """Return the options that build this structure again, as plain data."""
         raise TypeError(f"model structure '{type(self).__name__}' does not state its options")
 
-    def rebuilt(self, effects: Iterable[Effect], vehicle: Vehicle | None = None) -> GreyBox:
-        """Return the same structure, its learned parts copied, with other effects or other numbers."""
+    def _like(self, effects: Iterable[Effect], vehicle: Vehicle, actuation: str, *, shared: bool) -> GreyBox:
+        """Return the same structure with other effects or other numbers, its learned parts shared or copied."""
         from auvnn.models.structures import build_structure
 
         made = build_structure(
-            self.structure, vehicle or self.vehicle, effects=list(effects), actuation=self.actuation,
-            **self.structure_options(),
-        )  # fmt: skip
+            self.structure, vehicle, effects=list(effects), actuation=actuation, **self.structure_options()
+        )
         assert isinstance(made, Structure)
-        made.learned.load_state_dict(copy.deepcopy(self.learned.state_dict()))
+        if shared:
+            made.take(self)
+        else:
+            made.learned.load_state_dict(copy.deepcopy(self.learned.state_dict()))
         return made.to(self._known("mass"))
+
+    def take(self, other: Structure) -> None:
+        """Use the learned parts of another model of the same structure instead of one's own."""
+        self.learned = other.learned
 
 
 def learned_parameters(model: GreyBox) -> list[nn.Parameter]:
