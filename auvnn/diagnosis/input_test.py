@@ -19,7 +19,6 @@ from auvnn.diagnosis.input_forces import AXES, InputForces
 from auvnn.diagnosis.nuisance import Layout, shapes
 from auvnn.diagnosis.score import inflation
 from auvnn.metrics.windows import Windows
-from auvnn.models import GreyBox
 from auvnn.training.sensitivity import Response
 from auvnn.training.window_sums import Statistics, answers, reduce
 

@@ -9,7 +9,6 @@ from auvnn.diagnosis.explain import Explanation, folds, left_out
 from auvnn.diagnosis.input_forces import AXES, InputForces
 from auvnn.diagnosis.left_over import excess
 from auvnn.metrics.windows import Windows
-from auvnn.models import GreyBox
 from auvnn.training.free_parameters import Priors
 from auvnn.training.window_sums import Statistics, answers, reduce
 

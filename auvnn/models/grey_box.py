@@ -196,7 +196,7 @@ class GreyBox(nn.Module):
         return self._like(effects, self.vehicle, self.actuation, shared=True)
 
     def beside(self, *effects: Effect) -> GreyBox:
-        """Return the model with further effects, probes among them; those that it has are copied, learned parts shared."""
+        """Return the model with further effects, probes among them: its own are copied, learned parts shared."""
         return self.sharing([*self.copied_effects(), *effects])
 
     def _like(self, effects: Iterable[Effect], vehicle: Vehicle, actuation: str, *, shared: bool) -> GreyBox:

@@ -188,7 +188,8 @@ def fit(
         converged = False
         statistics, a, slopes = reduce(windows, here, sigma)
     if not _sound(statistics, a, slopes):
-        raise FitError(f"the fit of {', '.join(names) or 'the initial states'} has no finite errors: choose shorter windows")
+        what = ', '.join(names) or 'the initial states'
+        raise FitError(f"the fit of {what} has no finite errors: choose shorter windows with window=")
     initial = moved(initial, torch.as_tensor(a))
     total = float(statistics.cost.sum()) + penalty(theta)
     return Fitted(model, names, theta, initial, sigma, statistics, priors, total, converged, taken)
