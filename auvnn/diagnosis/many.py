@@ -32,7 +32,7 @@ from auvnn.diagnosis.diagnose import searched
 from auvnn.diagnosis.nuisance import Layout, lay_out
 from auvnn.diagnosis.null_tests import together
 from auvnn.diagnosis.passes import Passes, Point
-from auvnn.diagnosis.search import Search
+from auvnn.diagnosis.state import Searched
 from auvnn.diagnosis.told import told as parameters_told
 from auvnn.diagnosis.whole import Look, Refit, look, refit
 from auvnn.errors import ConfigError, InputError
@@ -176,7 +176,7 @@ def _sample(plan: Plan, paths: Sequence[Path], cut: Cut, most: int) -> tuple[Log
     }
 
 
-def _leading(found: Diagnosis, under_way: Search, count: int | None) -> list[str]:
+def _leading(found: Diagnosis, under_way: Searched, count: int | None) -> list[str]:
     """Return the effects to test on the whole: those found, and those that led on the sample."""
     tested = [c["effect"] for c in found.candidates if c["p_value"] is not None]
     tested = [n for n in tested if n in under_way.usable and n not in under_way.silent]
@@ -185,7 +185,7 @@ def _leading(found: Diagnosis, under_way: Search, count: int | None) -> list[str
     return [*first, *[n for n in tested if n not in first][: count if count is not None else len(tested)]]
 
 
-def layout_with(under_way: Search, names: Sequence[str]) -> Layout:
+def layout_with(under_way: Searched, names: Sequence[str]) -> Layout:
     """Return the search's layout with none of the candidates in it but those named."""
     whole = under_way.layout
     keep = [*under_way.base, *names]
@@ -199,7 +199,7 @@ def layout_with(under_way: Search, names: Sequence[str]) -> Layout:
 
 
 def _look(
-    passes: Passes, model: GreyBox, under_way: Search, asked: list[str], cut: Cut
+    passes: Passes, model: GreyBox, under_way: Searched, asked: list[str], cut: Cut
 ) -> tuple[Look, Layout]:
     layout, null = layout_with(under_way, asked), under_way.first
     assert null is not None  # the search has run

@@ -1,10 +1,10 @@
 """How large a force without a name is: its root mean square, an upper limit, and the smallest that would have shown.
 
-The force is the one of `any_force`: in every window a Fourier series of its own, whose coefficients are independent normal
-ones with a common variance v in each degree of freedom. The variance is that of the largest marginal likelihood; its
-upper limit the one at which twice the logarithm has fallen by 2.71, which is exceeded in one of twenty logs (Wilks 1938,
-Annals of Mathematical Statistics 9(1) 60-62). With a mean and K pairs of sine and cosine of variance v each, the mean
-square over a window is v (1 + K).
+The force is the one of `any_force`: in every window a Fourier series of its own, whose coefficients are independent
+normal ones with a common variance v in each degree of freedom. The variance is that of the largest marginal likelihood.
+Its upper limit is the one at which twice the logarithm has fallen by 2.71, which is exceeded in one of twenty logs
+(Wilks 1938, Annals of Mathematical Statistics 9(1) 60-62). With a mean and K pairs of sine and cosine of variance v each,
+the mean square over a window is v (1 + K).
 """
 
 from __future__ import annotations

@@ -27,6 +27,8 @@ from auvnn.training.sensitivity import Response
 from auvnn.training.window_sums import TRUST, Statistics, answers, cost_of, motion, reduce, spread
 
 Array = NDArray[np.float64]
+# What torch raises where a matrix has no inverse.
+SINGULAR = torch.linalg.LinAlgError  # pyright: ignore[reportPrivateImportUsage]
 
 
 class FitError(InputError):
@@ -188,7 +190,7 @@ def fit(
         converged = False
         statistics, a, slopes = reduce(windows, here, sigma)
     if not _sound(statistics, a, slopes):
-        what = ', '.join(names) or 'the initial states'
+        what = ", ".join(names) or "the initial states"
         raise FitError(f"the fit of {what} has no finite errors: choose shorter windows with window=")
     initial = moved(initial, torch.as_tensor(a))
     total = float(statistics.cost.sum()) + penalty(theta)
@@ -218,7 +220,7 @@ def _answered(
     """Return the windows' answers; None where the equations cannot be solved, such as with a singular inertia."""
     try:
         return list(answers(model, windows, initial, names))
-    except torch.linalg.LinAlgError:
+    except SINGULAR:
         return None
 
 

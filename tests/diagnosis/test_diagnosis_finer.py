@@ -9,7 +9,6 @@ from small_logs import make_log, small_vehicle
 
 from auvnn.diagnosis.cut import windows_for
 from auvnn.diagnosis.finer import finer
-from auvnn.diagnosis.search import Search
 from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.windows import VELOCITY
 from auvnn.models import GreyBox
@@ -51,15 +50,12 @@ def test_noise_hides_what_steps_get_wrong_and_they_stay(model, windows):
 
 
 def test_a_search_goes_on_with_shorter_steps(model, windows, monkeypatch):
-    from auvnn.diagnosis import diagnose
+    from auvnn.diagnosis.diagnose import searched
 
     def halved(model, windows, initial, sigma):
         return windows if windows.max_step < 0.05 else type(windows)(**{**vars(windows), "max_step": 0.025})
 
-    seen = []
-    monkeypatch.setattr("auvnn.diagnosis.search.finer", halved)
-    monkeypatch.setattr(Search, "_rest", lambda self, current: seen.append(self) or "adequate")
+    monkeypatch.setattr("auvnn.diagnosis.stages.finer", halved)
     log = make_log(model, runs=2, duration=8.0, noise=1.0)
-    assert diagnose(model, log, ["net_buoyancy"], whiteness=False).verdict == "adequate"
-    (search,) = seen
-    assert {search.windows.max_step, search.chooser.windows.max_step, search.tests.windows.max_step} == {0.025}
+    found, search = searched(model, log, ["net_buoyancy"], whiteness=False)
+    assert found.verdict == "adequate" and search.state.windows.max_step == 0.025

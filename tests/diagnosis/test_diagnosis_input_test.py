@@ -62,8 +62,8 @@ def told(monkeypatch, found, left=0.05, p_value=1.0):
         energy = left if explanation.effects else 1.0
         return Unnamed(np.zeros(6), np.array([p_value / 6, *np.ones(5)]), energy * np.eye(6)[0], {"X": 1.0})
 
-    monkeypatch.setattr("auvnn.diagnosis.search.any_force", some_left)
-    monkeypatch.setattr("auvnn.diagnosis.search.input_force", lambda *_: found)
+    monkeypatch.setattr("auvnn.diagnosis.what_is_left.any_force", some_left)
+    monkeypatch.setattr("auvnn.diagnosis.what_is_left.input_force", lambda *_: found)
 
 
 @pytest.mark.parametrize(
