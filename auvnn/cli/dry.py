@@ -23,15 +23,15 @@ def foreseen(job: Job) -> None:
         if options.get(key) is not None:
             _names(job, key, model)
     if "window" in options:
-        from auvnn.diagnosis.cut import check_window
+        from auvnn.diagnosis.hypotheses.candidates import check_window_length
 
-        check_window(options["window"])
+        check_window_length(options["window"])
 
 
 def _beginnings(job: Job) -> tuple[str, ...] | None:
     """Return what commands the first rows of the log have; None where there is no log."""
-    from auvnn.logs.mapping import Mapping
-    from auvnn.logs.portions import kinds_of
+    from auvnn.logs.reading.mapping import Mapping
+    from auvnn.logs.reading.portions import kinds_of
 
     mapping, found = job.mapping(), None
     if mapping is not None:
@@ -68,5 +68,7 @@ def _names(job: Job, key: str, model: Any) -> None:
             raise ConfigError(f"the model has {name} already: remove it first, or name another effect")
         lacking = kind.lacks(model.vehicle, model.actuation)
         if lacking and key != "effects":
-            raise ConfigError(f"{name} needs {lacking[0]}, which the file of {model.vehicle.name} does not state")
+            raise ConfigError(
+                f"{name} needs {lacking[0]}, which the file of {model.vehicle.name} does not state"
+            )
         kind.build(model.vehicle, model.actuation, values)

@@ -8,22 +8,22 @@ from typing import Any
 import numpy as np
 
 from auvnn.diagnosis.advise import advise
-from auvnn.diagnosis.answer import Diagnosis, OneOf
-from auvnn.diagnosis.any_force import white
+from auvnn.diagnosis.answers.answer import Diagnosis, OneOf
+from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.bounds import reservations
-from auvnn.diagnosis.cut import HORIZON, WARMUP
-from auvnn.diagnosis.explain import Explanation
-from auvnn.diagnosis.input_test import input_force
+from auvnn.diagnosis.hypotheses.candidates import HORIZON, WARMUP
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.layout import has_stated_uncertainty
 from auvnn.diagnosis.joint import joint
 from auvnn.diagnosis.moved import moved
-from auvnn.diagnosis.nuisance import stated
 from auvnn.diagnosis.partial import without
-from auvnn.diagnosis.residual_tests import residual_tests
+from auvnn.diagnosis.residuals.additive_force import additive_force_test
+from auvnn.diagnosis.residuals.attribution import attribute_residual
+from auvnn.diagnosis.residuals.variance_component import white
+from auvnn.diagnosis.residuals.whiteness import residual_tests
 from auvnn.diagnosis.state import Setting, State
-from auvnn.diagnosis.table import fill
-from auvnn.diagnosis.unknown import depends_on
 from auvnn.diagnosis.worth import Worth, names_by_worth, worth
-from auvnn.training.prediction_error import FitError
+from auvnn.estimation.prediction_error import FitError
 
 # A force of one measured input that is surer than this is told where no smooth function of the inputs was sure enough.
 SURE = 0.01
@@ -73,7 +73,7 @@ def answer(asked: Setting, state: State) -> Diagnosis:
     )
 
 
-def _beside(asked: Setting, state: State) -> dict[str, Explanation]:
+def _beside(asked: Setting, state: State) -> dict[str, FittedHypothesis]:
     """Return the fit without each name of the answer, everything else refitted."""
     found = {}
     for name in state.current.effects:
@@ -84,7 +84,7 @@ def _beside(asked: Setting, state: State) -> dict[str, Explanation]:
     return found
 
 
-def _worth(asked: Setting, state: State, beside: Mapping[str, Explanation], notes: list[str]) -> Worth:
+def _worth(asked: Setting, state: State, beside: Mapping[str, FittedHypothesis], notes: list[str]) -> Worth:
     try:
         return worth(asked, state, beside)
     except (np.linalg.LinAlgError, FloatingPointError):
@@ -93,14 +93,14 @@ def _worth(asked: Setting, state: State, beside: Mapping[str, Explanation], note
 
 
 def _candidates(
-    asked: Setting, state: State, given: list[str], beside: Mapping[str, Explanation]
+    asked: Setting, state: State, given: list[str], beside: Mapping[str, FittedHypothesis]
 ) -> list[dict[str, Any]]:
     """Return the table of candidates, those given first, then by their evidence."""
     table = dict(state.table)
     # What was tried alone at first has other values beside what was found since.
     for explanation in (e for group in state.groups for e in group):
-        table = fill(asked.layout, table, explanation, state.first)
-    table = fill(asked.layout, table, state.current, state.first, beside)
+        table = fill_candidate(asked.layout, table, explanation, state.first)
+    table = fill_candidate(asked.layout, table, state.current, state.first, beside)
     for name, reason in state.failed.items():
         if name not in state.current.effects:
             table[name] = {**table[name], "reason": reason}
@@ -124,13 +124,13 @@ def _depends(asked: Setting, state: State, verdict: str, notes: list[str]) -> di
         return {}
     asked.say("tracing what is left to the measured inputs")
     try:
-        found = depends_on(state.current, state.windows)
+        found = attribute_residual(state.current, state.windows)
         if any(found.values()):
             return found
         traced = state.traced
         if traced is None or state.current is state.first:
             noise = white(state.current, asked.floor)
-            traced = input_force(state.current, asked.layout, state.windows, noise, (), SURE)
+            traced = additive_force_test(state.current, asked.layout, state.windows, noise, (), SURE)
     except np.linalg.LinAlgError:
         notes.append("what is left could not be traced to the measured inputs: its sums cannot be solved")
         return {}
@@ -180,7 +180,7 @@ def _warnings(asked: Setting, state: State) -> list[str]:
         found.append(
             f"{log.name} says nothing about {', '.join(state.silent)}: nothing in it depends on {them}"
         )
-    if not stated(asked.model):
+    if not has_stated_uncertainty(asked.model):
         found.append("no coefficient of the model is uncertain: any error of theirs will be given a name")
     found += reservations(asked.layout, state.current, state.current.effects)
     found += [f"{name} was no candidate any more: {why}" for name, why in state.failed.items()]

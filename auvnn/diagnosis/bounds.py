@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from auvnn.diagnosis.explain import Explanation
-from auvnn.diagnosis.nuisance import Layout
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.layout import Layout
 
 
-def at_bound(layout: Layout, found: Explanation, name: str) -> list[str]:
+def at_bound(layout: Layout, found: FittedHypothesis, name: str) -> list[str]:
     """Return which parameters of an effect ended at a bound that is not their null.
 
     Args:
@@ -25,7 +25,7 @@ def at_bound(layout: Layout, found: Explanation, name: str) -> list[str]:
     return out
 
 
-def reservations(layout: Layout, found: Explanation, names: Sequence[str]) -> list[str]:
+def reservations(layout: Layout, found: FittedHypothesis, names: Sequence[str]) -> list[str]:
     """Return warnings where a fit must not be accepted silently."""
     out = []
     if not found.fitted.converged:

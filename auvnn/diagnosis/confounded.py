@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.explain import Explanation
-from auvnn.diagnosis.nuisance import Layout, shapes
-from auvnn.diagnosis.words import number
+from auvnn.diagnosis.answers.words import number
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.layout import Layout, shapes
 
 Array = NDArray[np.float64]
 # Share of a name's trace that other parameters must be able to imitate to be told; parameters that are told; and the
@@ -18,7 +18,7 @@ EVEN = 0.15
 EQUATION = ("thruster_gain",)
 
 
-def confounded_with(layout: Layout, found: Explanation, name: str) -> list[str]:
+def confounded_with(layout: Layout, found: FittedHypothesis, name: str) -> list[str]:
     """Return in words what else could do on this log what a name does.
 
     What the name's fitted departure from its null does is imitated by all other parameters, what was stated of them set
@@ -62,7 +62,7 @@ def confounded_with(layout: Layout, found: Explanation, name: str) -> list[str]:
     return out
 
 
-def _of_scale(layout: Layout, found: Explanation, name: str) -> list[str]:
+def _of_scale(layout: Layout, found: FittedHypothesis, name: str) -> list[str]:
     """Say of one gain on all thrusters that it cannot be told from the scale of everything else.
 
     M nu_dot + C nu + D nu + g = k B f is M/k nu_dot + C/k nu + D/k nu + g/k = B f.

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from auvnn.diagnosis.answer import Diagnosis
-from auvnn.diagnosis.cut import candidates_for
-from auvnn.diagnosis.doubts import doubts
-from auvnn.diagnosis.learned_drag import reduced
-from auvnn.diagnosis.nuisance import lay_out
+from auvnn.checks.doubts import doubts
+from auvnn.diagnosis.answers.answer import Diagnosis
+from auvnn.diagnosis.hypotheses.candidates import candidates_for
+from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
 from auvnn.diagnosis.runaway import windows_that_hold
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.state import Searched, Setting
 from auvnn.diagnosis.tolerance import Tolerance
 from auvnn.errors import ConfigError
+from auvnn.estimation.normal_equations import TRUST, motion
 from auvnn.logs import Log
 from auvnn.models import GreyBox
-from auvnn.training.absorbed import absorption
-from auvnn.training.window_sums import TRUST, motion
+from auvnn.training.confounding.confounded_effects import confounded_effects
 
 LEARNED = (
     "of the learned damping only what drag can be was kept for the tests, and that was left uncertain; "
@@ -102,7 +102,7 @@ def searched(
     log.quality().refuse_contradictions(force)
     allowed = Tolerance.of(tolerance)
     # What subnetworks have swallowed leaves no residual: only what drag can be is kept of them.
-    known, spread = reduced(model, log)
+    known, spread = with_drag_only(model, log)
     windows, notes = windows_that_hold(known, log, window)
     layout = lay_out(known, usable, spread)
     asked = Setting(
@@ -124,7 +124,7 @@ def searched(
     found.warnings += notes
     if spread is not None:
         found.warnings.append(LEARNED)
-    found.absorbed = absorption(model, log)
+    found.absorbed = confounded_effects(model, log)
     if found.absorbed is not None:
         found.warnings += found.absorbed.words()
     found.warnings += doubts(model, log)

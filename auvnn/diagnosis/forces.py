@@ -9,12 +9,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from auvnn.diagnosis.explain import Explanation
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.estimation.simulated_windows import Thrust, substeps_of
 from auvnn.metrics.free_run import predict
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 from auvnn.physics.attitude import quat_to_matrix
-from auvnn.training.ran import Thrust, substeps_of
 
 Array = NDArray[np.float64]
 AXES = ("X", "Y", "Z", "K", "M", "N")
@@ -22,7 +22,7 @@ AXES = ("X", "Y", "Z", "K", "M", "N")
 LEAST = 0.1
 
 
-def forces_of(found: Explanation, windows: Windows, names: Sequence[str]) -> dict[str, Array]:
+def forces_of(found: FittedHypothesis, windows: Windows, names: Sequence[str]) -> dict[str, Array]:
     """Return the root mean square force of each effect along the fitted motion, (6,), N and N m.
 
     It is what the equations of motion lose without the effect, nothing else changed: M (nu_dot with - nu_dot without)

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from auvnn.diagnosis.any_force import any_force, white
+from auvnn.diagnosis.answers.table import values
 from auvnn.diagnosis.confounded import confounded_with
 from auvnn.diagnosis.forces import AXES
+from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
 from auvnn.diagnosis.state import Setting, State
-from auvnn.diagnosis.table import values
 from auvnn.diagnosis.worth import Worth
 
 
@@ -22,12 +22,12 @@ def joint(asked: Setting, state: State, found: Worth) -> dict[str, dict[str, Any
     """
     last = state.current
     noise = white(last, asked.floor)
-    energy = np.maximum(any_force(state.first, state.windows, noise).energy, 0.0)
-    left = any_force(last, state.windows, noise).energy
+    energy = np.maximum(variance_component_test(state.first, state.windows, noise).energy, 0.0)
+    left = variance_component_test(last, state.windows, noise).energy
     told = values(asked.layout, last, last.effects)
     out = {}
     for name in last.effects:
-        less = any_force(found.beside[name], state.windows, noise).energy
+        less = variance_component_test(found.beside[name], state.windows, noise).energy
         back = np.maximum(less, 0.0) - np.maximum(left, 0.0)
         with np.errstate(invalid="ignore", divide="ignore"):
             share = np.where(energy > 0.01 * energy.sum(), np.clip(back / energy, 0.0, 1.0), 0.0)

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from auvnn.diagnosis.explain import Explanation
-from auvnn.diagnosis.nuisance import Layout
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.layout import Layout
 
 # Stated standard deviations from which on a movement is told, and coefficients that the words name.
 FAR, NAMED = 2.0, 6
 
 
-def moved(layout: Layout, found: Explanation) -> list[dict[str, Any]]:
+def moved(layout: Layout, found: FittedHypothesis) -> list[dict[str, Any]]:
     """Return stated coefficients that moved by more than two of their standard deviations, the furthest first.
 
     Each is a factor on what the vehicle's file states, which is one; `deviations` says by how many of the stated standard

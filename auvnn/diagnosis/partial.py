@@ -7,18 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from auvnn.diagnosis.bounds import at_bound
-from auvnn.diagnosis.explain import Explanation
-from auvnn.diagnosis.left_over import excess
-from auvnn.diagnosis.pays import foreseen
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.residuals.autocorrelation import excess_variance
+from auvnn.diagnosis.selection.predictive_density import cross_validated_log_density
 from auvnn.diagnosis.state import Setting, State
-from auvnn.training.prediction_error import FitError
+from auvnn.estimation.prediction_error import FitError
 
 # Share of the error's excess over the noise floor that names must remove together; and standard errors that each must
 # gain beside the others.
 JOINTLY, EACH = 0.2, 2.0
 
 
-def kept(asked: Setting, state: State, names: Sequence[str]) -> Explanation | None:
+def kept(asked: Setting, state: State, names: Sequence[str]) -> FittedHypothesis | None:
     """Return the joint fit of those names that earn their place, or None where they do not together.
 
     Each must foresee what is left out better by more than two standard errors beside the others, with no parameter at a
@@ -54,13 +54,13 @@ def kept(asked: Setting, state: State, names: Sequence[str]) -> Explanation | No
     return found if removed(state.first, found) >= JOINTLY else None
 
 
-def removed(first: Explanation, found: Explanation) -> float:
+def removed(first: FittedHypothesis, found: FittedHypothesis) -> float:
     """Return the share of the error's excess over the noise floor that a fit removes."""
-    before = excess(first, first)
-    return 1.0 - excess(found, first) / before if before > 0 else 0.0
+    before = excess_variance(first, first)
+    return 1.0 - excess_variance(found, first) / before if before > 0 else 0.0
 
 
-def without(asked: Setting, state: State, found: Explanation, name: str) -> Explanation:
+def without(asked: Setting, state: State, found: FittedHypothesis, name: str) -> FittedHypothesis:
     """Return a fit again without one of its names, everything else refitted."""
     chooser = asked.chooser(state.windows)
     if (
@@ -72,8 +72,8 @@ def without(asked: Setting, state: State, found: Explanation, name: str) -> Expl
     return chooser.without(found, asked.base, [name])
 
 
-def _errors(found: Explanation, other: Explanation) -> float:
+def _errors(found: FittedHypothesis, other: FittedHypothesis) -> float:
     """Return by how many of its standard errors a fit foresees what is left out better than another one."""
-    gain = foreseen(other) - foreseen(found)
+    gain = cross_validated_log_density(other) - cross_validated_log_density(found)
     spread = float(np.sqrt(len(gain)) * gain.std(ddof=1))
     return float(gain.sum()) / spread if spread > 0 else 0.0

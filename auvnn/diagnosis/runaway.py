@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from auvnn.diagnosis.cut import windows_for
+from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.errors import InputError
+from auvnn.estimation.prediction_error import SINGULAR
 from auvnn.logs import Log
 from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 from auvnn.models.limits import LIMIT
-from auvnn.training.prediction_error import SINGULAR
 
 # Lengths that are tried where the usual one is too long, s; share of the windows that must hold, and least number.
 SHORTER = (2.0, 1.0, 0.5)

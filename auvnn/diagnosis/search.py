@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from auvnn.diagnosis.answer import Diagnosis
 from auvnn.diagnosis.answering import answer
+from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.stages import fit_null, look, regroup
 from auvnn.diagnosis.state import Searched, Setting
 from auvnn.diagnosis.what_is_left import what_is_left

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from auvnn.diagnosis.choose import ALPHA
-from auvnn.diagnosis.explain import Explanation, explain
-from auvnn.diagnosis.finer import finer
-from auvnn.diagnosis.left_over import slow
+from auvnn.diagnosis.answers.table import candidate_table, fill_candidate
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
+from auvnn.diagnosis.hypotheses.refine_step import refine_step
+from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
+from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.state import Setting, State
-from auvnn.diagnosis.table import fill, tabulate
+from auvnn.estimation.prediction_error import FitError
 from auvnn.metrics.windows import Windows
-from auvnn.training.prediction_error import FitError
 
 # Once something is in the model the question is asked again, and each time chance gets another turn.
 ALPHA_NEXT = 0.01
@@ -27,7 +27,7 @@ ALPHA_UNKNOWN = 0.001
 def fit_null(asked: Setting, windows: Windows) -> State:
     """Fit what is uncertain alone."""
     asked.say("fitting the uncertain coefficients")
-    first = explain(asked.layout, windows, asked.base, ())
+    first = fit_hypothesis(asked.layout, windows, asked.base, ())
     first, windows = _finer(asked, first, windows)
     return State(windows, first, first)
 
@@ -45,7 +45,7 @@ def look(asked: Setting, state: State) -> State:
         state = state.but(
             p_value=p_value,
             similar=similar,
-            table=tabulate(asked.layout, tested.scores, state.current, similar, dict(asked.needs)),
+            table=candidate_table(asked.layout, tested.scores, state.current, similar, dict(asked.needs)),
             silent=tuple(n for n in remaining if not tested.scores[n].degrees),
         )
     if p_value >= (ALPHA_NEXT if chosen else ALPHA) or not remaining or len(chosen) >= asked.most:
@@ -55,7 +55,7 @@ def look(asked: Setting, state: State) -> State:
     state = state.but(failed={**state.failed, **choice.failed})
     if not chosen:
         for explanation in choice.tried:
-            state = state.but(table=fill(asked.layout, state.table, explanation, first))
+            state = state.but(table=fill_candidate(asked.layout, state.table, explanation, first))
     if choice.best is None:
         verdict = "unknown" if p_value < ALPHA_UNKNOWN else rest(asked, state.current)
         return state.step(verdict, [], p_value).but(ended=True)
@@ -100,20 +100,22 @@ def regroup(asked: Setting, state: State) -> State:
     return state.but(current=last, groups=open_, steps=tuple(steps))
 
 
-def rest(asked: Setting, current: Explanation) -> str:
+def rest(asked: Setting, current: FittedHypothesis) -> str:
     """Return the verdict where no effect is asked for any more."""
-    return "unknown" if slow(current, asked.floor) else "adequate"
+    return "unknown" if is_autocorrelated(current, asked.floor) else "adequate"
 
 
-def _finer(asked: Setting, found: Explanation, windows: Windows) -> tuple[Explanation, Windows]:
+def _finer(asked: Setting, found: FittedHypothesis, windows: Windows) -> tuple[FittedHypothesis, Windows]:
     """Return a fit with steps so short that what the integrator gets wrong has no say in what follows."""
-    shorter = finer(found.fitted.model, windows, found.fitted.initial, found.fitted.sigma)
+    shorter = refine_step(found.fitted.model, windows, found.fitted.initial, found.fitted.sigma)
     if shorter is windows:
         return found, windows
     asked.say("fitting again with shorter steps")
     guess = replace(asked.layout, model=found.fitted.model)
     try:
-        again = explain(asked.layout, shorter, asked.base, found.effects, start=found.fitted, guess=guess)
+        again = fit_hypothesis(
+            asked.layout, shorter, asked.base, found.effects, start=found.fitted, guess=guess
+        )
     except FitError:
         return found, windows
     return again, shorter

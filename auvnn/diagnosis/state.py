@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.any_force import Unnamed
-from auvnn.diagnosis.choose import Chooser
-from auvnn.diagnosis.explain import Explanation
-from auvnn.diagnosis.input_test import InputForce
-from auvnn.diagnosis.nuisance import Layout
-from auvnn.diagnosis.null_tests import NullTests
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.layout import Layout
+from auvnn.diagnosis.residuals.additive_force import AdditiveForce
+from auvnn.diagnosis.residuals.variance_component import Unnamed
+from auvnn.diagnosis.score_tests.null_tests import NullTests
+from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.diagnosis.tolerance import Tolerance
 from auvnn.logs import Log
 from auvnn.metrics.windows import Windows
@@ -96,10 +96,10 @@ class State:
     """
 
     windows: Windows
-    first: Explanation
-    current: Explanation
+    first: FittedHypothesis
+    current: FittedHypothesis
     chosen: tuple[str, ...] = ()
-    groups: tuple[tuple[Explanation, ...], ...] = ()
+    groups: tuple[tuple[FittedHypothesis, ...], ...] = ()
     withdrawn: tuple[str, ...] = ()
     steps: tuple[dict[str, Any], ...] = ()
     table: Mapping[str, dict[str, Any]] = field(default_factory=dict)
@@ -109,7 +109,7 @@ class State:
     silent: tuple[str, ...] = ()
     ended: bool = False
     left: Unnamed | None = None
-    traced: InputForce | None = None
+    traced: AdditiveForce | None = None
     remainder: Unnamed | None = None
     negligible: bool = False
     nearest: tuple[str, ...] = ()
@@ -171,7 +171,7 @@ class Searched:
         return self.setting.tests(self.state.windows).extent
 
     @property
-    def first(self) -> Explanation:
+    def first(self) -> FittedHypothesis:
         """The fit of what is uncertain alone."""
         return self.state.first
 

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from auvnn.diagnosis.any_force import Unnamed, any_force, white
-from auvnn.diagnosis.explain import Explanation
-from auvnn.diagnosis.input_test import input_force
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.partial import kept
+from auvnn.diagnosis.residuals.additive_force import additive_force_test
+from auvnn.diagnosis.residuals.variance_component import Unnamed, variance_component_test, white
 from auvnn.diagnosis.stages import ALPHA_NEXT, ALPHA_UNKNOWN
 from auvnn.diagnosis.state import Setting, State
 from auvnn.diagnosis.worth import small
-from auvnn.training.prediction_error import FitError
+from auvnn.estimation.prediction_error import FitError
 
 # A name that leaves a force is refuted on weaker grounds: to be silent about a cause costs less than a wrong one.
 ALPHA_LEFT = 0.01
@@ -40,7 +40,7 @@ def what_is_left(asked: Setting, state: State) -> State:
 def _asked(asked: Setting, state: State) -> State:
     first, last = state.first, state.current
     noise = white(last, asked.floor)
-    left = any_force(last, state.windows, noise)
+    left = variance_component_test(last, state.windows, noise)
     state = state.but(remainder=left)
     # What was withdrawn is none of the names that stand.
     standing = {*last.effects, *state.in_groups}
@@ -54,9 +54,9 @@ def _asked(asked: Setting, state: State) -> State:
     if not given:
         return _ended(asked, state, left, left.p_value)
     own = [e for e in given if e in last.effects]
-    state = state.but(unexplained=left.left_of(any_force(first, state.windows, noise)))
+    state = state.but(unexplained=left.left_of(variance_component_test(first, state.windows, noise)))
     asked.say("asking whether a force of what is measured is left")
-    traced = input_force(last, asked.layout, state.windows, noise, own, ALPHA_NEXT)
+    traced = additive_force_test(last, asked.layout, state.windows, noise, own, ALPHA_NEXT)
     state = state.but(traced=traced)
     sure = traced.p_value < ALPHA_LEFT
     needless = list(traced.needless) if sure else []
@@ -102,7 +102,7 @@ def _not_the_cause(asked: Setting, state: State, given: list[str], own: list[str
     found = kept(asked, state, own)
     if found is not None:
         noise = white(found, asked.floor)
-        left = any_force(found, state.windows, noise)
+        left = variance_component_test(found, state.windows, noise)
         return state.but(
             current=found,
             chosen=found.effects,
@@ -111,11 +111,11 @@ def _not_the_cause(asked: Setting, state: State, given: list[str], own: list[str
             partial=True,
             left=left,
             remainder=left,
-            unexplained=left.left_of(any_force(state.first, state.windows, noise)),
+            unexplained=left.left_of(variance_component_test(state.first, state.windows, noise)),
             steps=({"verdict": "partial", "effects": [], "p_value": p_value},),
         )
-    first: Explanation = state.first
-    left = any_force(first, state.windows, white(first, asked.floor))
+    first: FittedHypothesis = state.first
+    left = variance_component_test(first, state.windows, white(first, asked.floor))
     return state.but(
         current=first,
         chosen=(),

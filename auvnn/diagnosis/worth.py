@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.any_force import Unnamed
-from auvnn.diagnosis.explain import Explanation
 from auvnn.diagnosis.forces import AXES, actuators_of, forces_of, share_of
-from auvnn.diagnosis.gains import noise_floor
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.left_out import Gain, LeftOut, gain, left_out_found
+from auvnn.diagnosis.residuals.variance_component import Unnamed
 from auvnn.diagnosis.state import Setting, State
 from auvnn.errors import InputError
+from auvnn.improvement.gains import noise_floor
 from auvnn.metrics.rollouts import roll, scale_of
 
 Array = NDArray[np.float64]
@@ -68,12 +68,12 @@ class Worth:
     """
 
     names: Mapping[str, Cost] = field(default_factory=dict)
-    beside: Mapping[str, Explanation] = field(default_factory=dict)
+    beside: Mapping[str, FittedHypothesis] = field(default_factory=dict)
     left: Mapping[str, Any] = field(default_factory=dict)
     words: str = ""
 
 
-def worth(asked: Setting, state: State, beside: Mapping[str, Explanation]) -> Worth:
+def worth(asked: Setting, state: State, beside: Mapping[str, FittedHypothesis]) -> Worth:
     """Return what each name of the fit, and what is left, is worth.
 
     Args:
@@ -148,7 +148,7 @@ def _matters(asked: Setting, fall: Gain | None, share: Array) -> bool:
     return bool(not fall.cost < tolerance.cost or any(_dof_cost(fall, n) >= tolerance.cost for n in sure))
 
 
-def _errors(asked: Setting, state: State, found: Explanation) -> LeftOut | None:
+def _errors(asked: Setting, state: State, found: FittedHypothesis) -> LeftOut | None:
     try:
         errors = left_out_found(asked.layout, found, state.windows, asked.log)
     except InputError:

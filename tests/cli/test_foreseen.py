@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
-from small_logs import make_log, small_vehicle
 
 from auvnn.cli.main import main
 from auvnn.models import GreyBox
+from tests.small_logs import make_log, small_vehicle
 
 
 @pytest.fixture
@@ -49,7 +49,13 @@ def test_the_objective_of_add_is_an_option_like_any_other(here, capsys):
     make_log(truth, duration=20.0, accelerations=True, noise=1.0).write("log.csv")
     known.save("known")
     status, out, err = told(
-        capsys, "add", "model=known", "log=log.csv", "effect=constant_force", "objective=one_step", "out=better"
+        capsys,
+        "add",
+        "model=known",
+        "log=log.csv",
+        "effect=constant_force",
+        "objective=one_step",
+        "out=better",
     )
     assert status == 0, err
     assert json.loads(Path("better/improvement.json").read_text())["objective"] == "one_step"
@@ -84,4 +90,6 @@ def test_a_model_driven_by_a_wrench_stays_so_on_a_log_that_has_both(here, capsys
     status, _, err = told(capsys, "compare", "model=known", "log=both.csv", "out=compared")
     assert status == 0, err
     found = json.loads(Path("compared/comparison.json").read_text())
-    assert found["rollout"]["5"]["total"] < 0.1, "the wrench that was logged moves the model as the thrusters did"
+    assert found["rollout"]["5"]["total"] < 0.1, (
+        "the wrench that was logged moves the model as the thrusters did"
+    )

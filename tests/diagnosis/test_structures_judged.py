@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from small_logs import make_log, small_vehicle
 
-from auvnn.diagnosis import add, compare, diagnose
-from auvnn.diagnosis.any_force import AnyForce
+from auvnn.comparison import compare
+from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.residuals.variance_component import VarianceComponents
+from auvnn.improvement import add
 from auvnn.models import GreyBox
 from auvnn.models.structures import STRUCTURES, build_structure
 from auvnn.models.structures.base import learned_parameters
 from auvnn.training.fit_structure import fit_structure
+from tests.small_logs import make_log, small_vehicle
 
 OPTIONS = {"damping": ({"networks": "six"}, {"networks": "one"}), "separate": ({"restoring": "learned"},)}
 EVERY = [(n, o) for n in STRUCTURES.names() for o in OPTIONS.get(n, ({},))]
@@ -45,8 +47,10 @@ def test_its_learned_part_stays_however_it_is_built_again(name, options):
         "without what is absent": made.without_absent(),
         "rebuilt": made.rebuilt(made.copied_effects()),
         "sharing": made.sharing(made.members),
-        "with a probe beside it": made.beside(AnyForce(made, 5.0)),
-        "driven by a wrench and back": made.rebuilt([], actuation="wrench").rebuilt([], actuation="thrusters"),
+        "with a probe beside it": made.beside(VarianceComponents(made, 5.0)),
+        "driven by a wrench and back": made.rebuilt([], actuation="wrench").rebuilt(
+            [], actuation="thrusters"
+        ),
     }
     for way, other in ways.items():
         assert type(other) is type(made), way
@@ -79,7 +83,10 @@ SHORT = ("damping-one",)
 
 @pytest.mark.parametrize(
     ("name", "options"),
-    [pytest.param(n, o, id=i, marks=() if i in SHORT else pytest.mark.long) for (n, o), i in zip(EVERY, IDS, strict=True)],
+    [
+        pytest.param(n, o, id=i, marks=() if i in SHORT else pytest.mark.long)
+        for (n, o), i in zip(EVERY, IDS, strict=True)
+    ],
 )
 def test_it_is_compared_diagnosed_and_fitted_as_it_is(name, options, full_log):
     made = build_structure(name, small_vehicle(0.1), **options)

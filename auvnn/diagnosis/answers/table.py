@@ -1,0 +1,128 @@
+"""The table of candidates: each by its test at the null, the leading ones by a fit of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.diagnosis.answers.describe_parameters import describe_parameters
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, standard_errors
+from auvnn.diagnosis.hypotheses.layout import Layout
+from auvnn.diagnosis.residuals.autocorrelation import excess_variance
+from auvnn.diagnosis.score_tests.score import Score
+
+Array = NDArray[np.float64]
+
+
+def candidate_table(
+    layout: Layout,
+    scores: dict[str, Score],
+    current: FittedHypothesis,
+    similar: tuple[list[str], Array],
+    needs: dict[str, list[str]],
+) -> dict[str, dict[str, Any]]:
+    """Return an entry for every effect that was wanted, by its test at the null; see `formats` of the answer.
+
+    Args:
+        layout: stated values.
+        scores: the tests.
+        current: the fit at which they were made.
+        similar: effects, and how much of each one's trace another can imitate.
+        needs: effects wanted, and the channels that the log lacks for them.
+    """
+    names, matrix = similar
+    whole = max(excess_variance(current, current), max((s.gain for s in scores.values()), default=0.0), 1e-12)
+    table: dict[str, dict[str, Any]] = {}
+    for name, absent in needs.items():
+        found = scores.get(name)
+        entry: dict[str, Any] = {
+            "effect": name,
+            "p_value": None,
+            "explained": None,
+            "cv_before": None,
+            "cv_after": None,
+            "parameters": {},
+            "confusable_with": [],
+            "needs": absent,
+            "reason": None,
+            "_order": -np.inf,
+        }
+        if found is not None:
+            row = names.index(name)
+            near = sorted(((matrix[row, j], names[j]) for j in range(len(names)) if j != row), reverse=True)
+            entry.update(
+                p_value=found.p_value,
+                explained=float(np.clip(found.gain / whole, 0.0, 1.0)),
+                cv_before=current.cv,
+                cv_after=predicted_left_out(current, found),
+                parameters=describe_parameters(layout.model.effect(name), found.estimate, found.std),
+                confusable_with=[{"effect": n, "similarity": float(v)} for v, n in near if v >= 0.5],
+                _order=found.evidence,
+            )
+        table[name] = entry
+    return table
+
+
+def fill_candidate(
+    layout: Layout,
+    table: Mapping[str, dict[str, Any]],
+    explanation: FittedHypothesis,
+    before: FittedHypothesis,
+    beside: Mapping[str, FittedHypothesis] | None = None,
+) -> dict[str, dict[str, Any]]:
+    """Return the table with the one-step figures of an explanation's effects replaced by those of its own fit.
+
+    Args:
+        layout: stated values.
+        table: the candidates.
+        explanation: the fit.
+        before: the fit without any effect.
+        beside: of several effects, the fits without each: what an effect does is what it does beside the others.
+    """
+    found, out = values(layout, explanation, explanation.effects), dict(table)
+    whole = max(excess_variance(before, before), 1e-12)
+    after = _scaled_left_out(explanation, before)
+    for name in explanation.effects:
+        own: dict[str, Any] = {"parameters": found[name]}
+        count = before.left_out_count.sum()
+        if beside is None or name not in beside or beside[name] is before:
+            own["cv_before"] = before.cv
+        else:
+            own["cv_before"] = float(np.sqrt(max(_scaled_left_out(beside[name], before), 0.0) / count))
+        own["cv_after"] = float(np.sqrt(max(after, 0.0) / count))
+        if beside is not None and name in beside:
+            fall = excess_variance(beside[name], before) - excess_variance(explanation, before)
+            own["explained"] = float(np.clip(fall / whole, 0.0, 1.0))
+        out[name] = {**out[name], **own}
+    return out
+
+
+def values(
+    layout: Layout, found: FittedHypothesis, wanted: Sequence[str]
+) -> dict[str, dict[str, dict[str, Any]]]:
+    """Return the named effects' parameters as fitted, with their standard errors, as answers hold them."""
+    places = {n: at for n, at in layout.places(found.names).items() if n in wanted}
+    return {
+        n: describe_parameters(layout.model.effect(n), found.fitted.theta[at], standard_errors(found, at)[0])
+        for n, at in places.items()
+    }
+
+
+def predicted_left_out(current: FittedHypothesis, found: Score) -> float:
+    """Return the error on what was left out that a test's one-step estimate promises."""
+    left = max(current.left_out.sum() - (found.gain - found.degrees), 0.0)
+    return float(np.sqrt(left / max(current.left_out_count.sum(), 1.0)))
+
+
+def _scaled_left_out(explanation: FittedHypothesis, before: FittedHypothesis) -> float:
+    """Return an explanation's left-out error in the weights of the explanation before it."""
+    mine, theirs = explanation.fitted.sigma, before.fitted.sigma
+    if np.allclose(mine[np.isfinite(mine)], theirs[np.isfinite(mine)]):
+        return float(explanation.left_out.sum())
+    usable = np.isfinite(mine)
+    sums = explanation.fitted.statistics.channel.sum(0)[usable]
+    inflated = explanation.left_out.sum() / max(explanation.fitted.statistics.cost.sum(), 1e-12)
+    return float((sums / theirs[usable] ** 2).sum() * inflated)
