@@ -7,13 +7,13 @@ from typing import Any
 
 from auvnn.checks.doubts import doubts
 from auvnn.diagnosis.answers.answer import Diagnosis
+from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.diagnosis.hypotheses.layout import lay_out
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
-from auvnn.diagnosis.runaway import windows_that_hold
 from auvnn.diagnosis.search import search
-from auvnn.diagnosis.state import Searched, Setting
-from auvnn.diagnosis.tolerance import Tolerance
+from auvnn.diagnosis.stages.runaway import windows_that_hold
+from auvnn.diagnosis.stages.state import Searched, Setting
 from auvnn.errors import ConfigError
 from auvnn.estimation.normal_equations import TRUST, motion
 from auvnn.logs import Log

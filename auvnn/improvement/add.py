@@ -22,9 +22,10 @@ from auvnn.diagnosis.score_tests.probes import null_is_no_start
 from auvnn.diagnosis.score_tests.shape_search import search_shapes
 from auvnn.effects import effect_class
 from auvnn.errors import ConfigError, InputError
-from auvnn.improvement.gains import noise_floor, paired_gain
+from auvnn.improvement.gains import paired_gain
 from auvnn.logs import Log
 from auvnn.logs.leakage import leakage
+from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.one_step import choose_derivative, one_step, scores
 from auvnn.metrics.rollouts import HORIZONS, rollout_table, scale_of
 from auvnn.models import GreyBox

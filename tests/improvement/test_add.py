@@ -14,8 +14,9 @@ from auvnn.diagnosis.hypotheses.layout import lay_out
 from auvnn.errors import ConfigError, InputError
 from auvnn.improvement import add
 from auvnn.improvement.add import _by_one_step
-from auvnn.improvement.gains import noise_floor, paired_gain
+from auvnn.improvement.gains import paired_gain
 from auvnn.logs import Log, Run
+from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.rollouts import Rolled, Scale, roll, rollout_table, scale_of
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox, load, remove

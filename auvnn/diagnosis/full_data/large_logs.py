@@ -34,7 +34,7 @@ from auvnn.diagnosis.full_data.map_reduce import LinearisationPoint, MapReduce
 from auvnn.diagnosis.hypotheses.candidates import HORIZON, WARMUP, check_window_length
 from auvnn.diagnosis.hypotheses.layout import Layout, lay_out
 from auvnn.diagnosis.score_tests.null_tests import bonferroni
-from auvnn.diagnosis.state import Searched
+from auvnn.diagnosis.stages.state import Searched
 from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.priors import set_parameters
 from auvnn.executors import Executor, executor_for

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from auvnn.diagnosis.answers.confounded import confounded_with
 from auvnn.diagnosis.answers.table import values
-from auvnn.diagnosis.confounded import confounded_with
-from auvnn.diagnosis.forces import AXES
+from auvnn.diagnosis.answers.worth import Worth
+from auvnn.diagnosis.residuals.forces import AXES
 from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
-from auvnn.diagnosis.state import Setting, State
-from auvnn.diagnosis.worth import Worth
+from auvnn.diagnosis.stages.state import Setting, State
 
 
 def joint(asked: Setting, state: State, found: Worth) -> dict[str, dict[str, Any]]:

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.forces import AXES, actuators_of, forces_of, share_of
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.left_out import Gain, LeftOut, gain, left_out_found
+from auvnn.diagnosis.residuals.forces import AXES, actuators_of, forces_of, share_of
 from auvnn.diagnosis.residuals.variance_component import Unnamed
-from auvnn.diagnosis.state import Setting, State
+from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.errors import InputError
-from auvnn.improvement.gains import noise_floor
+from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.rollouts import roll, scale_of
 
 Array = NDArray[np.float64]

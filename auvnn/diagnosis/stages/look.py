@@ -13,7 +13,7 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.refine_step import refine_step
 from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
 from auvnn.diagnosis.selection.choose import ALPHA
-from auvnn.diagnosis.state import Setting, State
+from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.estimation.prediction_error import FitError
 from auvnn.metrics.windows import Windows
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from auvnn.diagnosis.bounds import at_bound
+from auvnn.diagnosis.answers.bounds import at_bound
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.residuals.autocorrelation import excess_variance
 from auvnn.diagnosis.selection.predictive_density import cross_validated_log_density
-from auvnn.diagnosis.state import Setting, State
+from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.estimation.prediction_error import FitError
 
 # Share of the error's excess over the noise floor that names must remove together; and standard errors that each must

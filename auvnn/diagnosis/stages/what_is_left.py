@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from auvnn.diagnosis.answers.worth import small
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.partial import kept
 from auvnn.diagnosis.residuals.additive_force import additive_force_test
 from auvnn.diagnosis.residuals.variance_component import Unnamed, variance_component_test, white
-from auvnn.diagnosis.stages import ALPHA_NEXT, ALPHA_UNKNOWN
-from auvnn.diagnosis.state import Setting, State
-from auvnn.diagnosis.worth import small
+from auvnn.diagnosis.stages.look import ALPHA_NEXT, ALPHA_UNKNOWN
+from auvnn.diagnosis.stages.partial import kept
+from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.estimation.prediction_error import FitError
 
 # A name that leaves a force is refuted on weaker grounds: to be silent about a cause costs less than a wrong one.

@@ -9,20 +9,20 @@ import numpy as np
 
 from auvnn.diagnosis.advise import advise
 from auvnn.diagnosis.answers.answer import Diagnosis, OneOf
+from auvnn.diagnosis.answers.bounds import reservations
+from auvnn.diagnosis.answers.joint import joint
+from auvnn.diagnosis.answers.moved import moved
 from auvnn.diagnosis.answers.table import fill_candidate
-from auvnn.diagnosis.bounds import reservations
+from auvnn.diagnosis.answers.worth import Worth, names_by_worth, worth
 from auvnn.diagnosis.hypotheses.candidates import HORIZON, WARMUP
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.layout import has_stated_uncertainty
-from auvnn.diagnosis.joint import joint
-from auvnn.diagnosis.moved import moved
-from auvnn.diagnosis.partial import without
 from auvnn.diagnosis.residuals.additive_force import additive_force_test
 from auvnn.diagnosis.residuals.attribution import attribute_residual
 from auvnn.diagnosis.residuals.variance_component import white
 from auvnn.diagnosis.residuals.whiteness import residual_tests
-from auvnn.diagnosis.state import Setting, State
-from auvnn.diagnosis.worth import Worth, names_by_worth, worth
+from auvnn.diagnosis.stages.partial import without
+from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.estimation.prediction_error import FitError
 
 # A force of one measured input that is surer than this is told where no smooth function of the inputs was sure enough.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from auvnn.diagnosis.unnamed_size import sizes
+from auvnn.diagnosis.residuals.unnamed_size import sizes
 
 COUNT, WINDOWS, UNIT = 7, 60, np.array([10.0, 10.0, 10.0, 1.0, 1.0, 1.0])
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.layout import Layout
 from auvnn.diagnosis.residuals.additive_force import AdditiveForce
 from auvnn.diagnosis.residuals.variance_component import Unnamed
 from auvnn.diagnosis.score_tests.null_tests import NullTests
 from auvnn.diagnosis.selection.choose import Chooser
-from auvnn.diagnosis.tolerance import Tolerance
 from auvnn.logs import Log
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
