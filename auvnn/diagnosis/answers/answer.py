@@ -76,6 +76,15 @@ class Diagnosis(Answer):
 
         return tell(self)
 
+    @property
+    def judged_words(self) -> list[str]:
+        """What each name costs and what is left, as plain sentences."""
+        from auvnn.diagnosis.answers import judged_words
+        from auvnn.diagnosis.answers.moved import moved_words
+
+        told = judged_words.predicts(self) if self.verdict == "partial" else judged_words.costs(self)
+        return [*told, *judged_words.left(self), *moved_words(self.moved)]
+
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
         from auvnn.answers import plain
@@ -99,6 +108,7 @@ class Diagnosis(Answer):
             "moved",
             "tolerance",
             "judged_by",
+            "judged_words",
             "next_experiment",
             "warnings",
             "global_p_value",

@@ -64,6 +64,8 @@ def diagnose_files(
     address: str | None = None,
     advice: bool = True,
     force: bool = False,
+    tolerance: Any = None,
+    costs: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """Say which physical effects a model lacks, by files of any size and number; see the module's text.
@@ -83,6 +85,8 @@ def diagnose_files(
         address: of a Ray or Dask cluster that is running.
         advice: for an ambiguous answer, also work out which manoeuvre would tell the candidates apart.
         force: go on with a log that contradicts itself.
+        tolerance: what does not matter, as in `diagnose`.
+        costs: also work out what each name costs.
         progress: told in words what is being done.
 
     Returns:
@@ -111,6 +115,8 @@ def diagnose_files(
             window=window,
             advice=advice,
             force=force,
+            tolerance=tolerance,
+            costs=costs,
             progress=say,
         )
         parts = plan.spread(windows)
