@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from auvnn.cli.dry import foreseen
 from auvnn.cli.job import Answering, Job, Verb, files
 
 _STYLE = {"error": "red", "warning": "yellow"}
@@ -71,4 +72,5 @@ VERB = Verb(
     reads=("log", "mapping", "model"),
     writes=("quality.json", "report.html", "figures/"),
     run=_run,
+    foresee=foreseen,
 )

@@ -5,7 +5,8 @@ sure that is, `fleet` fits the same effects over many dives, `trend` asks whethe
 dive.
 """
 
-from auvnn.improvement.add import Improvement, add
+from auvnn.improvement.add import add
+from auvnn.improvement.added import Improvement
 from auvnn.improvement.fleet import Fleet, fleet
 
 __all__ = ["Fleet", "Improvement", "add", "fleet"]

@@ -88,7 +88,8 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
     simulated = time.monotonic()
     begun["made"] = True
     candidates = None if case.candidates is None else list(case.candidates)
-    found = diagnose(model, log, candidates, advice=False, whiteness=False)
+    # Rates are those of evidence alone: what does not matter is for users to decide.
+    found = diagnose(model, log, candidates, advice=False, whiteness=False, tolerance=0.0, costs=False)
     diagnosed = time.monotonic()
     row: dict[str, Any] = {
         "verdict": found.verdict,
