@@ -218,9 +218,7 @@ class Replay:
     def _drive(self) -> None:
         model = self.model
         with torch.no_grad():
-            drive = model.actuators.drive(
-                self.inputs.command, self.times, model.before_thrust
-            )
+            drive = model.actuators.drive(self.inputs.command, self.times, model.before_thrust)
         self.start = torch.stack(drive.start)
         self.mean = torch.stack([part[0] for part in drive.mean])
 
