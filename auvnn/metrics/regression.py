@@ -8,8 +8,9 @@ regressors pass the same filter. Reference: Klein and Morelli (2006), Aircraft S
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,36 +18,17 @@ from numpy.typing import NDArray
 from auvnn.logs import Log, Run
 from auvnn.logs.derivatives import LocalPolynomial
 from auvnn.logs.rotation import conjugate, rotate
+from auvnn.metrics.folds import Folds
 from auvnn.metrics.one_step import Derivative, integrated
+from auvnn.metrics.rollouts import NAMES, Rolled, Scale, scored
 from auvnn.metrics.windows import Windows, commands
 
 Array = NDArray[np.float64]
 # Directions of the regressors of which the log says less than this, beside the best known one, are left alone.
 SEEN = 1e-8
-# A run is left out whole, a single run by so many stretches.
-STRETCHES = 5
 DOWN = np.array([0.0, 0.0, 1.0])
 # Beyond these speeds, m/s and rad/s, a free run has left what is physical.
 LIMIT = 1e3
-
-
-@dataclass(frozen=True)
-class Sums:
-    """Normal equations of one stretch of a log.
-
-    Attributes:
-        run: number of its run.
-        first: its first sample in the run.
-        stop: the sample after its last.
-        gram: (c, c) of the regressors.
-        right: (c, 6) of regressors and accelerations.
-    """
-
-    run: int
-    first: int
-    stop: int
-    gram: Array
-    right: Array
 
 
 def regressors(nu: Array, command: Array, fins: Array | None, down: Array) -> Array:
@@ -71,21 +53,23 @@ def _rows(run: Run, kind: str, fins: bool, how: Derivative) -> tuple[Array, Arra
     return smooth(integrated(run.t, rows))[1], smooth(velocity)[1]
 
 
-def _sums(run: Run, kind: str, fins: bool, how: Derivative, parts: int) -> list[Sums]:
+Sums = tuple[Array, Array]
+
+
+def _sums(run: Run, kind: str, fins: bool, how: Derivative, folds: Folds) -> dict[int, Sums]:
+    """Return the normal equations of a run by fold: (c, c) of the regressors, (c, 6) of them and the accelerations."""
     rows, measured = _rows(run, kind, fins, how)
-    edges = np.linspace(0, run.samples, parts + 1).astype(int)
-    found = []
-    for first, stop in zip(edges[:-1], edges[1:], strict=True):
-        x, y = rows[first:stop], measured[first:stop]
-        good = np.isfinite(x).all(1) & np.isfinite(y).all(1)
-        x, y = x[good], y[good]
-        found.append(Sums(run.number, int(first), int(stop), x.T @ x, x.T @ y))
+    good = np.isfinite(rows).all(1) & np.isfinite(measured).all(1)
+    own, found = folds.at(run.number, run.t), {}
+    for fold in np.unique(own):
+        x, y = rows[good & (own == fold)], measured[good & (own == fold)]
+        found[int(fold)] = (x.T @ x, x.T @ y)
     return found
 
 
-def solved(sums: list[Sums]) -> Array:
-    """Return B, (6, c), by least squares over stretches; zero in directions that they do not show."""
-    gram, right = np.sum([s.gram for s in sums], axis=0), np.sum([s.right for s in sums], axis=0)
+def _solved(sums: Sequence[Sums]) -> Array:
+    """Return B, (6, c), by least squares; zero in directions that nothing shows."""
+    gram, right = np.sum([s[0] for s in sums], axis=0), np.sum([s[1] for s in sums], axis=0)
     size = np.sqrt(np.diag(gram))
     known = size > 1e-12
     out = np.zeros((6, len(size)))
@@ -100,56 +84,54 @@ def solved(sums: list[Sums]) -> Array:
 
 @dataclass(frozen=True)
 class Regression:
-    """The regression fitted to a log: coefficients for every stretch that may be left out, and for none.
+    """The regression fitted to a log, once to everything and once without each fold.
 
     Attributes:
-        kind: which commands drive it, "thrusters" or "wrench".
         fins: whether fin angles are among the regressors.
         whole: (6, c), fitted to everything.
-        without: {(run, first sample, sample after the last): (6, c) fitted to the rest}.
+        without: fold to (6, c), fitted to the others; empty where there is one fold only.
+        folds: what is left out in turn.
     """
 
-    kind: str
     fins: bool
     whole: Array
-    without: Mapping[tuple[int, int, int], Array]
+    without: dict[int, Array]
+    folds: Folds
 
     @classmethod
-    def of(cls, log: Log, kind: str, how: Derivative) -> Regression:
-        """Fit it to a log, once to everything and once for every run left out, or fifth of a single run.
+    def of(cls, log: Log, kind: str, how: Derivative, folds: Folds | None = None) -> Regression:
+        """Fit it to a log.
 
         Args:
             log: measurements.
-            kind: which commands to take.
+            kind: which commands drive it, "thrusters" or "wrench".
             how: how accelerations are obtained.
+            folds: what to leave out in turn; `Folds.of(log)` by default.
 
         Raises:
             InputError: a run lacks the commands.
         """
+        folds = folds or Folds.of(log)
         fins = all(run.fins is not None for run in log.runs)
-        parts = STRETCHES if len(log.runs) == 1 else 1
-        sums = [s for run in log.runs for s in _sums(run, kind, fins, how, parts)]
+        parts = [(f, s) for run in log.runs for f, s in _sums(run, kind, fins, how, folds).items()]
         without = {
-            (s.run, s.first, s.stop): solved([other for other in sums if other is not s])
-            for s in sums
-            if len(sums) > 1
+            f: _solved([s for g, s in parts if g != f]) for f in folds.numbers if len(folds.numbers) > 1
         }
-        return cls(kind, fins, solved(sums), without)
+        return cls(fins, _solved([s for _, s in parts]), without, folds)
 
     def predict(self, windows: Windows, *, left_out: bool, max_step: float | None = None) -> Array:
         """Run every window free from its measured start and return velocities, (B, L, 6); NaN once one has run away.
 
         Args:
             windows: of the log that was fitted, or of another.
-            left_out: the windows are of the fitted log: each is run with coefficients that have not seen its run.
+            left_out: the windows are of the fitted log: each is run with coefficients that have not seen its fold.
             max_step: longest step of the solver, s; the windows' own by default.
         """
         coefficients = np.broadcast_to(self.whole, (len(windows), *self.whole.shape)).copy()
-        if left_out:
-            middle = windows.first + windows.length // 2
-            for (run, first, stop), value in self.without.items():
-                mine = (windows.run == run) & (middle >= first) & (middle < stop)
-                coefficients[mine] = value
+        if left_out and self.without:
+            fold, _ = self.folds.windows(windows)
+            for k, value in self.without.items():
+                coefficients[fold == k] = value
         return _free_run(coefficients, windows, self.fins, windows.max_step if max_step is None else max_step)
 
 
@@ -195,4 +177,44 @@ def _free_run(coefficients: Array, windows: Windows, fins: bool, max_step: float
                 # What has run away stays away: it is cut by whoever scores it.
                 nu = np.where((np.abs(nu) < LIMIT).all(1, keepdims=True), nu, np.nan)
             out[:, k + 1] = nu
+    return out
+
+
+def baseline(found: Regression, like: Rolled, scale: Scale, *, left_out: bool) -> dict[str, Any]:
+    """Return the errors of the regression over the windows of a free run, and those of persistence beside it.
+
+    Args:
+        found: the regression.
+        like: a free run of a model over the windows wanted.
+        scale: what errors are measured by.
+        left_out: the windows are of the fitted log: each is run with coefficients that have not seen its fold.
+
+    Returns:
+        `total` and one entry for each velocity (NaN where it is not excited), `diverged`, and `persistence` with `total`
+        and the same entries.
+    """
+    ran = scored(like.windows, found.predict(like.windows, left_out=left_out), scale)
+    out: dict[str, Any] = {"total": ran.total(scale), **_by_name(ran.nrmse(scale))}
+    out["diverged"] = int(ran.diverged.sum())
+    out["persistence"] = {"total": like.total(scale, held=True), **_by_name(like.nrmse(scale, held=True))}
+    return out
+
+
+def _by_name(values: Array) -> dict[str, float]:
+    return {n: float(v) for n, v in zip(NAMES, values, strict=True)}
+
+
+def worse_than(mine: Mapping[str, float], line: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Return the excited velocities in which a model errs more than the regression, and more than persistence.
+
+    Args:
+        mine: the model's errors by velocity.
+        line: what `baseline` returns.
+    """
+    out: dict[str, list[str]] = {"baseline": [], "persistence": []}
+    for name in NAMES:
+        error = mine.get(name, float("nan"))
+        for key, other in (("baseline", line[name]), ("persistence", line["persistence"][name])):
+            if np.isfinite(other) and np.isfinite(error) and error > other:
+                out[key].append(name)
     return out
