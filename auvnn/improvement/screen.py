@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.cut import candidates_for
 from auvnn.diagnosis.nuisance import lay_out, shapes
 from auvnn.diagnosis.probes import null_is_no_start
-from auvnn.effects import effect_class
 from auvnn.improvement.free_run import FreeRunFit, normal_equations
 from auvnn.improvement.judge import Judge
 from auvnn.improvement.state import Recipe, State, held_by, laid_out, starting
@@ -21,6 +20,8 @@ from auvnn.training.free_parameters import set_parameters
 Array = NDArray[np.float64]
 # Windows that candidates are looked at on, at most.
 WINDOWS = 120
+# Effects that go by the time since the start of a run.
+COURSES = ("payload", "flooding", "biofouling", "waves")
 # Share of the error by which a candidate must promise to lower it, to be fitted at all.
 PROMISE = 0.005
 
@@ -43,15 +44,11 @@ class Promise:
 def wanted(base: GreyBox, judge: Judge, recipe: Recipe) -> list[str]:
     """Return the effects that may be asked for: those of the catalogue that the log and the vehicle can speak of.
 
-    What varies with the time since the start of a run tells a course of events. Where the diagnosis does not name it, there
-    is no reason why another run should follow the same course: it is not taken for its prediction alone.
+    What goes by the time since the start of a run tells a course of events. Where the diagnosis does not name it,
+    there is no reason why another run should follow the same course: it is not taken for its prediction alone.
     """
     usable, _ = candidates_for(base, judge.log, None)
-    return [
-        n
-        for n in usable
-        if n not in recipe.effects and n not in base.effect_names and not effect_class(n).time_varying
-    ]
+    return [n for n in usable if n not in recipe.effects and n not in base.effect_names and n not in COURSES]
 
 
 def promises(
