@@ -11,20 +11,20 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.catalogue import unknown_name
-from auvnn.diagnosis.closer import closer_at
-from auvnn.diagnosis.cut import windows_for
-from auvnn.diagnosis.explain import Explanation, explain
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
+from auvnn.diagnosis.hypotheses.layout import Layout, priors
 from auvnn.diagnosis.left_out_folds import Fold
-from auvnn.diagnosis.nuisance import Layout, priors
-from auvnn.diagnosis.one_step_fit import explain_one_step
-from auvnn.diagnosis.probes import null_is_no_start
+from auvnn.diagnosis.one_step.fit import fit_hypothesis_one_step
+from auvnn.diagnosis.score_tests.probes import null_is_no_start
+from auvnn.diagnosis.score_tests.shape_search import search_shapes
 from auvnn.errors import ConfigError
+from auvnn.estimation.prediction_error import Fitted, fit
+from auvnn.estimation.priors import limits, parameters_of, set_parameters
 from auvnn.logs import Log
 from auvnn.metrics.one_step import Derivative, choose_derivative
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.training.free_parameters import limits, parameters_of, set_parameters
-from auvnn.training.prediction_error import Fitted, fit
 
 OBJECTIVES = ("rollout", "one_step")
 # Steps of a fit that begins next to where it ends: the same log but for one fold.
@@ -35,8 +35,8 @@ class Fitter(Protocol):
     """Fits effects and what is uncertain to a log, and to a log without one of its folds."""
 
     def fit(
-        self, layout: Layout, base: Sequence[str], effects: Sequence[str], start: Explanation | None
-    ) -> Explanation:
+        self, layout: Layout, base: Sequence[str], effects: Sequence[str], start: FittedHypothesis | None
+    ) -> FittedHypothesis:
         """Fit effects jointly with what is free anyway.
 
         Args:
@@ -47,7 +47,7 @@ class Fitter(Protocol):
         """
         ...
 
-    def without(self, layout: Layout, found: Explanation, fold: Fold, refit: bool) -> Explanation:
+    def without(self, layout: Layout, found: FittedHypothesis, fold: Fold, refit: bool) -> FittedHypothesis:
         """Fit the same again without a fold; where not `refit`, by one Newton step from the fit to everything."""
         ...
 
@@ -88,20 +88,20 @@ class ByWindows:
     windows: Windows
 
     def fit(
-        self, layout: Layout, base: Sequence[str], effects: Sequence[str], start: Explanation | None
-    ) -> Explanation:
+        self, layout: Layout, base: Sequence[str], effects: Sequence[str], start: FittedHypothesis | None
+    ) -> FittedHypothesis:
         """Fit from measured states, or from another fit's; see `Fitter`."""
         looked = start is not None and bool(effects) and effects[-1] not in start.names
         looked = looked and null_is_no_start(layout, effects[-1])
         guess = None
         if start is not None and looked:
-            guess = closer_at(layout, self.windows, start, base).start(effects[-1])
+            guess = search_shapes(layout, self.windows, start, base).start(effects[-1])
         elif start is not None:
             guess = started(layout, start, [*base, *effects])
         fitted = None if start is None else start.fitted
-        return explain(layout, self.windows, base, effects, start=fitted, guess=guess)
+        return fit_hypothesis(layout, self.windows, base, effects, start=fitted, guess=guess)
 
-    def without(self, layout: Layout, found: Explanation, fold: Fold, refit: bool) -> Explanation:
+    def without(self, layout: Layout, found: FittedHypothesis, fold: Fold, refit: bool) -> FittedHypothesis:
         """Fit again without the windows that share a sample with a fold; see `Fitter`."""
         keep = ~within(self.windows, fold.held)
         if not keep.any():
@@ -137,23 +137,23 @@ class OneStep:
     how: Derivative
 
     def fit(
-        self, layout: Layout, base: Sequence[str], effects: Sequence[str], start: Explanation | None
-    ) -> Explanation:
+        self, layout: Layout, base: Sequence[str], effects: Sequence[str], start: FittedHypothesis | None
+    ) -> FittedHypothesis:
         """Fit all samples; see `Fitter`.
 
         Raises:
             ConfigError: an effect has a time or a shape to be found.
         """
         _shapeless(layout, effects)
-        return explain_one_step(
+        return fit_hypothesis_one_step(
             layout, self.log, base, effects, self.how, start=None if start is None else start.fitted
         )
 
-    def without(self, layout: Layout, found: Explanation, fold: Fold, refit: bool) -> Explanation:
+    def without(self, layout: Layout, found: FittedHypothesis, fold: Fold, refit: bool) -> FittedHypothesis:
         """Fit the other samples, always in full: it is cheap; see `Fitter`."""
         log = replace(fold.fit, runs=tuple(run.cleaned for run in fold.fit.runs))
         base = [n for n in found.names if n not in found.effects]
-        return explain_one_step(layout, log, base, found.effects, self.how, start=found.fitted)
+        return fit_hypothesis_one_step(layout, log, base, found.effects, self.how, start=found.fitted)
 
 
 def _shapeless(layout: Layout, effects: Sequence[str]) -> None:
@@ -171,7 +171,7 @@ def at(layout: Layout, names: Sequence[str], theta: NDArray[np.float64]) -> Grey
     return model
 
 
-def started(layout: Layout, found: Explanation, names: Sequence[str]) -> Layout:
+def started(layout: Layout, found: FittedHypothesis, names: Sequence[str]) -> Layout:
     """Return the layout with those of some effects that a fit holds where it has them."""
     model = layout.model.rebuilt(layout.model.copied_effects())
     for name in names:

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.bake import baked
-from auvnn.diagnosis.explain import Explanation
 from auvnn.diagnosis.fitters import Fitter, fitter_for
+from auvnn.diagnosis.hypotheses.bake import with_fitted_parameters
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.layout import Layout, lay_out
 from auvnn.diagnosis.left_out_folds import MOST_FOLDS, Fold, folds_of
-from auvnn.diagnosis.nuisance import Layout, lay_out
 from auvnn.errors import InputError
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import NAMES, Rolled, Scale, roll, scale_of
@@ -280,7 +280,7 @@ def each_name(
     layout = lay_out(model, list(names))
     fitter = fitter_for(model, log, objective, window=window, derivative=derivative)
 
-    def of(chosen: Sequence[str], absent: Sequence[str], start: Explanation | None) -> Any:
+    def of(chosen: Sequence[str], absent: Sequence[str], start: FittedHypothesis | None) -> Any:
         return _of_names(model, log, layout, fitter, chosen, absent, start, most, refit, say)
 
     nothing, bare = of((), names, None)
@@ -300,11 +300,11 @@ def _of_names(
     fitter: Fitter,
     names: Sequence[str],
     absent: Sequence[str],
-    start: Explanation | None,
+    start: FittedHypothesis | None,
     most: int,
     refit: bool,
     say: Callable[[str], None],
-) -> tuple[LeftOut, Explanation]:
+) -> tuple[LeftOut, FittedHypothesis]:
     """Return the errors on what is left out with some names, and the fit to everything.
 
     A coefficient group that is among the names, and absent, stays as stated.
@@ -325,7 +325,7 @@ def _of_names(
             runs = ", ".join(str(r.number) for r in fold.held.runs)
             reason = f"the fit without run {runs} failed: {problem}"
             break
-        out.append(baked(model, layout, own))
+        out.append(with_fitted_parameters(model, layout, own))
     how = "refitted without each fold" if refit else "one Newton step from the fit to all runs, for each fold"
     return _rolled(out, log, folds, names, reason, how), found
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from auvnn.diagnosis.explain import FOLDS
+from auvnn.diagnosis.hypotheses.fit import FOLDS
 from auvnn.errors import InputError
 from auvnn.logs import Log, Run
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from auvnn.diagnosis.compare import stitch
-from auvnn.diagnosis.gains import noise_floor
+from auvnn.comparison.compare import stitch
+from auvnn.improvement.gains import noise_floor
 from auvnn.logs import Log
 from auvnn.metrics.one_step import Derivative
 from auvnn.metrics.regression import Regression, baseline, worse_than
-from auvnn.metrics.rollouts import NAMES, Rolled, scale_of, table
+from auvnn.metrics.rollouts import NAMES, Rolled, rollout_table, scale_of
 from auvnn.models import GreyBox
 
 # Horizons of free running that are shown, s.
@@ -28,12 +28,12 @@ def budget(steps: Sequence[tuple[str, str, GreyBox]], log: Log, test: Log, how: 
     """
     scale = scale_of(test)
     first, last = steps[0][2], steps[-1][2]
-    before, rolled = table(first, test, scale, SHOWN)
+    before, rolled = rollout_table(first, test, scale, SHOWN)
     key = next((h for h in ("5", "2", "1", "0.5") if h in rolled), "full")
-    after, finally_ = (before, rolled) if last is first else table(last, test, scale, SHOWN)
+    after, finally_ = (before, rolled) if last is first else rollout_table(last, test, scale, SHOWN)
     errors = [before[key]["total"]]
     for _, _, model in steps[1:-1]:
-        errors.append(table(model, test, scale, (key,))[0][key]["total"])
+        errors.append(rollout_table(model, test, scale, (key,))[0][key]["total"])
     if len(steps) > 1:
         errors.append(after[key]["total"])
     waterfall = [

@@ -21,12 +21,12 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.effects import Sensed
+from auvnn.estimation.normal_equations import linearise
+from auvnn.estimation.priors import Priors, bounded_step, limits, parameters_of, set_parameters
 from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.rollouts import CUT, Scale
 from auvnn.metrics.windows import VELOCITY, Windows
 from auvnn.models import GreyBox
-from auvnn.training.free_parameters import Priors, bounded_step, limits, parameters_of, set_parameters
-from auvnn.training.window_sums import answers
 
 Array = NDArray[np.float64]
 # A window's root-mean-square error, in standard deviations, from which on it counts linearly.
@@ -139,7 +139,7 @@ def normal_equations(model: GreyBox, task: Task, names: Sequence[str]) -> tuple[
         count = len(task.windows)
         return np.zeros((count, 0, 0)), np.zeros((count, 0)), costs(model, task)
     hessian, slope, cost = [], [], []
-    for answer in answers(model, task.windows, initial_states(model, task.windows), names):
+    for answer in linearise(model, task.windows, initial_states(model, task.windows), names):
         size = len(answer.error)
         own = weight[at : at + size]
         error = (answer.error[..., VELOCITY] * own).flatten(1)

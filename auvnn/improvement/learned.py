@@ -12,15 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.nuisance import Layout
+from auvnn.diagnosis.hypotheses.layout import Layout
 from auvnn.effects import Effect, effect_class
 from auvnn.effects.residual_force import INPUTS, ResidualForce
+from auvnn.estimation.priors import set_parameters
 from auvnn.improvement.free_run import FreeRunFit, normal_equations
 from auvnn.improvement.judge import Judge
 from auvnn.improvement.screen import PROMISE, WINDOWS
 from auvnn.improvement.state import Recipe, State, held_by, laid_out, starting
 from auvnn.models import GreyBox
-from auvnn.training.free_parameters import set_parameters
 
 Array = NDArray[np.float64]
 # How many of its scales a learned parameter may be away from nothing: what is tried.

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from auvnn.diagnosis.cut import candidates_for
+from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.diagnosis.left_out import gain
 from auvnn.errors import AuvnnError, ConfigError
 from auvnn.improvement import learned
@@ -34,7 +34,7 @@ from auvnn.improvement.state import (
     starting,
 )
 from auvnn.logs import Log
-from auvnn.logs.overlap import leakage
+from auvnn.logs.leakage import leakage
 from auvnn.metrics.one_step import choose_derivative
 from auvnn.models import GreyBox
 

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.cut import candidates_for
-from auvnn.diagnosis.nuisance import lay_out, shapes
-from auvnn.diagnosis.probes import null_is_no_start
+from auvnn.diagnosis.hypotheses.candidates import candidates_for
+from auvnn.diagnosis.hypotheses.layout import lay_out, shapes
+from auvnn.diagnosis.score_tests.probes import null_is_no_start
+from auvnn.estimation.priors import set_parameters
 from auvnn.improvement.free_run import FreeRunFit, normal_equations
 from auvnn.improvement.judge import Judge
 from auvnn.improvement.state import Recipe, State, held_by, laid_out, starting
 from auvnn.models import GreyBox
-from auvnn.training.free_parameters import set_parameters
 
 Array = NDArray[np.float64]
 # Windows that candidates are looked at on, at most.

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.bake import holding
 from auvnn.diagnosis.fitters import newton
+from auvnn.diagnosis.hypotheses.bake import holding
+from auvnn.diagnosis.hypotheses.layout import Layout, lay_out, priors, scales
 from auvnn.diagnosis.left_out import LeftOut
-from auvnn.diagnosis.nuisance import Layout, lay_out, priors, scales
-from auvnn.diagnosis.one_step_fit import explain_one_step
+from auvnn.diagnosis.one_step.fit import fit_hypothesis_one_step
 from auvnn.effects import Effect
+from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
 from auvnn.improvement.free_run import STEPS, FreeRunFit, fit_free_run
 from auvnn.improvement.judge import NEWTON, Judge
 from auvnn.metrics.one_step import Derivative
 from auvnn.models import GreyBox
-from auvnn.training.free_parameters import Priors, limits, parameters_of, set_parameters
 
 Array = NDArray[np.float64]
 # Length of the stretches whose sums a fit one step ahead keeps apart, s.
@@ -149,7 +149,7 @@ def fitted_one_step(
     layout, names, _ = laid_out(base, recipe)
     log = replace(judge.log, runs=tuple(run.cleaned for run in judge.log.runs))
     free = [n for n in names if n not in recipe.effects]
-    found = explain_one_step(layout, log, free, recipe.effects, how)
+    found = fit_hypothesis_one_step(layout, log, free, recipe.effects, how)
     sums, starts = found.fitted.statistics, {run.number: run.t for run in judge.log.runs}
     begin = np.array([starts[int(r)][f] for r, f in zip(sums.run, sums.first, strict=True)])
     _, apart = judge.folds.stretches(sums.run, begin, begin + STRETCH)

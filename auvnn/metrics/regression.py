@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.logs import Log, Run
-from auvnn.logs.derivatives import LocalPolynomial
-from auvnn.logs.rotation import conjugate, rotate
+from auvnn.logs.signals.derivatives import LocalPolynomial
+from auvnn.logs.signals.rotation import conjugate, rotate
 from auvnn.metrics.folds import Folds
 from auvnn.metrics.one_step import Derivative, integrated
 from auvnn.metrics.rollouts import NAMES, Rolled, Scale, scored

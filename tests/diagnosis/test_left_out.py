@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_logs import make_log, small_vehicle
 
 from auvnn.diagnosis.left_out import each_name, gain, left_out, left_out_by
 from auvnn.diagnosis.left_out_folds import folds_of
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
+from tests.small_logs import make_log, small_vehicle
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from auvnn.errors import AuvnnError
-from auvnn.plants.base import LIMIT, Motion, Task, diverged
+from auvnn.plants.base import LIMIT, Motion, PlantTask, diverged
 from auvnn.plants.independent.equations import Equations, Held
 from auvnn.plants.independent.sensors import Reported, report
 from auvnn.plants.independent.thrust import Actuators
@@ -41,7 +41,7 @@ class Stretch:
         task: what to do.
     """
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: PlantTask) -> None:
         """Begin at the first row."""
         self.task = task
         self.actuators = Actuators(task.vehicle, task.actuation, task.effects)
