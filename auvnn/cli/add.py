@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from auvnn.cli.dry import foreseen
 from auvnn.cli.job import Answering, Job, Verb
 
 
@@ -13,13 +14,14 @@ def _run(job: Job) -> Answering:
     model, say = job.model(log), job.say
     better = add(
         model, log, effects,
-        test=test, derivative=job["derivative"], window=job["window"], objective=job["objective"],
+        test=test, derivative=job["derivative"], window=job["window"], objective=job["objective"]["objective"],
         force=job["force"], progress=say.progress,
     )  # fmt: skip
     better.model.save(job.folder / "model")
     better.write(job.folder)
     data = better.to_dict()
-    say(f"assumed   {data['held_out']}")
+    said = "assumed" if test is None else "test"
+    say(f"{said:<9} {data['held_out']}")
     job.warn(data["warnings"])
     for name, values in data["parameters"].items():
         say(f"fitted    {name}: {parameters({'parameters': values})}")
@@ -37,4 +39,5 @@ VERB = Verb(
     reads=("log", "mapping", "model", "test"),
     writes=("improvement.json", "model/", "report.html", "figures/"),
     run=_run,
+    foresee=foreseen,
 )

@@ -120,6 +120,8 @@ def _run(verb: Verb, composer: Composer, config: DictConfig, out: Path) -> None:
             files(options, key)
     if options["dry_run"]:
         refuse_taken(out, overwrite=options["overwrite"])
+        if verb.foresee is not None:
+            verb.foresee(Job(options, out, out, say))
         for key in verb.reads:
             if options[key] is not None:
                 say(f"would read   {key}={options[key]}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from auvnn.cli.dry import foreseen
 from auvnn.cli.job import Answering, Job, Verb
 
 _STYLE = {"error": "red", "warning": "yellow"}
@@ -34,4 +35,5 @@ VERB = Verb(
     reads=("log", "mapping", "model"),
     writes=("quality.json", "report.html", "figures/"),
     run=_run,
+    foresee=foreseen,
 )

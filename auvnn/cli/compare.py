@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from auvnn.cli.dry import foreseen
 from auvnn.cli.job import Answering, Job, Verb
 from auvnn.cli.results import horizons
 
@@ -28,4 +29,5 @@ VERB = Verb(
     reads=("log", "mapping", "model"),
     writes=("comparison.json", "predictions.parquet", "report.html", "figures/"),
     run=_run,
+    foresee=foreseen,
 )

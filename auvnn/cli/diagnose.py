@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from auvnn.cli.dry import foreseen
 from auvnn.cli.job import Answering, Job, Verb, files
 from auvnn.errors import ConfigError
 
@@ -35,14 +36,14 @@ def _in_memory(job: Job) -> Diagnosis:
 
 def _in_parts(job: Job) -> Diagnosis:
     from auvnn.diagnosis.full_data.large_logs import diagnose_files
-    from auvnn.logs.reading.portions import kind_of
+    from auvnn.logs.reading.portions import kinds_of
 
     if job["max_duration"] is not None:
         raise ConfigError("max_duration= reads the beginning of each file: leave it out, or say stream=false")
     paths, mapping = files(job.options, "log"), job.mapping()
     job.say(f"log       {len(paths)} files, read in parts by {job['workers']} workers")
     return diagnose_files(
-        job.model(kind=kind_of(paths, mapping)), paths, _effects(job),
+        job.model(kinds=kinds_of(paths, mapping)), paths, _effects(job),
         mapping=mapping, progress=job.say.progress, **_options(job), **_shares(job),
     )  # fmt: skip
 
@@ -68,4 +69,5 @@ VERB = Verb(
     reads=("log", "mapping", "model"),
     writes=("diagnosis.json", "report.html", "figures/"),
     run=_run,
+    foresee=foreseen,
 )

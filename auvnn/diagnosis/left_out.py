@@ -11,20 +11,22 @@ Reference: Stone (1974), JRSS B 36(2) 111-147 (cross-validation); Kuensch (1989)
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.fitters import Fitter, fitter_for
+from auvnn.diagnosis.fitters import ByWindows, Fitter, at, fitter_for
 from auvnn.diagnosis.hypotheses.bake import with_fitted_parameters
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.layout import Layout, lay_out
 from auvnn.diagnosis.left_out_folds import MOST_FOLDS, Fold, folds_of
 from auvnn.errors import InputError
+from auvnn.estimation.prediction_error import SINGULAR, FitError
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import NAMES, Rolled, Scale, roll, scale_of
+from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
@@ -94,6 +96,10 @@ class LeftOut:
         """Run to the mean error of its windows."""
         return {int(r): _mean(self.nrmse(self.run == r)) for r in np.unique(self.run)}
 
+    def empty(self) -> LeftOut:
+        """Return the same windows without any error."""
+        return replace(self, squared=np.zeros_like(self.squared))
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
         return {
@@ -119,6 +125,7 @@ class Gain:
         by_dof: velocity to fall and standard error; only those that are excited.
         before: the total before.
         after: the total after.
+        after_by_dof: velocity to the error after.
     """
 
     value: float
@@ -126,6 +133,7 @@ class Gain:
     by_dof: dict[str, tuple[float, float]]
     before: float
     after: float
+    after_by_dof: dict[str, float] = field(default_factory=dict)
 
     def beyond(self, errors: float = 1.0) -> bool:
         """Whether the fall is more than so many of its standard errors."""
@@ -177,7 +185,7 @@ def gain(before: LeftOut, after: LeftOut) -> Gain:
     by_dof = {
         n: (float(whole[k + 1]), float(std[k + 1])) for k, n in enumerate(NAMES) if np.isfinite(whole[k + 1])
     }
-    return Gain(float(whole[0]), float(std[0]), by_dof, before.total, after.total)
+    return Gain(float(whole[0]), float(std[0]), by_dof, before.total, after.total, after.by_dof)
 
 
 @dataclass(frozen=True)
@@ -219,7 +227,7 @@ def left_out_by(
     for fold in folds:
         try:
             models.append(make(fold.fit))
-        except (FloatingPointError, np.linalg.LinAlgError, RuntimeError) as problem:
+        except (FitError, FloatingPointError, np.linalg.LinAlgError, SINGULAR) as problem:
             runs = ", ".join(str(r.number) for r in fold.held.runs)
             reason = f"the fit without run {runs} failed: {problem}"
             break
@@ -321,13 +329,47 @@ def _of_names(
         say(f"fitting {words} without part {k + 1} of {len(folds)}")
         try:
             own = fitter.without(layout, found, fold, refit)
-        except (FloatingPointError, np.linalg.LinAlgError) as problem:
+        except (FitError, FloatingPointError, np.linalg.LinAlgError) as problem:
             runs = ", ".join(str(r.number) for r in fold.held.runs)
             reason = f"the fit without run {runs} failed: {problem}"
             break
         out.append(with_fitted_parameters(model, layout, own))
     how = "refitted without each fold" if refit else "one Newton step from the fit to all runs, for each fold"
     return _rolled(out, log, folds, names, reason, how), found
+
+
+def left_out_found(
+    layout: Layout,
+    found: FittedHypothesis,
+    windows: Windows,
+    log: Log,
+    *,
+    refit: bool = False,
+    most: int = MOST_FOLDS,
+) -> LeftOut:
+    """Return the errors on what is left out of an explanation that has been fitted to all windows of a log.
+
+    Args:
+        layout: stated values.
+        found: the fit to all windows.
+        windows: of the log.
+        log: the log.
+        refit: fit again without each fold; otherwise take one Newton step from the fit to everything.
+        most: folds at most.
+
+    Raises:
+        InputError: no part that is left out is long enough to run free over it.
+    """
+    fitter, folds, out, reason = ByWindows(windows), folds_of(log, most), [], ""
+    for fold in folds:
+        try:
+            own = fitter.without(layout, found, fold, refit)
+        except (FitError, FloatingPointError, np.linalg.LinAlgError) as problem:
+            reason = str(problem)
+            break
+        out.append(at(layout, own.names, own.fitted.theta).without_absent())
+    how = "refitted without each fold" if refit else "one Newton step from the fit to all runs, for each fold"
+    return _rolled(out, log, folds, found.effects, reason, how)
 
 
 def _rolled(

@@ -38,7 +38,7 @@ def folds_of(log: Log, most: int = MOST_FOLDS) -> list[Fold]:
     Raises:
         InputError: a single run is too short for that.
     """
-    runs: tuple[Run, ...] = tuple(log.runs)
+    runs: list[Run] = [*log.runs]
     if len(runs) > 1:
         groups = np.arange(len(runs)) % min(most, len(runs))
         return [

@@ -1,6 +1,13 @@
-"""The whole loop in one call: a better model and an error budget, whatever the log."""
+"""Adding what is missing, and what that changes on data held out.
 
+`improve` walks the whole loop: check, compare, diagnose, add what pays, learn the rest, and the error budget. `add`
+refits with effects and compares before and after, `gains` says by how much free running improves and how sure that is,
+`fleet` fits the same effects over many dives, `trend` asks whether a parameter changes from dive to dive.
+"""
+
+from auvnn.improvement.add import Improvement, add
 from auvnn.improvement.answer import Improved, Step
+from auvnn.improvement.fleet import Fleet, fleet
 from auvnn.improvement.loop import improve
 
-__all__ = ["Improved", "Step", "improve"]
+__all__ = ["Fleet", "Improved", "Improvement", "Step", "add", "fleet", "improve"]

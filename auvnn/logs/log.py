@@ -111,6 +111,10 @@ class Log:
         """What actuates the vehicle: "thrusters" where there are thruster commands, else "wrench"."""
         return self.runs[0].kind
 
+    def drives(self, kind: str) -> bool:
+        """Whether every run has commands of a kind, "thrusters" or "wrench"."""
+        return all((run.thrusters if kind == "thrusters" else run.wrench) is not None for run in self.runs)
+
     @property
     def n_thrusters(self) -> int:
         """Number of thruster commands, 0 for a log with a wrench alone."""

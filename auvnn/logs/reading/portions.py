@@ -129,7 +129,18 @@ def kind_of(paths: Sequence[Path], mapping: Any = None) -> str:
     Raises:
         InputError: they cannot be read.
     """
-    return read_portion(paths[0], Mapping.read(mapping), 0, _FIRST).runs[0].kind
+    return kinds_of(paths, mapping)[0]
+
+
+def kinds_of(paths: Sequence[Path], mapping: Any = None) -> tuple[str, ...]:
+    """Return what commands a log has, by the first rows of its first file, the kind that is taken by default first.
+
+    Raises:
+        InputError: they cannot be read.
+    """
+    run = read_portion(paths[0], Mapping.read(mapping), 0, _FIRST).runs[0]
+    there = {"thrusters": run.thrusters is not None, "wrench": run.wrench is not None}
+    return (run.kind, *(k for k, known in there.items() if known and k != run.kind))
 
 
 # s since 1970 beyond which a stamp is a date.
