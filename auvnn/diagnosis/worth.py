@@ -20,7 +20,7 @@ from auvnn.diagnosis.left_out import Gain, LeftOut, gain, left_out_found
 from auvnn.diagnosis.residuals.variance_component import Unnamed
 from auvnn.diagnosis.state import Setting, State
 from auvnn.errors import InputError
-from auvnn.improvement.gains import noise_floor
+from auvnn.metrics.floor import noise_floor
 from auvnn.metrics.rollouts import roll, scale_of
 
 Array = NDArray[np.float64]
