@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from auvnn.answers import Answer, plain
 from auvnn.catalogue import unknown_name
+from auvnn.comparison.beside import beside
 from auvnn.comparison.compare import stitch
 from auvnn.diagnosis.answers.table import values
 from auvnn.diagnosis.hypotheses.bake import with_fitted_parameters
@@ -71,6 +72,7 @@ class Improvement(Answer):
     objective: str = "rollout"
     left_out: dict[str, float] | None = None
     steps: list[dict[str, Any]] = field(default_factory=list)
+    baseline: dict[str, Any] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
@@ -89,6 +91,7 @@ class Improvement(Answer):
             "held_out",
             "objective",
             "left_out",
+            "baseline",
             "warnings",
         )
         return plain(
@@ -226,6 +229,7 @@ def add(
             }
             for k, (step, candidate) in enumerate(models)
         ],
+        beside(rolled[last], model.actuation, scale, log, choose_derivative(log, derivative), left_out=False),
     )
 
 

@@ -122,6 +122,7 @@ class Improved(Answer):
             "loses",
             "left_out",
             "objective",
+            "verdict",
             "folds",
             "horizon",
             "diagnoses",
@@ -141,6 +142,15 @@ class Improved(Answer):
             }
         )
 
+    @property
+    def verdict(self) -> str:
+        """The answer in one sentence."""
+        errors = [w["error"] for w in self.waterfall if w["step"] != "noise floor"]
+        if not self.steps:
+            return f"nothing paid: the model stays as given ({_number(errors[0])} on {self.test})"
+        names = ", ".join(s.step for s in self.steps)
+        return f"from {_number(errors[0])} to {_number(errors[-1])} on {self.test} by {names}; {self.stopped}"
+
     def history(self) -> Mapping[str, GreyBox]:
         """Return the model after every step, as given first, by the name of its folder."""
         found = {"00-as-given": self.given}
@@ -156,3 +166,7 @@ class Improved(Answer):
         for name, model in self.history().items():
             model.save(folder / "history" / name, overwrite=True)
         return super().write(folder, report=report)
+
+
+def _number(value: float | None) -> str:
+    return "unknown" if value is None or value != value else f"{value:.3g}"

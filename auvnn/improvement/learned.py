@@ -23,6 +23,7 @@ from auvnn.improvement.state import Recipe, State, held_by, laid_out, starting
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
 # How many of its scales a learned parameter may be away from nothing: what is tried.
 RIDGES = (10.0, 3.0, 1.0, 0.3, 0.1, 0.03)
 # Inputs of the residual force that are tried.
@@ -36,6 +37,8 @@ SUBSETS = (
     ("tilt", "velocity", "command"),
     INPUTS,
 )
+# Of terms that promise at least this share of what the best one does, the one with the fewest weights is taken.
+NEARLY = 0.8
 KINDS = ("polynomial", "residual_force")
 EFFECT = {"polynomial": "learned_drag", "residual_force": "residual_force"}
 
@@ -79,13 +82,13 @@ def choose(base: GreyBox, judge: Judge, state: State, kind: str) -> Choice | Non
     sums = (begin, *normal_equations(model, task, names))
     weight = 1.0 if state.fit is None else state.fit.weight
 
-    def foreseen(columns: Array, trial: Recipe) -> float:
+    def foreseen(columns: Index, trial: Recipe) -> float:
         return _foreseen(layout, trial, names, columns, sums, weight, own, free, judge)
 
     own_columns = layout.places(names)[name]
     others = np.setdiff1d(np.arange(len(begin)), own_columns)
     before = foreseen(others, recipe)
-    best: Choice | None = None
+    found: list[tuple[int, Choice]] = []
     for inputs in SUBSETS if kind == "residual_force" else (None,):
         mine = _columns(layout.model.effect(name), own_columns, inputs)
         if not len(mine):
@@ -93,9 +96,13 @@ def choose(base: GreyBox, judge: Judge, state: State, kind: str) -> Choice | Non
         for ridge in RIDGES:
             trial = _with(base, state.recipe, name, inputs, ridge)
             fall = (before - foreseen(np.sort(np.concatenate([others, mine])), trial)) / max(before, 1e-300)
-            if fall > PROMISE and (best is None or fall > best.fall):
-                best = Choice(trial, float(fall), " and ".join(inputs) if inputs else "velocity")
-    return best
+            if fall > PROMISE:
+                words = " and ".join(inputs) if inputs else "velocity"
+                found.append((len(mine), Choice(trial, float(fall), words)))
+    if not found:
+        return None
+    most = max(choice.fall for _, choice in found)
+    return min((c for c in found if c[1].fall >= NEARLY * most), key=lambda c: (c[0], -c[1].fall))[1]
 
 
 def _with(base: GreyBox, recipe: Recipe, name: str, inputs: Sequence[str] | None, ridge: float) -> Recipe:
@@ -112,7 +119,7 @@ def _with(base: GreyBox, recipe: Recipe, name: str, inputs: Sequence[str] | None
     )
 
 
-def _columns(effect: Effect, columns: Array, inputs: Sequence[str] | None) -> Array:
+def _columns(effect: Effect, columns: Index, inputs: Sequence[str] | None) -> Index:
     """Return those columns of an effect whose parameters belong to some inputs."""
     if inputs is None:
         return columns
@@ -127,7 +134,7 @@ def _foreseen(
     layout: Layout,
     recipe: Recipe,
     names: Sequence[str],
-    index: Array,
+    index: Index,
     sums: tuple[Array, Array, Array, Array],
     weight: float,
     own: NDArray[np.int64],
@@ -137,7 +144,6 @@ def _foreseen(
     """Return the squared error of all folds, each foreseen by the others, some columns free."""
     begin, hessian, slope, cost = sums
     held = held_by(layout, names, recipe)
-    assert held.reach is not None
     total = 0.0
     precision, mean = held.precision[index], held.mean[index]
     fit = FreeRunFit(
