@@ -44,6 +44,8 @@ FAILURES = (FloatingPointError, np.linalg.LinAlgError, RuntimeError, ValueError,
 FITTED = 3
 # A diagnosis sees at most so many seconds of a log.
 DIAGNOSED = 300.0
+# Share of the time after which a diagnosis is broken off: prediction shall have its turn.
+PATIENCE = 0.4
 # Rounds of diagnosis at most.
 ROUNDS = 3
 
@@ -107,6 +109,10 @@ def improve(
             walk.learn(kind)
     walk.polish()
     return walk.end(test, held_out)
+
+
+class _TooLong(Exception):
+    """The time for a diagnosis is up."""
 
 
 class Walk:
@@ -228,6 +234,7 @@ class Walk:
             if self.late() or self._full():
                 return
             self.say(f"diagnosing what is missing ({number + 1})")
+            patience = max(self.limit * PATIENCE - (time.monotonic() - self.began), 0.0)
             asked = (
                 None
                 if self.effects is None
@@ -243,8 +250,15 @@ class Walk:
                     force=True,
                     advice=False,
                     whiteness=False,
-                    progress=self.say,
+                    costs=False,
+                    progress=self._until(time.monotonic() + patience),
                 )
+            except _TooLong:
+                self.told(
+                    f"Diagnose: broken off, it took too long (seconds={self.limit:g} for everything): no cause is named "
+                    "in this round."
+                )
+                return
             except FAILURES as problem:
                 self._failed("the diagnosis", problem)
                 return
@@ -272,6 +286,16 @@ class Walk:
             if found.verdict == "named" and last == "adequate":
                 self.adequate = True
                 return
+
+    def _until(self, end: float) -> Callable[[str], None]:
+        """Return who tells what is being done, and breaks it off after a time."""
+
+        def say(words: str) -> None:
+            if time.monotonic() > end:
+                raise _TooLong
+            self.say(words)
+
+        return say
 
     def _add_best(self, group: Sequence[str], kind: str, reason: str, *, rivals: bool = False) -> bool:
         """Fit each of a group, take the one that foresees best if it pays, and say so."""

@@ -25,7 +25,7 @@ from auvnn.metrics.windows import Windows, commands
 
 Array = NDArray[np.float64]
 # Directions of the regressors of which the log says less than this, beside the best known one, are left alone.
-SEEN = 1e-8
+SEEN = 1e-12
 DOWN = np.array([0.0, 0.0, 1.0])
 # Beyond these speeds, m/s and rad/s, a free run has left what is physical.
 LIMIT = 1e3
