@@ -27,6 +27,7 @@ __all__ = [
     "diagnose",
     "diagnose_files",
     "fleet",
+    "improve",
     "load",
     "remove",
     "simulate",
@@ -37,7 +38,7 @@ __all__ = [
 if TYPE_CHECKING:
     from auvnn.comparison import compare
     from auvnn.diagnosis import diagnose, diagnose_files
-    from auvnn.improvement import add, fleet
+    from auvnn.improvement import add, fleet, improve
     from auvnn.logs import Log, check
     from auvnn.models import GreyBox, load, remove
     from auvnn.online import adapt
@@ -57,6 +58,7 @@ _WHERE = {
     "diagnose": "auvnn.diagnosis",
     "diagnose_files": "auvnn.diagnosis",
     "fleet": "auvnn.improvement",
+    "improve": "auvnn.improvement",
     "load": "auvnn.models",
     "remove": "auvnn.models",
     "simulate": "auvnn.simulation",

@@ -7,6 +7,7 @@ from auvnn.cli.job import Answering, Job, Verb
 
 
 def _run(job: Job) -> Answering:
+    from auvnn.comparison.beside import words
     from auvnn.diagnosis.answers.words import parameters
     from auvnn.improvement import add
 
@@ -23,6 +24,8 @@ def _run(job: Job) -> Answering:
     said = "assumed" if test is None else "test"
     say(f"{said:<9} {data['held_out']}")
     job.warn(data["warnings"])
+    for line in words(better.baseline):
+        say(f"baseline  {line}")
     for name, values in data["parameters"].items():
         say(f"fitted    {name}: {parameters({'parameters': values})}")
     for step in data["waterfall"]:

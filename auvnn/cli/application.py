@@ -149,7 +149,7 @@ def _job(name: str, verb: Verb, composer: Composer, config: DictConfig) -> int:
 
 def _run(verb: Verb, composer: Composer, config: DictConfig, out: Path) -> None:
     options = composer.options(config)
-    say = Speaker(only_json=options["json"])
+    say = Speaker(only_json=options["json"], verbose=options["verbose"])
     for key in verb.reads:
         # A model may also be a name, which is not ours to judge.
         if options[key] is not None and (key != "model" or _is_path(options[key])):

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 
 def _run(job: Job) -> Answering:
+    from auvnn.comparison.beside import words
     from auvnn.logs.reading.portions import is_large
 
     parted = job["stream"]
@@ -22,6 +23,8 @@ def _run(job: Job) -> Answering:
     diagnosis.write(job.folder)
     data = diagnosis.to_dict()
     job.warn(data["warnings"])
+    for line in words(diagnosis.baseline):
+        job.say(f"baseline  {line}")
     for line in data["story"]:
         job.say(f"result    {line}")
     return diagnosis

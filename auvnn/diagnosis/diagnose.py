@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from auvnn.checks.doubts import doubts
+from auvnn.comparison.beside import stands
 from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
@@ -17,6 +18,7 @@ from auvnn.diagnosis.stages.state import Searched, Setting
 from auvnn.errors import ConfigError
 from auvnn.estimation.normal_equations import TRUST, motion
 from auvnn.logs import Log
+from auvnn.metrics.one_step import choose_derivative
 from auvnn.models import GreyBox
 from auvnn.training.confounding.confounded_effects import confounded_effects
 
@@ -128,4 +130,5 @@ def searched(
     if found.absorbed is not None:
         found.warnings += found.absorbed.words()
     found.warnings += doubts(model, log)
+    found.baseline = stands(model, log, choose_derivative(log))
     return found, under_way

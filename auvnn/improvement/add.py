@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from auvnn.catalogue import unknown_name
+from auvnn.comparison.beside import beside
 from auvnn.comparison.compare import stitch
 from auvnn.diagnosis.answers.answer import OneOf
 from auvnn.diagnosis.answers.table import values
@@ -19,6 +20,7 @@ from auvnn.improvement.held_out import Judged, judge, words
 from auvnn.logs import Log
 from auvnn.logs.leakage import leakage
 from auvnn.metrics.noise_floor import noise_floor
+from auvnn.metrics.one_step import choose_derivative
 from auvnn.metrics.rollouts import HORIZONS
 from auvnn.models import GreyBox
 
@@ -73,7 +75,7 @@ def add(
     notes += unseen(fits.layout, fits.best, names, log)
     say("free running on the held-out data")
     judged = judge(fits, names, test, horizons, derivative, objective == "one_step")
-    return _assembled(model, log, test, names, fits, judged, objective, held_out, notes)
+    return _assembled(model, log, test, names, fits, judged, objective, held_out, notes, derivative)
 
 
 def _wanted(effects: str | Sequence[str]) -> tuple[list[str], list[str]]:
@@ -98,6 +100,7 @@ def _assembled(
     objective: str,
     held_out: str,
     notes: list[str],
+    derivative: dict[str, Any] | None,
 ) -> Improvement:
     """Return the answer."""
     layout, best, last, key = fits.layout, fits.best, names[-1], judged.key
@@ -155,6 +158,14 @@ def _assembled(
             for k, (step, candidate) in enumerate(fits.steps)
         ],
         by_effect=judged.by_effect,
+        baseline=beside(
+            rolled[last],
+            model.actuation,
+            judged.scale,
+            log,
+            choose_derivative(log, derivative),
+            left_out=False,
+        ),
     )
 
 

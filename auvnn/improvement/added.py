@@ -19,6 +19,7 @@ class Improvement(Answer):
             brings a fall of its own that is beyond its own uncertainty.
         by_effect: effect to the fall of the held-out error that it brings beside the others, everything else refitted,
             whether that is beyond its uncertainty, and what else to mind of it.
+        baseline: what a plain regression and holding the initial velocity reach on the held-out data.
         better: the model with the effects.
         refitted_model: the model as given, its uncertain coefficients refitted.
         left_out: where one-step errors were fitted, their weighted size on runs of `log` left out in turn: before
@@ -49,6 +50,7 @@ class Improvement(Answer):
     left_out: dict[str, float] | None = None
     steps: list[dict[str, Any]] = field(default_factory=list)
     by_effect: dict[str, dict[str, Any]] = field(default_factory=dict)
+    baseline: dict[str, Any] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
@@ -68,6 +70,7 @@ class Improvement(Answer):
             "objective",
             "left_out",
             "by_effect",
+            "baseline",
             "warnings",
         )
         return plain(

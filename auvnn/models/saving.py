@@ -40,7 +40,9 @@ def save(model: GreyBox, folder: str | Path, *, overwrite: bool = False) -> Path
         InputError: the folder exists, is not empty and `overwrite` is not set.
     """
     path = Path(folder)
-    write_folder(path, contents(model, path), overwrite=overwrite, readable=lambda files: read_again(files, path))
+    write_folder(
+        path, contents(model, path), overwrite=overwrite, readable=lambda files: read_again(files, path)
+    )
     return path
 
 

@@ -34,6 +34,7 @@ class Diagnosis(Answer):
         moved: stated coefficients that were moved by more than two of their standard deviations.
         tolerance: what does not matter.
         judged_by: how the costs were worked out.
+        baseline: error of the model as given, of a plain regression and of persistence, and where it loses to them.
     """
 
     kind = "diagnosis"
@@ -63,6 +64,7 @@ class Diagnosis(Answer):
     tolerance: dict[str, float] = field(default_factory=dict)
     judged_by: str = ""
     whole_log: dict[str, Any] | None = None
+    baseline: dict[str, Any] = field(default_factory=dict)
 
     @property
     def surfaces(self) -> list[dict[str, Any]]:
@@ -115,6 +117,7 @@ class Diagnosis(Answer):
             "residual_tests",
             "story",
             "whole_log",
+            "baseline",
         )
         absorbed = None if self.absorbed is None else self.absorbed.to_dict()
         return plain(

@@ -48,7 +48,7 @@ class DiagnosisPage(Page):
         by_name = {str(c.get("effect")): c for c in candidates}
         leading = [by_name[m] for m in missing if m in by_name]
         left = finite(view.get("unexplained"))
-        out = [_first_sentence(verdict, missing)]
+        out = [_first_sentence(verdict, missing), *common.baseline_words(view)[1:]]
         if verdict in ("named", "ambiguous"):
             out += [_candidate_words(c) for c in leading[:3]]
             out += _rival_words(candidates, missing)
@@ -148,6 +148,7 @@ class DiagnosisPage(Page):
         return [
             HtmlTable("Steps of the search", ["step", "verdict", "effects"], steps, words=3),
             *_whole_log(view),
+            common.baseline_table(view),
             HtmlTable("All candidates", head, rows, caption, words=2),
             HtmlTable("Parameters of every candidate", *_parameter_columns(fitted), folded=True, words=2),
             HtmlTable(
