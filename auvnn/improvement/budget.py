@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from auvnn.comparison.compare import stitch
-from auvnn.improvement.gains import noise_floor
+from auvnn.metrics.noise_floor import noise_floor
 from auvnn.logs import Log
 from auvnn.metrics.one_step import Derivative
 from auvnn.metrics.regression import Regression, baseline, worse_than
