@@ -16,7 +16,8 @@ from auvnn.comparison.beside import beside
 from auvnn.comparison.locate import AXES, failures, locate
 from auvnn.errors import ConfigError
 from auvnn.logs import Log
-from auvnn.metrics.one_step import OneStep, choose_derivative, one_step, scores
+from auvnn.metrics.derivative import choose_derivative
+from auvnn.metrics.one_step import OneStep, one_step, scores
 from auvnn.metrics.rollouts import HORIZONS, NAMES, Rolled, rollout_table, scale_of
 from auvnn.models import GreyBox
 from auvnn.models.excursions import region_of, words_of

@@ -18,7 +18,7 @@ from auvnn.diagnosis.stages.state import Searched, Setting
 from auvnn.errors import ConfigError
 from auvnn.estimation.normal_equations import TRUST, motion
 from auvnn.logs import Log
-from auvnn.metrics.one_step import choose_derivative
+from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
 from auvnn.training.confounding.confounded_effects import confounded_effects
 

@@ -22,7 +22,7 @@ from auvnn.errors import ConfigError
 from auvnn.estimation.prediction_error import Fitted, fit
 from auvnn.estimation.priors import limits, parameters_of, set_parameters
 from auvnn.logs import Log
-from auvnn.metrics.one_step import Derivative, choose_derivative
+from auvnn.metrics.derivative import Derivative, choose_derivative
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 

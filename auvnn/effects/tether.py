@@ -7,7 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Extent, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Extent, Moment, Parameter
 from auvnn.physics.products import matvec
 
 TINY = 1e-12

@@ -35,7 +35,7 @@ from auvnn.improvement.state import (
 )
 from auvnn.logs import Log
 from auvnn.logs.leakage import leakage
-from auvnn.metrics.one_step import choose_derivative
+from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
 
 # Numerical failures of one step: the step is told and left out, the loop goes on.

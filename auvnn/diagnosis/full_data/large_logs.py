@@ -38,7 +38,8 @@ from auvnn.diagnosis.stages.state import Searched
 from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.priors import set_parameters
 from auvnn.executors import Executor, executor_for
-from auvnn.log_chunks.windows import Plan, WindowCut, concatenate_windows, plan_file, runs_of
+from auvnn.log_chunks.scan import Plan, WindowCut
+from auvnn.log_chunks.windows import concatenate_windows, plan_file, runs_of
 from auvnn.logs import Log
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.logs.reading.portions import log_files

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.layout import Layout
-from auvnn.effects.base import Body
+from auvnn.effects.hooks import Body
 from auvnn.estimation.priors import set_parameters
 from auvnn.models import GreyBox
 from auvnn.vehicle import Vehicle
