@@ -9,6 +9,11 @@ _STYLE = {"error": "red", "warning": "yellow"}
 
 def _run(job: Job) -> Answering:
     log = job.log(repairs=False)  # they are findings too
+    if job["seal"]:
+        from auvnn.logs.seal import file_hash, write_seal
+
+        for path in log.paths:
+            job.say(f"sealed    {write_seal(path, file_hash(path))}")
     quality = log.quality()
     if job["model"] is not None:
         from auvnn.checks import check_actuators
