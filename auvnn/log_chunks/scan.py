@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from auvnn.errors import InputError
 from auvnn.logs import Run
 from auvnn.logs.reading.mapping import Mapping
-from auvnn.logs.reading.portions import Portion, read_portion, rows_in
+from auvnn.logs.reading.portions import Portion, read_portion, rows_in, verify
 from auvnn.metrics.windows import commands, starts
 
 Array = NDArray[np.float64]
@@ -151,6 +151,7 @@ class ScanState:
         Raises:
             InputError: it cannot be read, rows of one run are apart, or none of its rows can be used.
         """
+        verify(self.path)
         total = rows_in(self.path)
         at, size, failed = 0, ROWS, None
         while at < total:

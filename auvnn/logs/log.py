@@ -28,7 +28,10 @@ class Log:
         name: what to call the log in words and file names.
         paths: the files it was read from; empty for a log made in memory.
         repairs: what was mended or noted while reading.
-        sha256: of the files' bytes where it was read, of the samples where it was made in memory.
+        sha256: of the files' bytes where it was read, of the samples where it was made in memory; where only the
+            beginning of a file was read, of that.
+        unknown: columns that are kept and not used.
+        unsealed: files in which damage that leaves numbers readable cannot be seen.
 
     Raises:
         InputError: there is no run, a number occurs twice, or the runs' columns differ.
@@ -40,6 +43,7 @@ class Log:
     repairs: tuple[Repair, ...] = ()
     sha256: str = ""
     unknown: tuple[str, ...] = field(default=(), kw_only=True)
+    unsealed: tuple[Path, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         """Check that the runs belong together."""

@@ -19,7 +19,7 @@ import auvnn
 from auvnn.errors import ConfigError, InputError
 from auvnn.executors import EXECUTORS, executor_for
 from auvnn.log_chunks import samples as pieces
-from auvnn.log_chunks import windows as parts
+from auvnn.log_chunks import scan as parts
 from auvnn.log_chunks.samples import Reading, evenly_spread_runs, pieces_of_file
 from auvnn.logs import Log
 from auvnn.logs.reading.mapping import Mapping
