@@ -184,7 +184,7 @@ class Log:
         if self.unmeasured:
             raise InputError(
                 f"log '{self.name}': {', '.join(self.unmeasured)} not measured; comparing and fitting need attitude "
-                "and all of u, v, w, p, q, r in some samples. `auvnn check` reads such a log; a mapping can make velocities of "
+                "and u, v, w, p, q, r in some samples. `auvnn check` reads such a log; a mapping can make velocities of "
                 "positions (difference: true)"
             )
 
