@@ -90,6 +90,7 @@ def compare(
         ConfigError: a horizon that is no positive number.
     """
     wanted = tuple(_horizon(h) for h in horizons)
+    log.refuse_unmeasured()
     how = choose_derivative(log, derivative)
     parts = one_step(model, log, how)
     scale = scale_of(log)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from auvnn.errors import ConfigError, InputError
+from auvnn.logs.channels import VELOCITY
 from auvnn.logs.reading.repair import Repair
 from auvnn.logs.run import MIN_SAMPLES, Run
 
@@ -174,6 +175,26 @@ class Log:
     def quality(self) -> Quality:
         """Return what was read, repaired, implausible and excited; computed once."""
         return self._quality
+
+    @property
+    def unmeasured(self) -> list[str]:
+        """What a model needs of every sample and no run has measured: of attitude, u, v, w, p, q, r."""
+        absent = [n for i, n in enumerate(VELOCITY) if all(np.isnan(run.nu[:, i]).all() for run in self.runs)]
+        attitude = all(np.isnan(run.quaternion).any(axis=1).all() for run in self.runs)
+        return (["attitude"] if attitude else []) + absent
+
+    def refuse_unmeasured(self) -> None:
+        """Raise where attitude or a velocity was not measured at all.
+
+        Raises:
+            InputError: naming what is not there.
+        """
+        if self.unmeasured:
+            raise InputError(
+                f"log '{self.name}': {', '.join(self.unmeasured)} not measured; comparing and fitting need attitude "
+                "and u, v, w, p, q, r in some samples. `auvnn check` reads such a log; a mapping can make velocities of "
+                "positions (difference: true)"
+            )
 
     def select(self, numbers: int | Iterable[int]) -> Log:
         """Return a log of the runs with these numbers, in this order."""
