@@ -14,6 +14,8 @@ VERBS = Catalogue(
         "diagnose": "auvnn.cli.diagnose:VERB",
         "add": "auvnn.cli.add:VERB",
         "remove": "auvnn.cli.remove:VERB",
+        "export": "auvnn.cli.export:VERB",
+        "import": "auvnn.cli.import:VERB",
         "adapt": "auvnn.cli.adapt:VERB",
         "fleet": "auvnn.cli.fleet:VERB",
         "demo": "auvnn.cli.demo:VERB",
