@@ -11,7 +11,7 @@ import torch
 from auvnn import __version__
 from auvnn.answers import write_text
 from auvnn.exports.base import Target, Written
-from auvnn.exports.c_code import Dialect, block
+from auvnn.exports.c_code import Dialect, block, grouped
 from auvnn.exports.check import agreement
 from auvnn.exports.system import System
 from auvnn.models.rate import SIZE
@@ -116,7 +116,7 @@ def source(system: System, precision: str) -> str:
     k, whole, risen = flow.actuators.states, system.jacobian.results, _risen(system)
     parts = [
         f'/* Written by auvnn {__version__}; see {name}.h. */\n#include "{name}.h"\n\n#include <math.h>\n',
-        say.helpers(),
+        say.helpers(_together(system)),
         say.function_of(
             f"static void {name}_motion(const {real} *y, const {real} *f, const {real} *u, {real} t, {real} *rate)",
             system.motion, {"rate": system.motion.results},
@@ -154,6 +154,12 @@ def source(system: System, precision: str) -> str:
         _step(system, say, risen),
     ]  # fmt: skip
     return "\n".join(parts)
+
+
+def _together(system: System) -> set[str]:
+    """Return the functions that are called on many numbers at once."""
+    graphs = (system.motion, system.actuator_rate, system.actuator_step, system.unit, system.settled, system.jacobian)
+    return {g.scalars.operation[node] for g in graphs for node in grouped(g, g.results)[1]}
 
 
 def _risen(system: System) -> bool:
