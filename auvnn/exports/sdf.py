@@ -66,8 +66,6 @@ def lost(model: GreyBox, terms: Terms) -> list[str]:
         found.append("thrust tables: gz-sim's thrusters take newtons; look the thrust up before sending it")
     if model.vehicle.fins:
         found.append("fins: their lift is cut off at the stall angle, without the smooth stall of the model")
-    if not model.time_varying and model.prepare().body.weight_centre is not None:
-        found.append("weight that acts elsewhere than at the centre of gravity")
     return found
 
 
@@ -92,7 +90,8 @@ def document(model: GreyBox, terms: Terms) -> xml.Element:
     with torch.no_grad():
         body = (model if not model.time_varying else model.rebuilt([])).prepare().body
     b: dict[str, Any] = {
-        n: getattr(body, n).numpy() for n in ("mass", "buoyancy", "weight", "cg", "cb", "inertia", "added_mass")
+        n: getattr(body, n).numpy()
+        for n in ("mass", "buoyancy", "weight", "hangs", "cg", "cb", "inertia", "added_mass")
     }
     root = xml.Element("sdf", {"version": "1.11"})
     main = xml.SubElement(root, "model", {"name": vehicle.name})
@@ -114,11 +113,16 @@ def document(model: GreyBox, terms: Terms) -> xml.Element:
     for i in range(6):
         for j in range(i, 6):
             _text(added, SECOND[i] + SECOND[j], [matrix[i, j]])
-    # A difference of weight and buoyancy that is an effect's is one of volume.
-    lift = float(b["buoyancy"]) - (float(b["weight"]) - float(b["mass"]) * vehicle.gravity)
+    # The simulator's weight is mass times gravity at the centre of gravity: what else hangs on the body, and where,
+    # goes into displaced volume and its centre, so that force and moment are the same in every attitude.
+    weight = float(b["mass"]) * vehicle.gravity
+    lift = float(b["buoyancy"]) - (float(b["weight"]) - weight)
+    centre = b["cb"]
+    if lift != float(b["buoyancy"]):
+        centre = (weight * b["cg"] - b["weight"] * b["hangs"] + b["buoyancy"] * b["cb"]) / lift
     side = (lift / (vehicle.water_density * vehicle.gravity)) ** (1 / 3)
     hull = xml.SubElement(link, "collision", {"name": "displaced_volume"})
-    _text(hull, "pose", [*(FLU[:3] * b["cb"]), 0, 0, 0])
+    _text(hull, "pose", [*(FLU[:3] * centre), 0, 0, 0])
     _text(xml.SubElement(xml.SubElement(hull, "geometry"), "box"), "size", [side, side, side])
     _hydrodynamics(main, model, body, terms)
     if model.actuation == "thrusters":
