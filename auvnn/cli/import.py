@@ -12,7 +12,9 @@ def _run(job: Job) -> Answering:
     answer.save(job.folder / "model.yaml")
     answer.write(job.folder, report=False)
     parts = f"{answer.vehicle.n_thrusters} thrusters, {answer.vehicle.n_fins} fins"
-    job.say(f"result    {answer.vehicle.name}, {answer.vehicle.mass:g} kg, {parts} (a file of {answer.source})")
+    job.say(
+        f"result    {answer.vehicle.name}, {answer.vehicle.mass:g} kg, {parts} (a file of {answer.source})"
+    )
     for word in answer.unread:
         job.say(f"unread    {word}", style="yellow")
     for word in answer.vehicle.warnings:

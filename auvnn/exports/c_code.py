@@ -12,7 +12,8 @@ from auvnn.compiled.scalars import FUNCTIONS
 from auvnn.exports.graph import Graph
 
 INFIX = {
-    "add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "ne": "!=", "and": "&&", "or": "||",
+    "add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "ne": "!=",
+    "and": "&&", "or": "||",
 }  # fmt: skip
 WIDTH = 118
 INLINE = ("sqrt", "floor", "ceil")
@@ -73,7 +74,9 @@ class Dialect:
             if node in groups:
                 members = groups[node]
                 lines.append(f"{self.type} i{node}[{len(members)}], o{node}[{len(members)}];")
-                lines += [f"i{node}[{k}] = {self._name(graph, s.operands[m][0])};" for k, m in enumerate(members)]
+                lines += [
+                    f"i{node}[{k}] = {self._name(graph, s.operands[m][0])};" for k, m in enumerate(members)
+                ]
                 lines.append(f"{self.prefix}_many_{name}(i{node}, o{node}, {len(members)});")
                 lines += [f"const {self.type} t{m} = o{node}[{k}];" for k, m in enumerate(members)]
                 done.update(members)

@@ -15,7 +15,15 @@ from auvnn.models.actuators import Actuators
 
 SPEEDS = torch.tensor([1.5, 0.75, 0.75, 0.75, 0.75, 0.75], dtype=torch.float64)
 """Velocities up to which the terms are fitted where the damping states no region, m/s and rad/s."""
-KNOWN = ("thrust", "Coriolis", "water acceleration", "linear damping", "quadratic damping", "restoring", "fins")
+KNOWN = (
+    "thrust",
+    "Coriolis",
+    "water acceleration",
+    "linear damping",
+    "quadratic damping",
+    "restoring",
+    "fins",
+)
 COUNT = 3000
 PAIRS = tuple(combinations_with_replacement(range(6), 2))
 SMALL = 1e-9
@@ -102,7 +110,9 @@ def _wrenches(model: GreyBox, nu: Tensor, other: int) -> dict[str, Tensor]:
     place = torch.tensor([1.0, 2.0, 8.0], dtype=torch.float64) * (1 + 3 * other)
     actuators: Actuators = model.actuators
     command = torch.full((len(nu), actuators.size), 0.0 if other == 0 else 0.4, dtype=torch.float64)
-    inputs = Inputs(command, None, torch.full((len(nu),), 15.0 - other), torch.full((len(nu),), 4.0 + 3 * other))
+    inputs = Inputs(
+        command, None, torch.full((len(nu),), 15.0 - other), torch.full((len(nu),), 4.0 + 3 * other)
+    )
     inputs = replace(inputs, voltage=inputs.voltage.double(), altitude=inputs.altitude.double())  # type: ignore[union-attr]
     time = torch.full((len(nu),), 3.0 + 40.0 * other, dtype=torch.float64)
     with torch.no_grad():

@@ -11,11 +11,11 @@ from importlib.resources import files
 from pathlib import Path
 from xml.etree import ElementTree as xml
 
-from auvnn import __version__
 from auvnn.compiled import toolchain
 from auvnn.exports.base import Target, Written
 from auvnn.exports.c import header, source
 from auvnn.exports.check import agreement
+from auvnn.exports.origin import ORIGIN
 from auvnn.exports.system import System
 from auvnn.models.actuator_states import PADE
 from auvnn.models.rate import SIZE
@@ -37,7 +37,9 @@ class FmuTarget(Target):
         code = {f"{system.name}.h": header(system, precision), f"{system.name}.c": source(system, precision)}
         digest = hashlib.sha256("".join(code.values()).encode()).hexdigest()
         token = f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
-        code["fmu.c"] = _settings(system, token) + files("auvnn.exports").joinpath("fmu_wrapper.c").read_text("utf-8")
+        code["fmu.c"] = _settings(system, token) + files("auvnn.exports").joinpath("fmu_wrapper.c").read_text(
+            "utf-8"
+        )
         written = Written(system.lost(), system.notes(), agreement(system))
         parts: dict[str, bytes] = {"modelDescription.xml": description(system, token)}
         parts |= {f"sources/{name}": text.encode() for name, text in code.items()}
@@ -67,7 +69,7 @@ def _settings(system: System, token: str) -> str:
     shown, rates = _shown(system), 0 if system.delay else _shown(system)
     start = ", ".join(f"{v!r}" for v in _start(system))
     inputs = ", ".join(f"{v!r}" for v in _start_inputs(system))
-    return f"""/* Written by auvnn {__version__}. */
+    return f"""/* Written by {ORIGIN}. */
 #include "{system.name}.h"
 
 #define MODEL(name) {system.name}_##name
@@ -102,17 +104,25 @@ def description(system: System, token: str) -> bytes:
     root = xml.Element("fmiModelDescription", {
         "fmiVersion": "3.0", "modelName": system.model.vehicle.name, "instantiationToken": token,
         "description": "Equations of motion of an underwater vehicle (NED, body x forward, y starboard, z down)",
-        "generationTool": f"auvnn {__version__}", "variableNamingConvention": "structured",
+        "generationTool": f"{ORIGIN}", "variableNamingConvention": "structured",
     })  # fmt: skip
     common = {"modelIdentifier": name, "canGetAndSetFMUState": "true"}
     if not delayed:
         xml.SubElement(root, "ModelExchange", common)
-    step = {"fixedInternalStepSize": repr(system.dt)} if delayed else {"canHandleVariableCommunicationStepSize": "true"}
+    step = (
+        {"fixedInternalStepSize": repr(system.dt)}
+        if delayed
+        else {"canHandleVariableCommunicationStepSize": "true"}
+    )
     xml.SubElement(root, "CoSimulation", {**common, **step})
     units = xml.SubElement(root, "UnitDefinitions")
     for unit, base in UNITS.items():
-        xml.SubElement(xml.SubElement(units, "Unit", {"name": unit}), "BaseUnit", {k: str(v) for k, v in base.items()})
-    xml.SubElement(root, "DefaultExperiment", {"startTime": "0", "stopTime": "10", "stepSize": repr(system.dt)})
+        xml.SubElement(
+            xml.SubElement(units, "Unit", {"name": unit}), "BaseUnit", {k: str(v) for k, v in base.items()}
+        )
+    xml.SubElement(
+        root, "DefaultExperiment", {"startTime": "0", "stopTime": "10", "stepSize": repr(system.dt)}
+    )
     variables, structure = xml.SubElement(root, "ModelVariables"), xml.Element("ModelStructure")
 
     def variable(reference: int, label: str, unit: str | None, **more: str) -> None:
@@ -137,7 +147,9 @@ def description(system: System, token: str) -> bytes:
         xml.SubElement(structure, "InitialUnknown", {"valueReference": str(1 + shown + k)})
     first = 1 + shown * (1 if delayed else 2)
     for k, (label, value) in enumerate(zip(system.flow.input_names(), _start_inputs(system), strict=True)):
-        variable(first + k, label, _unit(label), causality="input", variability="continuous", start=repr(value))
+        variable(
+            first + k, label, _unit(label), causality="input", variability="continuous", start=repr(value)
+        )
     root.append(structure)
     xml.indent(root)
     return xml.tostring(root, encoding="utf-8", xml_declaration=True)
@@ -176,7 +188,9 @@ def _binary(name: str, code: dict[str, str]) -> tuple[tuple[str, bytes] | None, 
     command = toolchain.compiler()
     if command is None:
         return None, "no C compiler here: the FMU holds sources alone, for importers that compile them"
-    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(
+        platform.machine().lower(), platform.machine().lower()
+    )
     system, ending = {"Darwin": ("darwin", "dylib")}.get(platform.system(), ("linux", "so"))
     with tempfile.TemporaryDirectory() as folder:
         for file, text in code.items():
@@ -195,4 +209,7 @@ def _binary(name: str, code: dict[str, str]) -> tuple[tuple[str, bytes] | None, 
             first = next((line for line in done.stderr.splitlines() if "error" in line), "no message")
             return None, f"the compiler failed ({first.strip()[:120]}): the FMU holds sources alone"
         tuple_ = f"{machine}-{system}"
-        return (f"binaries/{tuple_}/{name}.{ending}", out.read_bytes()), f"holds the sources and a binary for {tuple_}"
+        return (
+            f"binaries/{tuple_}/{name}.{ending}",
+            out.read_bytes(),
+        ), f"holds the sources and a binary for {tuple_}"

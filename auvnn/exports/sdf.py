@@ -9,10 +9,10 @@ from xml.etree import ElementTree as xml
 import numpy as np
 import torch
 
-from auvnn import __version__
 from auvnn.answers import write_text
 from auvnn.exports.base import Target, Written
 from auvnn.exports.drag_terms import Terms, fitted
+from auvnn.exports.origin import ORIGIN
 from auvnn.exports.system import System
 from auvnn.models import GreyBox
 from auvnn.vehicle.parts import ThrustTable
@@ -42,7 +42,7 @@ class SdfTarget(Target):
         for key, value in (("name", model.vehicle.name), ("version", "1.0")):
             xml.SubElement(config, key).text = value
         xml.SubElement(config, "sdf", {"version": "1.11"}).text = "model.sdf"
-        xml.SubElement(config, "description").text = f"written by auvnn {__version__}"
+        xml.SubElement(config, "description").text = f"written by {ORIGIN}"
         xml.indent(config)
         write_text(folder / "model.config", xml.tostring(config, encoding="unicode") + "\n")
         return Written(lost(model, terms), notes(model))
@@ -55,14 +55,18 @@ def lost(model: GreyBox, terms: Terms) -> list[str]:
                                 ("learned damping", model.learned_parts()[1] is not None)) if has]  # fmt: skip
     if terms.error > 1e-6:
         names = ", ".join([*learned, *terms.effects]) or "drag"
-        found.append(f"{names}: only as the nearest linear and quadratic terms, off by {100 * terms.error:.2g} % rms")
+        found.append(
+            f"{names}: only as the nearest linear and quadratic terms, off by {100 * terms.error:.2g} % rms"
+        )
     held = {"ocean_current", "thruster_gain", *terms.effects}
     for effect in model.members:
         hooks = set(effect.hooks())
         if effect.name in held or effect.absent() or (hooks == {"body"} and not effect.time_varying):
             continue
         found.append(f"{effect.name}: gz-sim has no such effect ({effect.cause})")
-    if model.actuation == "thrusters" and any(isinstance(u.curve, ThrustTable) for u in model.vehicle.thrusters):
+    if model.actuation == "thrusters" and any(
+        isinstance(u.curve, ThrustTable) for u in model.vehicle.thrusters
+    ):
         found.append("thrust tables: gz-sim's thrusters take newtons; look the thrust up before sending it")
     if model.vehicle.fins:
         found.append("fins: their lift is cut off at the stall angle, without the smooth stall of the model")
@@ -216,7 +220,9 @@ def _fin(main: xml.Element, number: int, fin: Any, density: float) -> None:
         "filename": "gz-sim-joint-position-controller-system", "name": "gz::sim::systems::JointPositionController",
     })  # fmt: skip
     xml.SubElement(control, "joint_name").text = f"{name}_joint"
-    plugin = xml.SubElement(main, "plugin", {"filename": "gz-sim-lift-drag-system", "name": "gz::sim::systems::LiftDrag"})
+    plugin = xml.SubElement(
+        main, "plugin", {"filename": "gz-sim-lift-drag-system", "name": "gz::sim::systems::LiftDrag"}
+    )
     xml.SubElement(plugin, "link_name").text = name
     axis = np.asarray(fin.axis)
     chord = np.array([1.0, 0.0, 0.0]) - axis[0] * axis

@@ -15,7 +15,14 @@ from auvnn.imports.tree import Reader, turned
 FLU = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 AXES, VELOCITIES, SECOND = "xyzkmn", "UVWPQR", "xyzpqr"
 OWN = "{urn:auvnn}"
-SETTINGS = {"link_name", "default_current", "namespace", "water_density", "disable_coriolis", "disable_added_mass"}
+SETTINGS = {
+    "link_name",
+    "default_current",
+    "namespace",
+    "water_density",
+    "disable_coriolis",
+    "disable_added_mass",
+}
 
 
 class GzSource:
@@ -26,7 +33,9 @@ class GzSource:
         return self._plugin(root) is not None
 
     def _plugin(self, root: xml.Element) -> xml.Element | None:
-        return next((p for p in root.iter("plugin") if "ydrodynamics" in (p.get("name") or "").split("::")[-1]), None)
+        return next(
+            (p for p in root.iter("plugin") if "ydrodynamics" in (p.get("name") or "").split("::")[-1]), None
+        )
 
     def read(self, root: xml.Element, reader: Reader) -> dict[str, Any]:
         """Return the mapping of a model file."""
@@ -36,7 +45,9 @@ class GzSource:
         wanted = (plugin.findtext("link_name") or "").strip()
         link = next((k for k in model.iter("link") if k.get("name") == wanted), None)
         if link is None:
-            raise InputError(f"{reader.where}: there is no link '{wanted}', to which the hydrodynamics belong")
+            raise InputError(
+                f"{reader.where}: there is no link '{wanted}', to which the hydrodynamics belong"
+            )
         density, gravity = self._water(root, model, reader)
         mass = reader.number(link, "inertial/mass")
         pose = reader.numbers(link, "inertial/pose", (6,), np.zeros(6))
@@ -91,7 +102,9 @@ class GzSource:
             matrix[i, j] = -reader.number(plugin, f"{AXES[i]}Dot{VELOCITIES[j]}", 0.0)
         return matrix
 
-    def _displaced(self, link: xml.Element, reader: Reader, per_volume: float, weight: float) -> dict[str, Any]:
+    def _displaced(
+        self, link: xml.Element, reader: Reader, per_volume: float, weight: float
+    ) -> dict[str, Any]:
         """Return buoyancy and its centre, from the volume of the link's collision shapes."""
         total, moment = 0.0, np.zeros(3)
         for shape in link.findall("collision"):
@@ -99,7 +112,9 @@ class GzSource:
             volume = self._volume(shape, reader)
             total, moment = total + volume, moment + volume * pose[:3]
         if not total > 0:
-            reader.unread.append("no collision shape whose volume is known: the vehicle is taken as neutrally buoyant")
+            reader.unread.append(
+                "no collision shape whose volume is known: the vehicle is taken as neutrally buoyant"
+            )
             return {"buoyancy": weight, "center_of_buoyancy": [0.0, 0.0, 0.0]}
         return {
             "buoyancy": total * per_volume, "center_of_buoyancy": (FLU[:3] * moment / total + 0.0).tolist()
@@ -113,8 +128,12 @@ class GzSource:
             return 4 / 3 * np.pi * reader.number(ball, "radius") ** 3
         if tube is not None:
             return np.pi * reader.number(tube, "radius") ** 2 * reader.number(tube, "length")
-        kinds = ", ".join(k.tag for k in (shape.find("geometry") if shape.find("geometry") is not None else []))  # type: ignore[union-attr]
-        reader.unread.append(f"collision {shape.get('name')}: the volume of a {kinds or 'shape'} is not worked out")
+        kinds = ", ".join(
+            k.tag for k in (shape.find("geometry") if shape.find("geometry") is not None else [])
+        )  # type: ignore[union-attr]
+        reader.unread.append(
+            f"collision {shape.get('name')}: the volume of a {kinds or 'shape'} is not worked out"
+        )
         return 0.0
 
     def _damping(self, plugin: xml.Element, reader: Reader) -> dict[str, Any]:
@@ -174,7 +193,9 @@ class GzSource:
             return None
         limits = [plugin.find(n) is not None for n in ("max_thrust_cmd", "min_thrust_cmd")]
         if not all(limits):
-            reader.unread.append(f"{name}: without max_thrust_cmd and min_thrust_cmd its largest thrust is not known; left out")
+            reader.unread.append(
+                f"{name}: left out, without max_thrust_cmd and min_thrust_cmd its thrust is not known"
+            )
             return None
         most, least = (reader.number(plugin, n) for n in ("max_thrust_cmd", "min_thrust_cmd"))
         unit: dict[str, Any] = {
@@ -185,7 +206,8 @@ class GzSource:
             texts = [plugin.findtext(OWN + n) or "" for n in ("command", "thrust")]
             counts = tuple(range(2, 10_001))
             unit["curve"] = {
-                k: reader.parsed(t, k, counts).tolist() for k, t in zip(("command", "thrust"), texts, strict=True)
+                k: reader.parsed(t, k, counts).tolist()
+                for k, t in zip(("command", "thrust"), texts, strict=True)
             }
         if plugin.find(OWN + "handedness") is not None:
             unit["handedness"] = int(reader.number(plugin, OWN + "handedness"))

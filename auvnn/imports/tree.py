@@ -49,7 +49,9 @@ class Reader:
         self.where = where
         self.unread: list[str] = []
 
-    def numbers(self, parent: xml.Element | None, path: str, count: tuple[int, ...], default: object = None) -> np.ndarray:
+    def numbers(
+        self, parent: xml.Element | None, path: str, count: tuple[int, ...], default: object = None
+    ) -> np.ndarray:
         """Return the numbers of an element's text, or the default where the element is not there.
 
         Raises:
@@ -73,7 +75,9 @@ class Reader:
         wrong = next((w for w in words if not NUMBER.fullmatch(w)), None)
         if wrong is not None or len(words) not in count:
             shown = f"holds '{one_line(wrong, 40)}'" if wrong is not None else f"has {len(words)} numbers"
-            raise InputError(f"{self.where}: {what} {shown}: {' or '.join(map(str, count))} numbers are needed")
+            raise InputError(
+                f"{self.where}: {what} {shown}: {' or '.join(map(str, count))} numbers are needed"
+            )
         values = np.array([float(w) for w in words])
         if not all(math.isfinite(v) and abs(v) < 1e17 for v in values):
             raise InputError(f"{self.where}: {what} is beyond any vehicle")

@@ -26,7 +26,9 @@ class UuvSource:
         return self._plugin(root) is not None
 
     def _plugin(self, root: xml.Element) -> xml.Element | None:
-        return next((p for p in root.iter("plugin") if "underwater_object" in (p.get("filename") or "")), None)
+        return next(
+            (p for p in root.iter("plugin") if "underwater_object" in (p.get("filename") or "")), None
+        )
 
     def read(self, root: xml.Element, reader: Reader) -> dict[str, Any]:
         """Return the mapping of a model file."""
@@ -34,11 +36,15 @@ class UuvSource:
         assert plugin is not None
         stated = [k for k in plugin.findall("link") if k.find("hydrodynamic_model") is not None]
         if not stated:
-            raise InputError(f"{reader.where}: the underwater object has no <link> with a <hydrodynamic_model>")
+            raise InputError(
+                f"{reader.where}: the underwater object has no <link> with a <hydrodynamic_model>"
+            )
         wet = stated[0]
         reader.unread += [f"link {k.get('name')}: a second body in the water" for k in stated[1:]]
         name = wet.get("name") or ""
-        link = next((k for k in root.iter("link") if k.get("name") == name and k.find("inertial") is not None), None)
+        link = next(
+            (k for k in root.iter("link") if k.get("name") == name and k.find("inertial") is not None), None
+        )
         if link is None:
             raise InputError(f"{reader.where}: there is no link '{name}' with an <inertial>")
         density, gravity = reader.number(plugin, "fluid_density", 1028.0), 9.81
@@ -63,13 +69,17 @@ class UuvSource:
                 made = self._thruster(one, root, reader)
                 thrusters += [made] if made is not None else []
             elif "fin_" in file:
-                reader.unread.append(f"fin {(one.findtext('joint_name') or one.get('name') or '').strip()}: its lift")
+                reader.unread.append(
+                    f"fin {(one.findtext('joint_name') or one.get('name') or '').strip()}: its lift"
+                )
         if thrusters:
             data["thrusters"] = thrusters
             lags = [self._lag(p, reader) for p in root.iter("plugin") if p.find("dynamics") is not None]
             if lags and all(lag == lags[0] and lag > 0 for lag in lags):
                 data["effects"] = {"thruster_lag": {"time_constant": lags[0]}}
-                reader.unread.append("rotor dynamics: the time constant of the rotors is taken as one of the thrust")
+                reader.unread.append(
+                    "rotor dynamics: the time constant of the rotors is taken as one of the thrust"
+                )
             elif any(lags):
                 reader.unread.append("rotor dynamics: time constants that differ between thrusters")
         return data
@@ -93,18 +103,25 @@ class UuvSource:
         assert stated is not None
         kind = (stated.findtext("type") or "fossen").strip()
         if kind != "fossen":
-            raise InputError(f"{reader.where}: a hydrodynamic_model of type {kind} states no coefficients; only fossen is read")
+            raise InputError(
+                f"{reader.where}: a hydrodynamic_model of type {kind} states no coefficients; only fossen is read"
+            )
         added = reader.numbers(stated, "added_mass", (6, 36))
         found: dict[str, Any] = {"added_mass": _square(added).tolist()}
         linear = reader.numbers(stated, "linear_damping", (6, 36), np.zeros(6))
         quadratic = _square(reader.numbers(stated, "quadratic_damping", (6, 36), np.zeros(6)))
         if (quadratic - np.diag(np.diag(quadratic))).any():
             reader.unread.append("quadratic_damping beyond the diagonal, which UUV Simulator leaves out too")
-        made = {"linear_damping": -_square(linear) + 0.0, "quadratic_damping": -np.diag(np.diag(quadratic)) + 0.0}
+        made = {
+            "linear_damping": -_square(linear) + 0.0,
+            "quadratic_damping": -np.diag(np.diag(quadratic)) + 0.0,
+        }
         found |= {k: m.tolist() for k, m in made.items() if m.any()}
         if reader.numbers(stated, "linear_damping_forward_speed", (6, 36), np.zeros(6)).any():
             reader.unread.append("linear_damping_forward_speed: damping in proportion to the forward speed")
-        reader.unread += [f"<{e.tag}> of the hydrodynamic_model" for e in stated if e.tag not in HYDRODYNAMICS]
+        reader.unread += [
+            f"<{e.tag}> of the hydrodynamic_model" for e in stated if e.tag not in HYDRODYNAMICS
+        ]
         return found
 
     def _lag(self, plugin: xml.Element, reader: Reader) -> float:
@@ -125,12 +142,18 @@ class UuvSource:
         axis = joint.find("axis")
         along = np.array([1.0, 0.0, 0.0])
         if axis is not None:
-            along = reader.attribute(axis, "xyz", 3, along) if axis.get("xyz") else reader.numbers(axis, "xyz", (3,), along)
+            stated = axis.get("xyz") is not None
+            along = (
+                reader.attribute(axis, "xyz", 3, along)
+                if stated
+                else reader.numbers(axis, "xyz", (3,), along)
+            )
         curve = self._curve(plugin, name, reader)
         if curve is None:
             return None
         return {
-            "position": (FLU * place + 0.0).tolist(), "direction": (FLU * (turned(angles) @ along) + 0.0).tolist(), **curve
+            "position": (FLU * place + 0.0).tolist(), "direction": (FLU * (turned(angles) @ along) + 0.0).tolist(),
+            **curve,
         }  # fmt: skip
 
     def _curve(self, plugin: xml.Element, name: str, reader: Reader) -> dict[str, Any] | None:
@@ -151,7 +174,9 @@ class UuvSource:
                 most = reader.number(plugin, "thrustMax")
                 least = -reader.number(plugin, "thrustMin", -most)
             if not most > 0:
-                reader.unread.append(f"thruster {name}: without clampMax or thrustMax its largest thrust is not known; left out")
+                reader.unread.append(
+                    f"thruster {name}: without clampMax or thrustMax its thrust is not known"
+                )
                 return None
             return {"max_forward": most, "max_reverse": least, "curve": "quadratic"}
         if kind == "Bessa" and high > 0:
@@ -159,10 +184,13 @@ class UuvSource:
             below, above = (reader.number(plugin, f"conversion/delta{s}") for s in "LR")
             x = gain * high * POINTS
             square = x * np.abs(x)
-            y = np.where(square <= below, left * (square - below), np.where(square >= above, right * (square - above), 0.0))
+            y = np.where(square >= above, right * (square - above), 0.0)
+            y = np.where(square <= below, left * (square - below), y)
             reader.unread.append(f"thruster {name}: its dead zone is read as a table of {len(POINTS)} points")
             return {"curve": {"command": POINTS.tolist(), "thrust": y.tolist()}}
-        reader.unread.append(f"thruster {name}: conversion of type {kind or 'unknown'} without limits; left out")
+        reader.unread.append(
+            f"thruster {name}: conversion of type {kind or 'unknown'} without limits; left out"
+        )
         return None
 
 

@@ -41,7 +41,9 @@ def model(name):
         return load("bluerov2").with_effects({**LAG, **LATE, **OVER, "thruster_deadband": {"width": 0.05}})
     if name == "payload":
         held = {"time": 10.0, "mass": 2.0, "x": 0.2, "buoyancy": 5.0, "X": 1.3}
-        return load("rov90").with_effects({"payload": held, "flooding": {"rate": 0.02}, "tether": {"stiffness": 20.0}})
+        return load("rov90").with_effects(
+            {"payload": held, "flooding": {"rate": 0.02}, "tether": {"stiffness": 20.0}}
+        )
     if name == "everything":
         # Full matrices, damping elements, a thrust table, fins, networks; effects by every hook.
         return GreyBox(example_vehicle(), (), trained_like()).with_effects({

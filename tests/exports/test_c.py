@@ -45,7 +45,10 @@ def called(library, name, precision, arguments, size):
     out = np.zeros((rows, size), dtype=dtype)
     for k in range(rows):
         # Numbers that stand alone go by value, arrays by address.
-        words = [kind(g[k, 0]) if a.ndim == 1 else ctypes.c_void_p(g[k].ctypes.data) for a, g in zip(arguments, given, strict=True)]
+        words = [
+            kind(g[k, 0]) if a.ndim == 1 else ctypes.c_void_p(g[k].ctypes.data)
+            for a, g in zip(arguments, given, strict=True)
+        ]
         function(*words, ctypes.c_void_p(out[k].ctypes.data))
     return out
 
@@ -68,7 +71,9 @@ def test_the_code_is_the_model(cc, tmp_path, name, precision):
     tolerance = {"double": 1e-12, "float": 1e-5}[precision]
     found = called(library, f"{system.name}_rate", precision, [n["t"], n["x"], n["u"]], system.flow.size)
     assert differs(found, rate) < tolerance
-    found = called(library, f"{system.name}_step", precision, [n["t"], n["h"], n["s"], n["u"]], system.steps.size)
+    found = called(
+        library, f"{system.name}_step", precision, [n["t"], n["h"], n["s"], n["u"]], system.steps.size
+    )
     assert differs(found, after) < tolerance
 
 
@@ -155,10 +160,14 @@ def test_a_step_is_no_slower_than_the_compiled_engine(cc, tmp_path, name):
     with torch.no_grad():
         for _ in range(5):
             begin = time.perf_counter()
-            library.loop(ctypes.c_long(rows - 1), *(ctypes.c_void_p(v.ctypes.data) for v in (state.copy(), u)))
+            library.loop(
+                ctypes.c_long(rows - 1), *(ctypes.c_void_p(v.ctypes.data) for v in (state.copy(), u))
+            )
             mine.append(time.perf_counter() - begin)
             begin = time.perf_counter()
-            own.rollout(eta, torch.zeros(6, dtype=torch.float64), inputs, times, engine="compiled", check=False)
+            own.rollout(
+                eta, torch.zeros(6, dtype=torch.float64), inputs, times, engine="compiled", check=False
+            )
             theirs.append(time.perf_counter() - begin)
     print(f"{name}: {1e6 * min(mine) / rows:.2f} us a step, the engine {1e6 * min(theirs) / rows:.2f}")
     # Equal for networks, whose time is that of the same products: a tenth for what else the machine does.

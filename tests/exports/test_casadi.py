@@ -26,7 +26,10 @@ def test_the_functions_are_the_model(tmp_path, name):
     out = export(own, "casadi", tmp_path / "out")
     assert out.lost == ()
     system = System(own, 0.05)
-    rate, step, jacobian = (ca.Function.load(str(tmp_path / "out" / f"{system.name}_{n}.casadi")) for n in ("rate", "step", "jacobian"))
+    rate, step, jacobian = (
+        ca.Function.load(str(tmp_path / "out" / f"{system.name}_{n}.casadi"))
+        for n in ("rate", "step", "jacobian")
+    )
     a = system.samples(1000, seed=21)
     with torch.no_grad():
         expected = system.flow.rate(a["x"], a["u"], a["t"])
@@ -62,11 +65,18 @@ def test_a_controller_drives_the_vehicle_to_a_point(tmp_path):
         opti.subject_to(x[:, k + 1] == step(middle, u[:, k], 0, dt / 2))
         place = x[:3, k + 1] - goal[:3]
         turn = 1 - ca.dot(x[3:7, k + 1], goal[3:]) ** 2
-        cost += ca.dot(place, place) + 2 * turn + 0.3 * ca.dot(x[7:, k + 1], x[7:, k + 1]) + 0.05 * ca.dot(u[:, k], u[:, k])
+        cost += (
+            ca.dot(place, place)
+            + 2 * turn
+            + 0.3 * ca.dot(x[7:, k + 1], x[7:, k + 1])
+            + 0.05 * ca.dot(u[:, k], u[:, k])
+        )
     opti.minimize(cost)
     opti.subject_to(x[:, 0] == start)
     opti.subject_to(opti.bounded(-0.9, ca.vec(u), 0.9))
-    opti.solver("ipopt", {"print_time": False, "expand": True}, {"print_level": 0, "max_iter": 80, "tol": 1e-4})
+    opti.solver(
+        "ipopt", {"print_time": False, "expand": True}, {"print_level": 0, "max_iter": 80, "tol": 1e-4}
+    )
     state = torch.tensor([0, 0, 5.0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0], dtype=torch.float64)
     target = np.array([1.5, -1.0, 5.8, np.cos(np.pi / 4), 0, 0, np.sin(np.pi / 4)])
     opti.set_value(goal, target)

@@ -20,7 +20,9 @@ def test_the_answer_says_what_was_written(tmp_path):
     told = json.loads((tmp_path / "out" / "export.json").read_text())
     assert told == out.to_dict() and told["schema"] == "auvnn/export/1"
     assert told["files"] == ["my_rov.c", "my_rov.h", "my_rov_test.c"]
-    assert told["lost"] == ["velocity_scale: what sensors make of the state is no part of the equations of motion"]
+    assert told["lost"] == [
+        "velocity_scale: what sensors make of the state is no part of the equations of motion"
+    ]
     assert any("exact in steps of 0.1 s" in note for note in told["notes"])
     n = own.actuators.size
     assert len(told["states"]) == 13 + 3 * n and len(told["step_states"]) == 13 + n

@@ -37,7 +37,9 @@ def test_it_is_valid_and_follows_a_rollout(tmp_path, name):
     path = tmp_path / "out" / next(f for f in out.files if f.endswith(".fmu"))
     assert validate_fmu(str(path)) == []
     rows = 201
-    commands = np.repeat(np.random.default_rng(0).uniform(-0.5, 0.5, (rows // 25 + 1, len(out.inputs))), 25, axis=0)[:rows]
+    commands = np.repeat(
+        np.random.default_rng(0).uniform(-0.5, 0.5, (rows // 25 + 1, len(out.inputs))), 25, axis=0
+    )[:rows]
     n = own.actuators.size
     commands[:, n:] *= 0.3
     if own.actuation == "wrench":
@@ -75,7 +77,9 @@ def test_model_exchange_with_a_solver_of_the_importer(tmp_path):
     own = model("rov95")
     out = export(own, "fmu", tmp_path / "out")
     path = str(tmp_path / "out" / out.files[0])
-    push = np.array([(0.0, 40.0, 10.0), (6.0, 40.0, 10.0)], dtype=[("time", float), ("tau_X", float), ("tau_N", float)])
+    push = np.array(
+        [(0.0, 40.0, 10.0), (6.0, 40.0, 10.0)], dtype=[("time", float), ("tau_X", float), ("tau_N", float)]
+    )
     own = own if own.actuation == "wrench" else None
     if own is None:
         push = np.array([(0.0, 0.4), (6.0, 0.4)], dtype=[("time", float), ("thruster_1", float)])

@@ -58,7 +58,8 @@ def test_what_gz_itself_reads_says_the_same(tmp_path):
     text = (tmp_path / "out" / "model.sdf").read_text()
     plain = re.sub(r"<auvnn:(\w+)>[^<]*</auvnn:\1>", "", text)
     assert "auvnn:" not in plain.replace('xmlns:auvnn="urn:auvnn"', "")
-    world = f"<sdf><world><gravity>0 0 -9.81</gravity><plugin><uniform_fluid_density>1030</uniform_fluid_density></plugin></world>{plain[plain.index('<sdf'):]}</sdf>"
+    water = "<plugin><uniform_fluid_density>1030</uniform_fluid_density></plugin>"
+    world = f"<sdf><world><gravity>0 0 -9.81</gravity>{water}</world>{plain[plain.index('<sdf') :]}</sdf>"
     (tmp_path / "plain.sdf").write_text(world)
     found, own = import_model(tmp_path / "plain.sdf").vehicle, model("remus100").vehicle
     for key in ("mass", "buoyancy", "inertia", "added_mass", "quadratic_damping"):
@@ -81,13 +82,17 @@ def forces(plugin, nu):
 def test_the_drag_of_the_terms_is_that_of_the_model(tmp_path, name):
     own = model(name)
     out = export(own, "sdf", tmp_path / "out")
-    plugin = next(p for p in xml.parse(tmp_path / "out" / "model.sdf").iter("plugin") if p.find("link_name") is not None)
+    plugin = next(
+        p for p in xml.parse(tmp_path / "out" / "model.sdf").iter("plugin") if p.find("link_name") is not None
+    )
     random = np.random.default_rng(1)
     nu = random.uniform(-1, 1, (400, 6)) * np.array([1.5, 0.75, 0.75, 0.75, 0.75, 0.75])
     level = quat_to_matrix(euler_to_quat(torch.zeros(400, 3, dtype=torch.float64)))
     zero = torch.zeros(400, own.actuators.size, dtype=torch.float64)
     with torch.no_grad():
-        terms = own.wrenches(torch.zeros(400, 3, dtype=torch.float64), level, torch.tensor(nu), zero, Inputs(zero), zero[:, 0])
+        terms = own.wrenches(
+            torch.zeros(400, 3, dtype=torch.float64), level, torch.tensor(nu), zero, Inputs(zero), zero[:, 0]
+        )
     drag = sum(w.numpy() for n, w in terms.items() if "damping" in n)
     error = np.sqrt(((FLU * forces(plugin, FLU * nu) - drag) ** 2).mean(0)) / np.sqrt((drag**2).mean(0))
     said = next((float(m[1]) for w in out.lost if (m := re.search(r"off by ([\d.e+-]+) %", w))), 0.0)
@@ -108,7 +113,9 @@ def test_what_is_lost_is_said_and_strict_refuses(tmp_path):
     assert np.isclose(found.buoyancy - found.weight, float(body.buoyancy - body.weight), rtol=1e-9)
     assert np.allclose(found.center_of_gravity, body.cg.detach().numpy())
     moment = found.weight * found.center_of_gravity - found.buoyancy * found.center_of_buoyancy
-    assert np.allclose(moment, (body.weight * body.hangs - body.buoyancy * body.cb).detach().numpy(), atol=1e-9)
+    assert np.allclose(
+        moment, (body.weight * body.hangs - body.buoyancy * body.cb).detach().numpy(), atol=1e-9
+    )
     text = (tmp_path / "out" / "model.sdf").read_text()
     # A product of two velocities is one of gz's terms: Y = - Yuv u v turned to port.
     assert re.search(r"<yUV>|<yVU>", text)
@@ -123,6 +130,7 @@ def test_fins_turn_and_lift_the_right_way(tmp_path):
     root = xml.parse(tmp_path / "out" / "model.sdf").getroot()
     plugin = next(p for p in root.iter("plugin") if p.findtext("link_name") == "fin_3")
     axis = next(j for j in root.iter("joint") if j.get("name") == "fin_3_joint").findtext("axis/xyz")
-    turn, forward, upward = (np.array([float(v) for v in t.split()]) for t in (axis, plugin.findtext("forward"), plugin.findtext("upward")))  # fmt: skip
+    texts = (axis, plugin.findtext("forward"), plugin.findtext("upward"))
+    turn, forward, upward = (np.array([float(v) for v in t.split()]) for t in texts)
     assert np.allclose(turn, [0, -1, 0]) and np.allclose(forward, [1, 0, 0])
     assert np.allclose(np.cross(turn, forward), upward) and np.allclose(upward, [0, 0, 1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import torch
 
 from auvnn import import_model
 from auvnn.errors import InputError
@@ -45,7 +46,9 @@ URDF = """<?xml version="1.0"?>
     <plugin name="t2" filename="libuuv_thruster_ros_plugin.so">
       <jointName>two_joint</jointName>
       <dynamics><type>FirstOrder</type><timeConstant>0.2</timeConstant></dynamics>
-      <conversion><type>LinearInterp</type><inputValues>-20 0 20</inputValues><outputValues>-30 0 40</outputValues></conversion>
+      <conversion>
+        <type>LinearInterp</type><inputValues>-20 0 20</inputValues><outputValues>-30 0 40</outputValues>
+      </conversion>
     </plugin>
     <plugin name="t3" filename="libuuv_thruster_ros_plugin.so">
       <jointName>two_joint</jointName><conversion><type>Basic</type><rotorConstant>0.01</rotorConstant></conversion>
@@ -85,7 +88,7 @@ def test_geometry_is_turned_and_derivatives_are_not(put):
     assert v.effects == {"thruster_lag": {"time_constant": 0.2}}
     said = " ".join(found.unread)
     assert "linear_damping_forward_speed" in said and "two_joint: without clampMax" in said
-    found.model.linearise(*(__import__("torch").zeros(n, dtype=__import__("torch").float64) for n in (12, 2)))
+    found.model.linearise(torch.zeros(12, dtype=torch.float64), torch.zeros(2, dtype=torch.float64))
 
 
 @pytest.mark.parametrize(
@@ -120,7 +123,9 @@ def test_mutated_files_end_in_an_answer_or_in_one_line(put):
         text = list(URDF)
         for _ in range(int(random.integers(1, 6))):
             at = int(random.integers(len(text)))
-            text[at : at + int(random.integers(0, 4))] = random.choice(list("<>/\"= 0129-.e$x"), int(random.integers(0, 3)))
+            text[at : at + int(random.integers(0, 4))] = random.choice(
+                list('<>/"= 0129-.e$x'), int(random.integers(0, 3))
+            )
         try:
             import_model(put("".join(text)))
         except AuvnnError as no:
