@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 from auvnn.catalogue import Catalogue
 
 if TYPE_CHECKING:
-    from auvnn.effects.base import HOOKS, Body, Effect, Extent, Moment, Parameter, Response, Sensed
+    from auvnn.effects.base import HOOKS, Effect
+    from auvnn.effects.hooks import Body, Extent, Moment, Parameter, Response, Sensed
 
 EFFECTS = Catalogue(
     "effect",

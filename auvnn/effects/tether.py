@@ -7,7 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Extent, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Extent, Moment, Parameter
 from auvnn.physics.products import matvec
 
 TINY = 1e-12
@@ -27,6 +28,9 @@ class Tether(Effect):
     cause = "a cable pulls on the vehicle"
     symbol = "F_t"
     reference = "Driscoll, Lueck and Nahon (2000), Applied Ocean Research 22"
+    confused_with = ("ocean_current", "constant_force", "net_buoyancy")
+    manoeuvre = "survey"
+    told_apart_by = "the same legs at several distances and bearings from the anchor"
     channels = ("x", "y", "z")
 
     @classmethod

@@ -7,8 +7,9 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter
+from auvnn.effects.base import Effect
 from auvnn.effects.factors import actuators
+from auvnn.effects.hooks import Parameter
 
 # Rows whose filter is worked out as one product of matrices.
 CHUNK = 128
@@ -28,6 +29,9 @@ class ThrustOvershoot(Effect):
     cause = "thrust is larger at first and falls back as the flow develops"
     symbol = "kappa_T"
     reference = "Healey, Rock, Cody, Miles and Brown (1995), IEEE JOE 20(4)"
+    confused_with = ("thruster_lag", "added_mass")
+    manoeuvre = "pulses"
+    told_apart_by = "steps from rest, held for several seconds"
     plainer = ("thruster_lag",)
     remembers = True
 

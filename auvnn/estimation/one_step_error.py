@@ -24,7 +24,8 @@ from auvnn.estimation.prediction_error import Fitted
 from auvnn.estimation.priors import Priors, parameters_of, set_parameters
 from auvnn.logs import Log, Run
 from auvnn.logs.signals.derivatives import LocalPolynomial
-from auvnn.metrics.one_step import Derivative, OneStepReplay
+from auvnn.metrics.derivative import Derivative
+from auvnn.metrics.one_step import OneStepReplay
 from auvnn.metrics.windows import ACCELERATION, CHANNELS
 from auvnn.models import GreyBox
 

@@ -128,9 +128,8 @@ class GzSource:
             return 4 / 3 * np.pi * reader.number(ball, "radius") ** 3
         if tube is not None:
             return np.pi * reader.number(tube, "radius") ** 2 * reader.number(tube, "length")
-        kinds = ", ".join(
-            k.tag for k in (shape.find("geometry") if shape.find("geometry") is not None else [])
-        )  # type: ignore[union-attr]
+        geometry = shape.find("geometry")
+        kinds = ", ".join(k.tag for k in geometry) if geometry is not None else ""
         reader.unread.append(
             f"collision {shape.get('name')}: the volume of a {kinds or 'shape'} is not worked out"
         )

@@ -19,7 +19,7 @@ from auvnn.diagnosis.score_tests.score import Score, following, projection, rati
 from auvnn.effects import Extent
 from auvnn.estimation.priors import Priors, bounded_step, limits, parameters_of, set_parameters
 from auvnn.estimation.sufficient_statistics import Combination, WindowSums
-from auvnn.log_chunks.windows import WindowCut
+from auvnn.log_chunks.scan import WindowCut
 
 Array = NDArray[np.float64]
 # Steps of the fit on everything; it begins where the fit on the sample has ended, and ends when a step would change the
