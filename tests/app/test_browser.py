@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import os
 import resource
 import time
 import urllib.error
@@ -29,6 +30,11 @@ DROP = """async ([text, name]) => {
 def drop(page, path: Path) -> None:
     """Drop a file on the page, as a person does with the mouse."""
     page.evaluate(DROP, [base64.b64encode(path.read_bytes()).decode(), path.name])
+
+
+def busy() -> float:
+    """Return by how much everything takes longer here than on a machine that does nothing else."""
+    return max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
 
 
 def accessible(page, where: str) -> None:
@@ -259,7 +265,7 @@ def test_the_first_view_of_a_million_samples(running, tmp_path):
         seen = time.monotonic() - began
         watched.close()
     print(f"first view of a million samples: {seen:.2f} s")
-    assert seen < 3.0  # 1 s on a machine that does nothing else
+    assert seen < 1.0 * busy()
 
 
 @pytest.mark.long
@@ -268,8 +274,8 @@ def test_a_slider_moves_and_the_free_run_follows(running, tmp_path):
     from auvnn.simulation import simulate
 
     hidden = {"ocean_current": {"v_north": 0.15, "v_east": -0.1}}
-    # Two runs: the second is held out, the first one is ten minutes at 20 Hz.
-    simulate(load("rov95"), "multisine", "realistic", hidden, 0, runs=2, duration=600.0).log.write(
+    # The last 30 % are held out: ten minutes at 20 Hz are left.
+    simulate(load("rov95"), "multisine", "realistic", hidden, 0, runs=1, duration=860.0).log.write(
         tmp_path / "long.parquet"
     )
     with served(tmp_path, "model=rov95", f"log={tmp_path / 'long.parquet'}") as (address, _):
@@ -298,4 +304,4 @@ def test_a_slider_moves_and_the_free_run_follows(running, tmp_path):
         watched.close()
     median = float(np.median(times))
     print(f"slider to redraw, median of 50: {median:.0f} ms")
-    assert median < 200.0  # 100 ms on a machine that does nothing else
+    assert median < 100.0 * busy()
