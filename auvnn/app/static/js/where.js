@@ -137,7 +137,6 @@ export class WhereScreen {
       // By powers: a residual of twice its floor is to be seen beside one of forty times.
       const strength = ratio === null || ratio <= 1 ? 0 : Math.min(Math.log(ratio) / Math.log(most), 1);
       button.style.setProperty("--heat", `${Math.round(100 * strength ** 1.4)}%`);
-      if (strength ** 1.4 > 0.62) button.classList.add("hot");
       return h("td", {}, button);
     };
     const move = (event) => {
