@@ -18,8 +18,8 @@ from auvnn.comparison.compare import write_predictions
 from auvnn.diagnosis import diagnose
 from auvnn.errors import AuvnnError
 from auvnn.improvement import add
-from auvnn.improvement.gains import noise_floor
 from auvnn.logs import Log
+from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.rollouts import HORIZONS, NAMES, roll, scale_of
 from auvnn.models import GreyBox, load
 

@@ -13,6 +13,7 @@ VERBS = Catalogue(
         "compare": "auvnn.cli.compare:VERB",
         "diagnose": "auvnn.cli.diagnose:VERB",
         "add": "auvnn.cli.add:VERB",
+        "improve": "auvnn.cli.improve:VERB",
         "remove": "auvnn.cli.remove:VERB",
         "adapt": "auvnn.cli.adapt:VERB",
         "fleet": "auvnn.cli.fleet:VERB",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from auvnn.answers import Answer, plain
 from auvnn.checks.doubts import doubts
+from auvnn.comparison.beside import beside
 from auvnn.comparison.locate import AXES, failures, locate
 from auvnn.errors import ConfigError
 from auvnn.logs import Log
@@ -42,6 +43,7 @@ class Comparison(Answer):
     regimes: dict[str, dict[str, Any]] = field(default_factory=dict)
     noise_floor: Array = field(default_factory=lambda: np.zeros(6))
     quality: Any = None
+    baseline: dict[str, Any] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
@@ -56,6 +58,7 @@ class Comparison(Answer):
             "residual_wrench",
             "failures",
             "warnings",
+            "baseline",
         )
         return plain({"schema": "auvnn/comparison/1", **{n: getattr(self, n) for n in names}})
 
@@ -119,6 +122,7 @@ def compare(
         located,
         noise,
         None,
+        beside(rolled, model.actuation, scale, log, how),
     )
 
 

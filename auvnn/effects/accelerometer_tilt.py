@@ -24,6 +24,9 @@ class AccelerometerTilt(Effect):
     cause = "the accelerometer is mounted askew"
     symbol = "R_a"
     reference = "Fossen (2011), section 11.5; Titterton and Weston (2004), chapter 12"
+    confused_with = ("constant_force", "cg_offset")
+    manoeuvre = "rotation"
+    told_apart_by = "static angles of roll and pitch"
     channels = ("du", "dv", "dw")
 
     @classmethod

@@ -21,6 +21,9 @@ class ActuationDelay(Effect):
     cause = "the thrust comes a fixed time after its command"
     symbol = "T_d"
     reference = "Ljung (1999), System Identification, section 4.2"
+    confused_with = ("thruster_lag", "added_mass")
+    manoeuvre = "chirp"
+    told_apart_by = "steps and swept sines"
     plainer = ("thruster_lag",)
 
     @classmethod

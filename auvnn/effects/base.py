@@ -190,6 +190,9 @@ class Effect(nn.Module):
     `plainer` names effects that explain the same trace more plainly wherever a log does not reach far enough to
     tell them apart: a current that is the same at all depths, where the depth hardly changes. The effect is then
     given as one of a group, never alone.
+
+    `remembers` says that `command` depends on earlier commands through one state per command; `follow` and `advance`
+    then state the same in continuous time and for one held command.
     """
 
     name: ClassVar[str]
@@ -198,8 +201,13 @@ class Effect(nn.Module):
     reference: ClassVar[str]
     channels: ClassVar[tuple[str, ...]] = ()
     excludes: ClassVar[tuple[str, ...]] = ()
+    # For people: effects that leave a similar trace, and the manoeuvre (configs/excitation) that tells them apart.
+    confused_with: ClassVar[tuple[str, ...]] = ()
+    manoeuvre: ClassVar[str] = ""
+    told_apart_by: ClassVar[str] = ""
     plainer: ClassVar[tuple[str, ...]] = ()
     time_varying: ClassVar[bool] = False
+    remembers: ClassVar[bool] = False
 
     theta: nn.Parameter
 
@@ -323,6 +331,14 @@ class Effect(nn.Module):
     def command(self, command: Tensor, times: Tensor) -> Tensor:
         """Change the commands of a stretch: (..., T, n) held from `times` (..., T), to the same shape."""
         return command
+
+    def follow(self, state: Tensor, command: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the changed command and the rate of the state, (..., n) each; settled, the state is the command."""
+        return command, torch.zeros_like(state)
+
+    def advance(self, state: Tensor, command: Tensor, step: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the changed command, its mean while one is held for `step` seconds (..., 1), and the state after."""
+        return command, state
 
     def delay(self) -> Tensor:
         """Return by how many seconds the thrust comes after its command, a scalar, not negative."""

@@ -24,6 +24,9 @@ class BodyLift(Effect):
     cause = "the hull gives lift at an angle to the flow"
     symbol = "Y_uv"
     reference = "Prestero (2001), body lift; Hoerner and Borst (1985), Fluid-Dynamic Lift"
+    confused_with = ("munk_moment", "coupled_damping")
+    manoeuvre = "oblique"
+    told_apart_by = "steady speed at several angles of drift and attack"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

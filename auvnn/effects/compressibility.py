@@ -23,6 +23,9 @@ class Compressibility(Effect):
     cause = "buoyancy changes with depth"
     symbol = "dB/dz"
     reference = "Fossen (2011), section 4.1"
+    confused_with = ("net_buoyancy", "current_shear")
+    manoeuvre = "dives"
+    told_apart_by = "slow dives over the whole range of depths"
     plainer = ("net_buoyancy",)
     channels = ("z",)
 

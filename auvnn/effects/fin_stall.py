@@ -22,6 +22,9 @@ class FinStall(Effect):
     cause = "the fins stall at another angle"
     symbol = "alpha_0"
     reference = "Beard and McLain (2012), Small Unmanned Aircraft, section 4.2"
+    confused_with = ("body_lift",)
+    manoeuvre = "survey"
+    told_apart_by = "large fin angles at constant speed"
     channels = ("fin_1",)
 
     @classmethod

@@ -21,6 +21,9 @@ class GyroBias(Effect):
     cause = "the gyroscope has a bias"
     symbol = "b_g"
     reference = "Fossen (2011), section 11.5"
+    confused_with = ("velocity_lever_arm",)
+    manoeuvre = "survey"
+    told_apart_by = "lying still, then turning both ways"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -34,6 +34,9 @@ class Payload(Effect):
     cause = "a load is picked up at some time"
     symbol = "m_p"
     reference = "Van de Ven et al. (2004), section 5; Fossen (2011), section 3.3"
+    confused_with = ("net_buoyancy", "cg_offset", "flooding")
+    manoeuvre = "multisine"
+    told_apart_by = "the same motion before and after the load is taken, turning included"
     plainer = ("net_buoyancy",)
     time_varying = True
 

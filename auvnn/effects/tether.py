@@ -27,6 +27,9 @@ class Tether(Effect):
     cause = "a cable pulls on the vehicle"
     symbol = "F_t"
     reference = "Driscoll, Lueck and Nahon (2000), Applied Ocean Research 22"
+    confused_with = ("ocean_current", "constant_force", "net_buoyancy")
+    manoeuvre = "survey"
+    told_apart_by = "the same legs at several distances and bearings from the anchor"
     channels = ("x", "y", "z")
 
     @classmethod

@@ -24,6 +24,9 @@ class ThrustInflowLoss(Effect):
     cause = "thrust falls with the speed of the inflow"
     symbol = "k_V"
     reference = "Fossen (2011), section 9.1"
+    confused_with = ("linear_damping", "quadratic_damping", "thruster_gain")
+    manoeuvre = "coast_down"
+    told_apart_by = "coasting, pushes from rest, and steady speed with several throttles"
     plainer = ("thruster_gain",)
 
     @classmethod

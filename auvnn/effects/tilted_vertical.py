@@ -23,6 +23,9 @@ class TiltedVertical(Effect):
     cause = "the attitude's vertical is tilted"
     symbol = "delta_v"
     reference = "Fossen (2011), section 2.2"
+    confused_with = ("cg_offset", "velocity_misalignment", "constant_force")
+    manoeuvre = "reciprocal"
+    told_apart_by = "level legs on several headings"
     plainer = ("cg_offset",)
 
     @classmethod

@@ -18,6 +18,9 @@ class TrappedWater(Effect):
     cause = "water inside the hull moves along"
     symbol = "m_w"
     reference = "Fossen (2011), sections 3.3 and 6.3"
+    confused_with = ("added_mass", "thruster_lag")
+    manoeuvre = "chirp"
+    told_apart_by = "swept sines, and a static weighing"
     plainer = ("added_mass",)
 
     @classmethod

@@ -39,6 +39,9 @@ class TurningForces(Effect):
     cause = "forces in a turn are not those of the added mass"
     symbol = "Y_ur"
     reference = "Gertler and Hagen (1967), DTMB report 2510"
+    confused_with = ("added_mass", "body_lift", "munk_moment")
+    manoeuvre = "rotation"
+    told_apart_by = "turns at several speeds"
     plainer = ("coupled_damping",)
 
     @classmethod

@@ -22,6 +22,9 @@ class VelocityMisalignment(Effect):
     cause = "the velocity sensor is mounted askew"
     symbol = "R_s"
     reference = "Hegrenaes and Hallingstad (2011), IEEE JOE 36(2)"
+    confused_with = ("ocean_current", "thruster_gain")
+    manoeuvre = "reciprocal"
+    told_apart_by = "straight legs on several headings with an independent position fix"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -31,6 +31,9 @@ class Waves(Effect):
     cause = "waves move the water"
     symbol = "zeta_a"
     reference = "Faltinsen (1990), Sea Loads on Ships and Offshore Structures, chapters 2 and 3"
+    confused_with = ("ocean_current",)
+    manoeuvre = "survey"
+    told_apart_by = "straight legs at constant depth, long enough for twenty periods, and again deeper"
     channels = ("x", "y", "z")
 
     @classmethod

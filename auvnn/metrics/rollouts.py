@@ -106,6 +106,17 @@ def roll_windows(model: GreyBox, windows: Windows, scale: Scale, engine: str = "
         rate = fastest_rate(model, start[:, :7], start[:, 7:], first)
         eta, nu = predict(model, windows, start, max(followed(MAX_STEP, rate), SHORTEST_STEP), engine)
         seen = model.sense(Sensed(eta[..., :3], eta[..., 3:], nu)).nu.numpy()
+    return scored(windows, seen, scale)
+
+
+def scored(windows: Windows, seen: Array, scale: Scale) -> Rolled:
+    """Return free runs with their errors, whoever predicted them.
+
+    Args:
+        windows: what was run.
+        seen: (B, L, 6) predicted velocities as the sensors would report them; not finite once one has run away.
+        scale: of the log.
+    """
     measured, mask = windows.nu.numpy(), windows.mask[..., VELOCITY].numpy().copy()
     mask[:, 0] = 0.0
     sound = (np.isfinite(seen) & (np.abs(seen) < LIMIT)).all(axis=-1)

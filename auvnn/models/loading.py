@@ -12,7 +12,7 @@ from auvnn.damping.region import Region
 from auvnn.effects import effect_class
 from auvnn.errors import ConfigError, ModelError
 from auvnn.models.grey_box import GreyBox
-from auvnn.models.saving import MODEL, REGION, STRUCTURE, SUBNETWORKS, WEIGHTS
+from auvnn.models.saving import MODEL, REGION, STRUCTURE, SUBNETWORKS, WEIGHTS, reads_again
 from auvnn.models.structures import build_structure
 from auvnn.models.structures.base import Structure
 from auvnn.storage import folder_exists, read_folder, tensors_from_bytes
@@ -106,3 +106,6 @@ def remove(model: GreyBox, effects: str | list[str]) -> GreyBox:
     for name in names:
         model.effect(name)
     return model.rebuilt(e for e in model.copied_effects() if e.name not in names)
+
+
+reads_again(from_contents)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,19 @@ SUBNETWORKS = "damping_subnetworks"
 STRUCTURE = "structure"
 REGION = "trained_region"
 
+_readers: list[Callable[[Mapping[str, bytes], Path], object]] = []
+
+
+def reads_again(reader: Callable[[Mapping[str, bytes], Path], object]) -> None:
+    """Take the function that reads a model's files: `loading`, which stands above, says which one it is."""
+    _readers[:] = [reader]
+
+
+def read_again(files: Mapping[str, bytes], path: Path) -> None:
+    """Read a model's files before they take the place of others, and raise where they cannot be read."""
+    for reader in _readers:
+        reader(files, path)
+
 
 def save(model: GreyBox, folder: str | Path, *, overwrite: bool = False) -> Path:
     """Write a model as a folder: `model.yaml`, the weights and a manifest with SHA-256 of each.
@@ -26,7 +40,9 @@ def save(model: GreyBox, folder: str | Path, *, overwrite: bool = False) -> Path
         InputError: the folder exists, is not empty and `overwrite` is not set.
     """
     path = Path(folder)
-    write_folder(path, contents(model, path), overwrite=overwrite)
+    write_folder(
+        path, contents(model, path), overwrite=overwrite, readable=lambda files: read_again(files, path)
+    )
     return path
 
 

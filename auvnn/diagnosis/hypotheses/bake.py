@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.layout import Layout
@@ -13,6 +15,8 @@ from auvnn.estimation.priors import set_parameters
 from auvnn.models import GreyBox
 from auvnn.vehicle import Vehicle
 
+Array = NDArray[np.float64]
+
 
 def with_fitted_parameters(model: GreyBox, layout: Layout, found: FittedHypothesis) -> GreyBox:
     """Return the model with an explanation in it.
@@ -20,10 +24,25 @@ def with_fitted_parameters(model: GreyBox, layout: Layout, found: FittedHypothes
     Coefficients that were merely refitted become the vehicle's numbers; effects that were asked for, and
     those that the model had, stay effects, so that they can be seen and removed.
     """
+    return holding(model, layout, found.names, found.fitted.theta, found.effects)
+
+
+def holding(
+    model: GreyBox, layout: Layout, names: Sequence[str], theta: Array, effects: Sequence[str]
+) -> GreyBox:
+    """Return the model with fitted values in it; see `baked`.
+
+    Args:
+        model: as known.
+        layout: of the fit.
+        names: effects that were free, in order of their columns.
+        theta: (P,) their values.
+        effects: those that were asked for.
+    """
     full = layout.model.rebuilt(layout.model.copied_effects())
-    set_parameters(full, found.names, found.fitted.theta)
-    coefficients = [n for n in layout.nuisance if n not in found.effects and n not in model.effect_names]
-    keep = [*model.effect_names, *(n for n in found.effects if n not in model.effect_names)]
+    set_parameters(full, names, theta)
+    coefficients = [n for n in layout.nuisance if n not in effects and n not in model.effect_names]
+    keep = [*model.effect_names, *(n for n in effects if n not in model.effect_names)]
     body = GreyBox(model.vehicle, actuation=model.actuation).prepare().body
     for name in coefficients:
         body = full.effect(name).body(body, None)

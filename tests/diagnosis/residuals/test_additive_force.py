@@ -65,8 +65,8 @@ def told(monkeypatch, found, left=0.05, p_value=1.0):
         energy = left if explanation.effects else 1.0
         return Unnamed(np.zeros(6), np.array([p_value / 6, *np.ones(5)]), energy * np.eye(6)[0], {"X": 1.0})
 
-    monkeypatch.setattr("auvnn.diagnosis.search.variance_component_test", some_left)
-    monkeypatch.setattr("auvnn.diagnosis.search.additive_force_test", lambda *_: found)
+    monkeypatch.setattr("auvnn.diagnosis.what_is_left.variance_component_test", some_left)
+    monkeypatch.setattr("auvnn.diagnosis.what_is_left.additive_force_test", lambda *_: found)
 
 
 @pytest.mark.parametrize(

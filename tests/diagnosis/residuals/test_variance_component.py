@@ -117,7 +117,7 @@ def test_a_name_is_refuted_on_weaker_grounds_than_adequacy(model, monkeypatch, p
         energy = 1.0 if explanation.effects else 2.0
         return Unnamed(np.zeros(6), p_values, np.array([energy, 0, 0, 0, 0, 0]), {"X": 1.0})
 
-    monkeypatch.setattr("auvnn.diagnosis.search.variance_component_test", half_left)
+    monkeypatch.setattr("auvnn.diagnosis.what_is_left.variance_component_test", half_left)
     found = diagnose(model, log, ["net_buoyancy"], advice=False, whiteness=False)
     assert (found.verdict, found.unexplained) == (verdict, pytest.approx(0.5))
     assert found.nearest == (["net_buoyancy"] if verdict == "unknown" else [])
