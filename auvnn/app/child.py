@@ -68,6 +68,12 @@ class Child:
                 process.kill()
             process.wait()
 
+    @property
+    def alive(self) -> bool:
+        """Whether the process is there."""
+        process = self._process
+        return process is not None and process.poll() is None
+
     def close(self) -> None:
         """End the process for good."""
         with self._lock:

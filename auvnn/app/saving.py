@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+import time
 from pathlib import Path
 
 from auvnn.answers import write_text
@@ -12,6 +13,7 @@ from auvnn.app.script import commands, python
 from auvnn.app.session import Session
 from auvnn.errors import ConfigError, InputError
 
+PATIENCE = 120.0  # s
 ANSWERS = ("comparison", "diagnosis", "improvement")
 
 
@@ -35,6 +37,11 @@ def save(session: Session, folder: Path) -> list[str]:
         session.refuse_busy()
         source, history, answers = session.source, list(session.history), dict(session.answers)
     assert source is not None and source.fit is not None
+    kept = history[-1].answer
+    # The report of the model that is saved, not of a later try that was not kept.
+    wanted = {k: kept if k == "improvement" and kept is not None else answers.get(k) for k in ANSWERS}
+    places = {kind: place for kind, place in wanted.items() if place is not None}
+    _drawn(session, list(places.values()))
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ConfigError(f"{folder}: is not empty; choose a new folder")
     try:
@@ -48,12 +55,7 @@ def save(session: Session, folder: Path) -> list[str]:
         source.fit.write(stage / "log.parquet")
         if source.held is not None:
             source.held.write(stage / "test.parquet")
-        # The report of the model that is saved, not of a later try that was not kept.
-        kept = history[-1].answer
-        for kind in ANSWERS:
-            place = kept if kind == "improvement" and kept is not None else answers.get(kind)
-            if place is None:
-                continue
+        for kind, place in places.items():
             shutil.copy(place / f"{kind}.json", stage / f"{kind}.json")
             if (place / "report.html").is_file():
                 name = "report.html" if kind == "improvement" else f"{kind}.html"
@@ -73,6 +75,15 @@ def save(session: Session, folder: Path) -> list[str]:
         session.saved.append(str(folder))
         session.version += 1
     return held
+
+
+def _drawn(session: Session, places: list[Path]) -> None:
+    """Wait until the child process, which has nothing else to do now, has drawn the reports."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end and session.child.alive:
+        if all((place / "report.html").is_file() for place in places):
+            return
+        time.sleep(0.1)
 
 
 def proposed(session: Session) -> Path:

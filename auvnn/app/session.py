@@ -16,6 +16,7 @@ from auvnn.app.source import Source
 from auvnn.errors import AuvnnError, ConfigError, one_line
 
 KINDS = ("compare", "diagnose", "add", "example")
+LONG = 100_000  # samples from which on the quality report takes seconds
 ANSWERS = {"compare": "comparison", "diagnose": "diagnosis", "add": "improvement"}
 
 
@@ -88,6 +89,7 @@ class Session:
         self.model_error = ""
         self._numbers = 0
         self.views: dict[str, Any] = {}
+        self.looked = threading.Event()
         self.child = Child(work, self._hear)
 
     # --- log -----------------------------------------------------------------------------------------------------
@@ -113,6 +115,10 @@ class Session:
         threading.Thread(target=self._judge, args=(source,), daemon=True).start()
 
     def _judge(self, source: Source) -> None:
+        # A long log takes a while to be judged; who has just opened it looks at the traces first.
+        if source.log is not None and source.log.samples > LONG:
+            self.looked.wait(3.0)
+        self.looked.clear()
         try:
             source.judge()
         except Exception as error:

@@ -28,6 +28,9 @@ class Source:
         held: what is held out, None where the log is too short for that.
         words: which is which.
         error: why there is no log.
+        findings: of the quality report, None until they are there.
+        sizes: how many of them, by level.
+        columns: the canonical columns, as the screen shows them.
     """
 
     files: list[Path]
@@ -42,6 +45,7 @@ class Source:
     error: str = ""
     findings: list[dict[str, Any]] | None = None
     sizes: dict[str, Any] = field(default_factory=dict)
+    columns: list[dict[str, Any]] = field(default_factory=list)
 
     def read(self) -> Source:
         """Read the files; what goes wrong is kept in words."""
@@ -55,6 +59,8 @@ class Source:
                 self.words = f"{self.held.name} is held out ({self.held.samples} samples)"
             else:
                 self.fit, self.held, self.words = split(self.log)
+            # Worked out once: the first look at a long log should not wait for it.
+            self.columns = columns(self.log, self.mapping)
         except AuvnnError as error:
             self.error = one_line(error, 2000)
         return self
@@ -81,13 +87,12 @@ class Source:
 
     def described(self) -> dict[str, Any]:
         """Return the columns and the mapping, for the screen of the log."""
-        canonical = columns(self.log, self.mapping) if self.log is not None else []
         return {
             "files": [str(p) for p in self.files],
             "mapping": self.mapping,
             "raw": self.raw,
             "guesses": guesses(self.raw),
-            "columns": canonical,
+            "columns": self.columns,
             "unknown": [] if self.log is None else list(self.log.unknown),
             "overview": None if self.log is None else overview(self.log),
             "fit_runs": [] if self.fit is None else _runs(self.fit),

@@ -75,16 +75,18 @@ def intervals(t: Array, mask: NDArray[np.bool_], most: int = 400) -> list[list[f
 
 def _extremes(values: Array, edges: NDArray[np.intp]) -> Array:
     """Return each bucket's smallest and largest value in their order, (B, 2); NaN where it holds none."""
-    low = np.fmin.reduceat(values, edges)
-    high = np.fmax.reduceat(values, edges)
-    bucket = np.repeat(np.arange(len(edges)), np.diff(np.append(edges, len(values))))
-    index = np.arange(len(values))
-    first_low = np.full(len(edges), len(values))
-    first_high = first_low.copy()
-    np.minimum.at(first_low, bucket[values == low[bucket]], index[values == low[bucket]])
-    np.minimum.at(first_high, bucket[values == high[bucket]], index[values == high[bucket]])
-    falling = first_high < first_low
-    return np.where(falling[:, None], np.stack([high, low], axis=1), np.stack([low, high], axis=1))
+    stride = int(edges[1])
+    # Repeating the last value fills the last bucket without adding an extreme.
+    padded = np.concatenate([values, np.full(len(edges) * stride - len(values), values[-1])])
+    table = padded.reshape(len(edges), stride)
+    lost = np.isnan(table)
+    some = bool(lost.any())
+    low = (np.where(lost, np.inf, table) if some else table).argmin(axis=1)
+    high = (np.where(lost, -np.inf, table) if some else table).argmax(axis=1)
+    ends = np.sort(np.stack([low, high], axis=1), axis=1)
+    found = np.take_along_axis(table, ends, axis=1)
+    # A bucket of one value has no second one, unless what stands there is missing.
+    return np.where(np.isnan(found), found[:, ::-1], found) if some else found
 
 
 def _numbers(values: Array) -> list[float | None]:

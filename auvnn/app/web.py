@@ -94,6 +94,7 @@ class Pages:
         log = self._source().log
         if log is None:
             raise ConfigError("there is no log that could be drawn")
+        self.session.looked.set()
         return traces(log, number, str(asked.get("group", "velocity")), low, high, points)
 
     async def upload(self, request: Request) -> Response:

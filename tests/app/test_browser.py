@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import os
 import resource
 import time
 import urllib.error
@@ -31,16 +32,21 @@ def drop(page, path: Path) -> None:
     page.evaluate(DROP, [base64.b64encode(path.read_bytes()).decode(), path.name])
 
 
-def accessible(page, where: str) -> None:
-    """Assert that axe finds nothing serious on the screen in view, where axe is at hand."""
+def busy() -> float:
+    """Return by how much everything takes longer here than on a machine that does nothing else."""
+    return max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
+
+
+def barriers(page, where: str) -> list[str]:
+    """Return what axe finds serious on the screen in view; nothing where axe is not at hand."""
     script = axe()
     if script is None:
-        return
+        return []
     page.evaluate(script.read_text(encoding="utf-8"))
     found = page.evaluate(
         "axe.run().then(r => r.violations.map(v => [v.impact, v.id, v.nodes.map(n => n.html).slice(0, 3)]))"
     )
-    assert not [v for v in found if v[0] in ("serious", "critical")], f"{where}: {found}"
+    return [f"{where}: {v}" for v in found if v[0] in ("serious", "critical")]
 
 
 @pytest.fixture(scope="module")
@@ -69,24 +75,24 @@ def test_the_whole_loop_by_clicks(running, demo_file, tmp_path):
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with served(tmp_path) as (address, process):
         watched = Watched(running)
-        page = watched.page
+        page, found = watched.page, []
         page.goto(address)
         page.wait_for_selector("#drop")
-        accessible(page, "begin")
+        found += barriers(page, "begin")
         drop(page, demo_file)
         page.wait_for_selector("#model")
         page.select_option("#model", "rov95")
         page.wait_for_selector("#compare:not([disabled])")
         settled(page)
         drawn(page, 5)
-        accessible(page, "log")
+        found += barriers(page, "log")
 
         page.click("#compare")
         title(page, "Where it fails")
         drawn(page, 2)
         page.click('button[aria-label^="roll, speed"] >> nth=5')
         page.wait_for_selector('.cell[aria-pressed="true"]')
-        accessible(page, "where")
+        found += barriers(page, "where")
 
         page.click("#diagnose")
         # Survives a reload in the middle: the job goes on, and its end is seen.
@@ -96,13 +102,13 @@ def test_the_whole_loop_by_clicks(running, demo_file, tmp_path):
         title(page, "What is missing", 240)
         page.wait_for_selector(".candidate.chosen")
         assert "ocean_current" in page.inner_text(".verdict")
-        accessible(page, "missing")
+        found += barriers(page, "missing")
 
         page.click("#try")
         title(page, "Try it")
         drawn(page, 6)
         page.wait_for_selector("#ocean_current-v_north")
-        accessible(page, "try")
+        found += barriers(page, "try")
         page.click("#fit")
         page.wait_for_selector("#keep", timeout=240_000)
         assert "Accepted" in page.inner_text("main")
@@ -110,13 +116,9 @@ def test_the_whole_loop_by_clicks(running, demo_file, tmp_path):
 
         title(page, "Result")
         drawn(page, 6)
-        accessible(page, "result")
-        page.wait_for_function(
-            "fetch('api/state').then(r => r.json()).then(s => Object.values(s.answers).every(a => a.report))",
-            timeout=60_000,
-        )
+        found += barriers(page, "result")
         page.click("#save")
-        page.wait_for_selector("#told p")
+        page.wait_for_selector("#told p", timeout=180_000)
         folder = Path(page.inner_text("#told p").removeprefix("Saved: "))
         assert {p.name for p in folder.iterdir()} >= {
             "model",
@@ -125,7 +127,7 @@ def test_the_whole_loop_by_clicks(running, demo_file, tmp_path):
             "diagnosis.html",
             "loop.py",
         }
-        page.screenshot(path=tmp_path / "end.png")
+        assert not found, found
         assert not watched.complaints and not watched.strangers, (watched.complaints, watched.strangers)
         watched.close()
 
@@ -259,7 +261,7 @@ def test_the_first_view_of_a_million_samples(running, tmp_path):
         seen = time.monotonic() - began
         watched.close()
     print(f"first view of a million samples: {seen:.2f} s")
-    assert seen < 3.0  # 1 s on a machine that does nothing else
+    assert seen < 1.0 * busy()
 
 
 @pytest.mark.long
@@ -268,8 +270,8 @@ def test_a_slider_moves_and_the_free_run_follows(running, tmp_path):
     from auvnn.simulation import simulate
 
     hidden = {"ocean_current": {"v_north": 0.15, "v_east": -0.1}}
-    # Two runs: the second is held out, the first one is ten minutes at 20 Hz.
-    simulate(load("rov95"), "multisine", "realistic", hidden, 0, runs=2, duration=600.0).log.write(
+    # The last 30 % are held out: ten minutes at 20 Hz are left.
+    simulate(load("rov95"), "multisine", "realistic", hidden, 0, runs=1, duration=860.0).log.write(
         tmp_path / "long.parquet"
     )
     with served(tmp_path, "model=rov95", f"log={tmp_path / 'long.parquet'}") as (address, _):
@@ -298,4 +300,4 @@ def test_a_slider_moves_and_the_free_run_follows(running, tmp_path):
         watched.close()
     median = float(np.median(times))
     print(f"slider to redraw, median of 50: {median:.0f} ms")
-    assert median < 200.0  # 100 ms on a machine that does nothing else
+    assert median < 100.0 * busy()

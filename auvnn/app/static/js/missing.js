@@ -83,15 +83,16 @@ export class MissingScreen {
   // The force that has no name, in N and N m, where the answer states it.
   left() {
     const left = this.answer.left, depends = Object.entries(this.answer.depends_on || {});
-    if (left && Object.keys(left).length) {
+    if (left && DOF.some((d) => left[d.axis])) {
+      const force = (value, d) => (Number.isFinite(value) ? `${number(value, 2)} ${d.force}` : "–");
       const rows = DOF.filter((d) => left[d.axis]).map((d) => {
         const l = left[d.axis];
-        return h("tr", {}, h("th", { scope: "row" }, `${d.axis} ${d.word}`), h("td", { class: "num" }, `${number(l.rms)} ${d.force}`),
-          h("td", { class: "num" }, Number.isFinite(l.correlation_time) ? `${number(l.correlation_time, 2)} s` : "–"), h("td", { class: "num" }, percent(l.share)), h("td", { class: "num" }, Number.isFinite(l.detectable) ? `${number(l.detectable, 2)} ${d.force}` : "–"));
+        return h("tr", {}, h("th", { scope: "row" }, `${d.axis} ${d.word}`), h("td", { class: "num" }, force(l.rms, d)), h("td", { class: "num" }, force(l.upper, d)), h("td", { class: "num" }, force(l.detectable, d)),
+          h("td", { class: "num" }, Number.isFinite(l.correlation_time) ? `${number(l.correlation_time, 2)} s` : "–"), h("td", { class: "num" }, percent(l.share)));
       });
       return card("Left without a name",
-        h("table", {}, h("thead", {}, h("tr", {}, ["", "force (rms)", "lasts", "of the residual", "least this log shows"].map((w) => h("th", { scope: "col" }, w)))), h("tbody", {}, rows)),
-        Number.isFinite(left.cost) && h("p", { class: "soft" }, `It costs ${number(left.cost)} of the error of 5 s free running.`));
+        h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Force without a name" }, h("table", {}, h("thead", {}, h("tr", {}, ["", "rms", "at most", "would have shown", "lasts", "of the actuators"].map((w) => h("th", { scope: "col" }, w)))), h("tbody", {}, rows))),
+        Number.isFinite(left.cost) && h("p", { class: "soft" }, `The error on runs left out is ${percent(left.cost)} above the noise floor.`));
     }
     return card("Left without a name",
       h("p", {}, this.answer.verdict === "adequate" ? "What is left looks like noise." : `${percent(this.answer.unexplained).replace("<", "Less than ")} of the residual's energy above the noise is explained by nothing in the catalogue.`),
@@ -100,14 +101,22 @@ export class MissingScreen {
       depends.length > 0 && h("p", { class: "soft" }, "It depends on: ", depends.map(([axis, shares]) => { const top = Object.entries(shares).sort((a, b) => b[1] - a[1])[0]; return top ? `${axis} on ${top[0]} (${percent(top[1])})` : null; }).filter(Boolean).join(", ")));
   }
 
+  // What each name costs, and names that predict without being the cause, where the answer states them.
   costs() {
     const matters = Object.entries(this.answer.matters || {}), joint = Object.entries(this.answer.joint || {});
     if (!matters.length && !joint.length) return null;
-    return card(joint.length ? "What predicts, fitted together" : "What each of them costs",
-      h("ul", {}, matters.map(([name, m]) => h("li", {}, h("b", {}, name), m && Number.isFinite(m.cost) ? ` costs ${number(m.cost)} of the 5 s error` : "", m && m.matters === false ? "; too little to matter" : ""))),
+    const gain = (g) => (g && Number.isFinite(g.value) ? measured(g.value, g.std, "1") : Number.isFinite(g) ? number(g) : "–");
+    const names = (list) => (list || []).map((c) => (typeof c === "string" ? c : c.effect)).join(", ");
+    return card(joint.length ? "What predicts a part" : "Does it matter?",
+      matters.length > 0 && h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "What each name costs" }, h("table", {},
+        h("thead", {}, h("tr", {}, ["effect", "matters", "costs", "force, of the actuators"].map((w) => h("th", { scope: "col" }, w)))),
+        h("tbody", {}, matters.map(([name, m]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, m.matters === false ? "no" : "yes"), h("td", { class: "num" }, percent(m.cost)), h("td", { class: "num" }, percent(m.share))))))),
+      matters.length > 0 && h("p", { class: "soft" }, "Costs: by how much the error on runs left out is larger without the name, everything else refitted."),
       joint.map(([name, j]) => h("div", {}, h("h3", {}, name), parameters(j.parameters),
-        Number.isFinite(j.gain) && h("p", { class: "soft" }, `lowers the error by ${number(j.gain)}`),
-        (j.confounded_with || []).length > 0 && h("p", { class: "soft" }, `cannot be told apart from ${j.confounded_with.map((c) => c.effect || c).join(", ")}`))));
+        j.explained_by_dof && h("p", { class: "soft" }, "Explains of the force: ", DOF.filter((d) => Number.isFinite(j.explained_by_dof[d.axis])).map((d) => `${d.axis} ${percent(j.explained_by_dof[d.axis])}`).join(", ")),
+        h("p", { class: "soft" }, `Lowers the error by ${gain(j.gain)}.`),
+        (j.confounded_with || []).length > 0 && h("p", { class: "alike" }, `Cannot be told apart from ${names(j.confounded_with)}`))),
+      joint.length > 0 && h("p", { class: "soft" }, "None of these names is claimed as the cause."));
   }
 
   drive() {
@@ -129,7 +138,7 @@ export class MissingScreen {
         h("dt", {}, "error on runs left out"), h("dd", {}, fall === null ? "unknown" : fall > 0.0005 ? `${percent(fall)} lower` : fall < -0.0005 ? `${percent(-fall)} higher` : "the same"),
         h("dt", {}, "were it absent"), h("dd", {}, chance(c.p_value))),
       parameters(c.parameters, effect),
-      c.confusable_with.length > 0 && h("p", { class: "alike" }, "Looks alike on this log: ", c.confusable_with.slice(0, 4).map((o) => `${o.effect} (${number(o.similarity, 3)})`).join(", ")),
+      (c.confusable_with || []).length > 0 && h("p", { class: "alike" }, "Looks alike on this log: ", c.confusable_with.slice(0, 4).map((o) => `${o.effect} (${number(o.similarity, 3)})`).join(", ")),
       h("p", {}, h("button", { type: "button", class: chosen ? "primary small" : "small", onclick: () => this.attempt([c.effect]) }, `Try ${c.effect}`)));
   }
 

@@ -98,7 +98,7 @@ export class ResultScreen {
     const told = h("div", { id: "told" }, state.saved.map((path) => h("p", { class: "good" }, `Saved: ${path}`)));
     const kept = state.history.length > 1;
     return card("Take it home",
-      h("form", { onsubmit: (event) => { event.preventDefault(); attempt(async () => { await post("save", { folder: folder.value }); await this.app.changed(); }, event.submitter); } },
+      h("form", { onsubmit: (event) => { event.preventDefault(); event.submitter.textContent = "Saving …"; attempt(async () => { await post("save", { folder: folder.value }); await this.app.changed(); }, event.submitter).finally(() => { event.submitter.textContent = "Save"; }); } },
         h("label", { for: "folder" }, "Folder on this machine, new or empty"), folder,
         h("p", { class: "soft" }, `Holds ${kept ? "the model, " : ""}the logs, the answers with their reports, and the commands and the script below.`, kept ? "" : " No effect was kept yet: without a model."),
         h("p", { class: "row" }, h("button", { type: "submit", class: "primary", id: "save" }, "Save"))),

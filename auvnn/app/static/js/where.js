@@ -67,7 +67,7 @@ export class WhereScreen {
     return h("div", {}, h("div", { class: "figures" },
       box(five.total, "error of 5 s free running, in standard deviations of the motion", worse ? "bad" : ""),
       box(five.persistence, "the same for holding the speed"),
-      base && box(base.total, "the same for a plain regression"),
+      base && Number.isFinite(base.total) && box(base.total, "the same for a plain regression fitted to the log"),
       box(floor, "noise floor: a perfect model would show this")),
     worse && h("p", { class: "bad" }, "The model predicts no better than holding the speed does."));
   }
@@ -100,7 +100,7 @@ export class WhereScreen {
 
   horizon() {
     const rows = this.answer.rollout, of = (name) => Object.fromEntries(Object.entries(rows).map(([k, v]) => [k, v[name]]));
-    const base = this.answer.baseline_rollout || (this.answer.baseline && { 5: this.answer.baseline.total });
+    const base = this.answer.baseline_rollout || (this.answer.baseline && Number.isFinite(this.answer.baseline.total) && { [this.answer.baseline.horizon || "5"]: this.answer.baseline.total });
     const lines = [["given", "model", of("total")], ["persistence", "holding the speed", of("persistence")], ...(base ? [["refitted", "plain regression", base]] : []), ["floor", "noise floor", this.answer.more.floors]];
     return card("Error against horizon", againstHorizon(lines), key(...lines.map(([kind, words]) => [kind, words])));
   }
@@ -137,7 +137,6 @@ export class WhereScreen {
       // By powers: a residual of twice its floor is to be seen beside one of forty times.
       const strength = ratio === null || ratio <= 1 ? 0 : Math.min(Math.log(ratio) / Math.log(most), 1);
       button.style.setProperty("--heat", `${Math.round(100 * strength ** 1.4)}%`);
-      if (strength ** 1.4 > 0.62) button.classList.add("hot");
       return h("td", {}, button);
     };
     const move = (event) => {
