@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, standard_errors
+from auvnn.diagnosis.hypotheses.layout import GROUPS, Layout
+from auvnn.effects import EFFECTS
 from auvnn.effects.base import Body
 from auvnn.estimation.priors import set_parameters
 from auvnn.models import GreyBox
@@ -18,16 +19,24 @@ def with_fitted_parameters(model: GreyBox, layout: Layout, found: FittedHypothes
     """Return the model with an explanation in it.
 
     Coefficients that were merely refitted become the vehicle's numbers; effects that were asked for, and
-    those that the model had, stay effects, so that they can be seen and removed.
+    those that the model had, stay effects, so that they can be seen and removed, with their standard errors as their
+    uncertainty. A mass, a centre or a thrust that was stated to be uncertain becomes an effect too.
     """
     full = layout.model.rebuilt(layout.model.copied_effects())
     set_parameters(full, found.names, found.fitted.theta)
-    coefficients = [n for n in layout.nuisance if n not in found.effects and n not in model.effect_names]
-    keep = [*model.effect_names, *(n for n in found.effects if n not in model.effect_names)]
+    refitted = [n for n in layout.nuisance if n not in found.effects and n not in model.effect_names]
+    coefficients = [n for n in refitted if n in GROUPS or n not in EFFECTS]
+    others = [n for n in refitted if n not in coefficients and n in found.names]
+    keep = [*model.effect_names, *(n for n in found.effects if n not in model.effect_names), *others]
     body = GreyBox(model.vehicle, actuation=model.actuation).prepare().body
     for name in coefficients:
         body = full.effect(name).body(body, None)
     copies = {str(e.name): e for e in full.copied_effects()}
+    for name, at in layout.places(found.names).items():
+        if name in keep and name in EFFECTS:
+            errors, _ = standard_errors(found, at)
+            known = zip(copies[name].parameters_of, errors, strict=True)
+            copies[name].uncertainty = {p.name: float(std) for p, std in known if np.isfinite(std)}
     return model.rebuilt([copies[n] for n in keep], with_body(model.vehicle, body))
 
 
