@@ -14,6 +14,8 @@ from auvnn.effects.hooks import Body, Extent, Moment, Parameter, Response, Sense
 from auvnn.errors import ConfigError
 
 AXES = ("X", "Y", "Z", "K", "M", "N")
+# Standard deviation, in scales, of a parameter that is stated to be exact: what is not nought can be divided by.
+EXACT = 1e-6
 
 
 class Effect(nn.Module):
@@ -56,6 +58,8 @@ class Effect(nn.Module):
     remembers: ClassVar[bool] = False
 
     theta: nn.Parameter
+    # Standard deviations by parameter, as they were stated or fitted; of what is not in it the default holds.
+    uncertainty: dict[str, float]
 
     def __init__(self, parameters: tuple[Parameter, ...], values: Mapping[str, float] | None = None) -> None:
         """Keep the parameters' descriptions and start them at `values`, the rest at their nulls.
@@ -66,6 +70,7 @@ class Effect(nn.Module):
         super().__init__()
         self.parameters_of = parameters
         self._index = {p.name: i for i, p in enumerate(parameters)}
+        self.uncertainty = {}
         start = [p.null for p in parameters]
         for key, value in (values or {}).items():
             if key not in self._index:
@@ -154,6 +159,37 @@ class Effect(nn.Module):
     def value(self, name: str) -> Tensor:
         """Return one parameter as a scalar tensor."""
         return self.theta[self._index[name]]
+
+    def state_uncertainty(self, given: Mapping[str, Any]) -> None:
+        """Keep the standard deviations of some parameters, in their units.
+
+        Raises:
+            ConfigError: a name is unknown, or a value is no number from nought up.
+        """
+        for key, value in given.items():
+            if key not in self._index:
+                raise ConfigError(unknown_name(f"parameter of {self.name}", str(key), self._index))
+            good = (
+                isinstance(value, (int, float))
+                and not isinstance(value, bool)
+                and 0.0 <= value < float("inf")
+            )
+            if not good:
+                raise ConfigError(
+                    f"{self.name}.uncertainty.{key} = {value!r}: a standard deviation, a number from 0 up, is needed"
+                )
+            self.uncertainty[str(key)] = float(value)
+
+    def standard_deviations(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Return how uncertain each parameter is, (p,): as stated, else a tenth of its value or of its scale.
+
+        The larger of the two; a parameter that is stated to be exact keeps a millionth of its scale.
+        """
+        out = []
+        for p, value in self.values().items():
+            scale = self.parameters_of[self._index[p]].scale
+            out.append(max(self.uncertainty.get(p, max(0.1 * abs(value), 0.1 * scale)), EXACT * scale))
+        return np.array(out)
 
     def absent(self) -> bool:
         """Return whether the effect is at its null, whatever its shape, and so does nothing."""
