@@ -105,6 +105,9 @@ def searched(
     known, spread = with_drag_only(model, log)
     windows, notes = windows_that_hold(known, log, window)
     layout = lay_out(known, usable, spread)
+    absorbed = confounded_effects(model, log)
+    notes += [] if spread is None else [LEARNED]
+    notes += [] if absorbed is None else absorbed.words()
     asked = Setting(
         model=model,
         log=log,
@@ -118,14 +121,8 @@ def searched(
         costs=costs,
         advice=advice,
         whiteness=whiteness,
+        absorbed=absorbed,
+        notes=(*notes, *doubts(model, log)),
         say=say,
     )
-    found, under_way = search(asked, windows)
-    found.warnings += notes
-    if spread is not None:
-        found.warnings.append(LEARNED)
-    found.absorbed = confounded_effects(model, log)
-    if found.absorbed is not None:
-        found.warnings += found.absorbed.words()
-    found.warnings += doubts(model, log)
-    return found, under_way
+    return search(asked, windows)

@@ -42,7 +42,7 @@ def some_model(random):
 
 def nonsense(random, model, runs, samples, rate):
     """Runs of a motion that no vehicle makes, with commands that have nothing to do with it."""
-    made = []
+    made, located = [], random.random() < 0.7
     for number in range(runs):
         t = np.arange(samples) / rate
         size = float(random.choice([0.01, 1.0, 5.0]))
@@ -57,7 +57,7 @@ def nonsense(random, model, runs, samples, rate):
                 t,
                 quaternion,
                 nu,
-                position=np.cumsum(random.normal(size=(samples, 3)), axis=0) if random.random() < 0.7 else None,
+                position=np.cumsum(random.normal(size=(samples, 3)), axis=0) if located else None,
                 fins=0.2 * random.normal(size=(samples, fins)) if fins else None,
                 thrusters=command,
             )
