@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
+
 from auvnn.checks.doubts import doubts
 from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.answers.tolerance import Tolerance
@@ -14,8 +16,9 @@ from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.state import Searched, Setting
-from auvnn.errors import ConfigError
+from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.normal_equations import TRUST, motion
+from auvnn.estimation.prediction_error import SINGULAR
 from auvnn.logs import Log
 from auvnn.models import GreyBox
 from auvnn.training.confounding.confounded_effects import confounded_effects
@@ -125,4 +128,10 @@ def searched(
         notes=(*notes, *doubts(model, log)),
         say=say,
     )
-    return search(asked, windows)
+    try:
+        return search(asked, windows)
+    except (np.linalg.LinAlgError, SINGULAR) as problem:
+        raise InputError(
+            f"{log.name} cannot be diagnosed with {model.vehicle.name}: free running grows without bound, so that the "
+            f"sums of its tests cannot be solved ({problem}); choose shorter windows with window=, and check the model"
+        ) from None
