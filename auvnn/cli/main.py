@@ -13,6 +13,7 @@ from typing import Any
 from auvnn.cli.faults import INTERRUPTED, OK, TERMINATED, Terminated, outcome
 from auvnn.cli.speech import complain
 from auvnn.cli.verbs import VERBS
+from auvnn.threads import sleep_when_idle
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -46,6 +47,7 @@ def _dispatch(verb: str, rest: list[str]) -> int:
 
 def _prepare() -> None:
     """Let SIGTERM end a run as Ctrl-C does, let no character be unprintable, and keep libraries quiet."""
+    sleep_when_idle()
 
     def end(_signal: int, _frame: Any) -> None:
         raise Terminated

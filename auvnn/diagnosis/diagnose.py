@@ -20,6 +20,7 @@ from auvnn.estimation.normal_equations import TRUST, motion
 from auvnn.logs import Log
 from auvnn.metrics.one_step import choose_derivative
 from auvnn.models import GreyBox
+from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
 
 LEARNED = (
@@ -28,6 +29,7 @@ LEARNED = (
 )
 
 
+@on_one_thread
 def diagnose(
     model: GreyBox,
     log: Log,

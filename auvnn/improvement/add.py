@@ -29,6 +29,7 @@ from auvnn.logs.leakage import leakage
 from auvnn.metrics.one_step import choose_derivative, one_step, scores
 from auvnn.metrics.rollouts import HORIZONS, rollout_table, scale_of
 from auvnn.models import GreyBox
+from auvnn.threads import on_one_thread
 
 Array = NDArray[np.float64]
 # Layout, effects that are free anyway, effects asked for, the fit to start from.
@@ -99,6 +100,7 @@ class Improvement(Answer):
         )
 
 
+@on_one_thread
 def add(
     model: GreyBox,
     log: Log,
