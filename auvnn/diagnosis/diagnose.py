@@ -24,6 +24,7 @@ from auvnn.estimation.prediction_error import SINGULAR
 from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
+from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
 
 LEARNED = (
@@ -32,6 +33,7 @@ LEARNED = (
 )
 
 
+@on_one_thread
 def diagnose(
     model: GreyBox,
     log: Log,

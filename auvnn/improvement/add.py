@@ -23,8 +23,10 @@ from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.rollouts import HORIZONS
 from auvnn.models import GreyBox
+from auvnn.threads import on_one_thread
 
 
+@on_one_thread
 def add(
     model: GreyBox,
     log: Log,
