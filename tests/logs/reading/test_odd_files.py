@@ -51,7 +51,7 @@ def test_a_recording_that_runs_through_the_same_times_with_other_values_is_a_run
 def test_shuffled_rows_are_told_as_such():
     table = frame(make_run(400))
     table[np.random.default_rng(0).permutation(400)].write_csv("log.csv")
-    with pytest.raises(InputError, match="not in the order of time.*sort the file by t"):
+    with pytest.raises(InputError, match=r"not in the order of time.*sort the file by t"):
         Log.read("log.csv")
 
 
