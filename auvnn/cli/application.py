@@ -149,17 +149,24 @@ def _job(name: str, verb: Verb, composer: Composer, config: DictConfig) -> int:
 
 def _run(verb: Verb, composer: Composer, config: DictConfig, out: Path) -> None:
     options = composer.options(config)
-    say = Speaker(only_json=options["json"])
+    say = Speaker(only_json=options["json"], verbose=options["verbose"])
     for key in verb.reads:
         # A model may also be a name, which is not ours to judge.
         if options[key] is not None and (key != "model" or _is_path(options[key])):
             files(options, key)
     if options["dry_run"]:
         refuse_taken(out, overwrite=options["overwrite"])
+        if verb.foresee is not None:
+            verb.foresee(Job(options, out, out, say))
         for key in verb.reads:
             if options[key] is not None:
                 say(f"would read   {key}={options[key]}")
-        say(f"would write  {', '.join(verb.writes)} in {out}")
+        if verb.writes:
+            say(f"would write  {', '.join(verb.writes)} in {out}")
+        return
+    if not verb.writes:
+        # It writes what its user asks for while it runs, and nothing of its own.
+        say.answer(verb.run(Job(options, out, out, say)).to_dict())
         return
     with written(out, overwrite=options["overwrite"]) as folder:
         answer = verb.run(Job(options, out, folder, say))

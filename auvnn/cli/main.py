@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from auvnn.cli.faults import INTERRUPTED, OK, TERMINATED, Terminated, outcome
+from auvnn.cli.pages import PAGES
 from auvnn.cli.speech import complain
 from auvnn.cli.verbs import VERBS
 from auvnn.executors.safe_path import keep_safe
@@ -38,6 +39,9 @@ def _dispatch(verb: str, rest: list[str]) -> int:
         from auvnn.cli.overview import overview
 
         print(f"auvnn {__version__}" if verb == "--version" else overview())
+        return OK
+    if verb in PAGES:
+        print(PAGES[verb](rest))
         return OK
     found = VERBS.get(verb)
     from auvnn.cli.application import run_verb

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from auvnn.errors import InputError
-from auvnn.log_chunks.windows import CHANGED, HOLD, ScanState, WindowCut
+from auvnn.log_chunks.scan import CHANGED, HOLD, ScanState, WindowCut
 from auvnn.logs import Run
 from auvnn.logs.log import blocks_of
 from auvnn.logs.reading.mapping import Mapping

@@ -55,12 +55,16 @@ def write(log: Log, path: Path, overwrite: bool) -> Path:
 
     Raises:
         InputError: the file is there already and `overwrite` is false, or it cannot be written.
-        ConfigError: the name ends in neither `.parquet` nor `.csv`.
+        ConfigError: the name ends in none of `.parquet`, `.csv`, `.mcap`.
     """
-    if path.suffix.lower() not in (".parquet", ".csv"):
-        raise ConfigError(f"a log is written as .parquet or .csv, not as '{path.name}'")
+    if path.suffix.lower() not in (".parquet", ".csv", ".mcap"):
+        raise ConfigError(f"a log is written as .parquet, .csv or .mcap, not as '{path.name}'")
     if path.exists() and not overwrite:
         raise InputError(f"{path} is there already; choose another name or overwrite it explicitly")
+    if path.suffix.lower() == ".mcap":
+        from auvnn.logs.writing_mcap import write_mcap
+
+        return write_mcap(log, path)
     _placed(to_frame(log), path)
     if path.suffix.lower() == ".csv":
         write_seal(path, file_hash(path))

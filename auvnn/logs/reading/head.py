@@ -38,17 +38,17 @@ def read_table(reader: Reader, path: Path, plan: Mapping, max_duration: float | 
     """
     where = str(path)
     if max_duration is None:
-        return plan.apply(reader.read(path), where), None
+        return reader.mapped(path, plan), None
     number = isinstance(max_duration, (int, float)) and not isinstance(max_duration, bool)
     if not number or not 0.0 < max_duration < np.inf:
         raise ConfigError(f"max_duration={max_duration} must be a number of seconds above zero")
     try:
         size = path.stat().st_size
-        share = min(1.0, _FIRST / max(size, 1))
+        share = min(1.0, _FIRST / max(size, 1)) if reader.in_parts else 1.0
     except OSError as problem:
         raise InputError(f"{where}: cannot be read: {problem}") from None
     while True:
-        table = plan.apply(reader.read_head(path, share), where)
+        table = reader.mapped(path, plan, share, max_duration)
         read = None if share >= 1.0 else int(share * size)
         if "t" not in table.columns:
             return table, read  # the check of what is required has better words for it

@@ -24,7 +24,18 @@ from auvnn.logs.channels import (
     numbered,
 )
 from auvnn.logs.readers import Table, choose
-from auvnn.logs.reading import attitude, clock, delays, frames, masks, plausible, required
+from auvnn.logs.readers.ros2_folder import ros2_files
+from auvnn.logs.reading import (
+    attitude,
+    clock,
+    delays,
+    frames,
+    in_world,
+    masks,
+    plausible,
+    required,
+    several_rates,
+)
 from auvnn.logs.reading.head import read_table
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.logs.reading.repair import Repair
@@ -65,7 +76,8 @@ def read(
         InputError: a file cannot be read or its content must not be trusted.
         ConfigError: the mapping is wrong, or no file is named.
     """
-    paths = [Path(p) for p in ([path] if isinstance(path, (str, Path)) else path)]
+    named = [Path(p) for p in ([path] if isinstance(path, (str, Path)) else path)]
+    paths = [f for p in named for f in (ros2_files(p) if (p / "metadata.yaml").is_file() else [p])]
     if not paths:
         raise ConfigError("no log file is named; log= takes a path or a list of paths")
     doubled = {str(p) for p in paths if paths.count(p) > 1}
@@ -147,6 +159,7 @@ def _number_apart(collector: Collector, first: int, file: Path, several: bool) -
 def collect(table: Table, plan: Mapping, file: Path, collector: Collector) -> None:
     """Turn a table into runs: told apart, in order of time, mended and checked."""
     where = str(file)
+    plan = table.rest or plan
     required.check_required(table, where)
     collector.repairs.extend(required.notes(table, where))
     label_column = plan.run if plan.run not in (None, "file") else "run"
@@ -172,6 +185,8 @@ def collect(table: Table, plan: Mapping, file: Path, collector: Collector) -> No
             columns = {n: c[pick].astype(np.float64, copy=False) for n, c in table.columns.items()}
             columns["t"] = t[pick]
             columns, notes = delays.undo_delays(columns, plan, here)
+            collector.repairs.extend(notes)
+            columns, notes = several_rates.settle(columns, plan, here)
             collector.repairs.extend(notes)
             run = _run(number if i == 0 else highest, columns, outside, plan, here, collector.repairs)
             collector.runs.append(run)
@@ -243,13 +258,15 @@ def _run(
         return np.stack([columns.get(n, missing) for n in names], axis=1)
 
     velocity = block(VELOCITY)
-    assert velocity is not None  # required.check has seen these columns
+    if velocity is None:
+        velocity = np.full((len(columns["t"]), 6), np.nan)
     raw = block(QUATERNION) if all(n in columns for n in QUATERNION) else None
     if raw is not None:
         quaternion, notes = attitude.from_quaternions(raw, where)
     else:
         angles = block(EULER)
-        assert angles is not None
+        if angles is None:
+            angles = np.full((len(columns["t"]), 3), np.nan)
         quaternion, notes = attitude.from_angles(angles, columns["t"], velocity[:, 5], where)
     repairs.extend(notes)
     acceleration, wrench, position = block(ACCELERATION), block(WRENCH), block(POSITION)
@@ -268,6 +285,8 @@ def _run(
         reset=columns.get(RESET),
         extra={n: columns[n] for n in outside},
     )
+    run, notes = in_world.settle(run, plan, where)
+    repairs.extend(notes)
     for mend in (plausible.check_plausible, masks.apply):
         run, notes = mend(run, where)
         repairs.extend(notes)
