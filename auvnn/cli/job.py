@@ -117,6 +117,8 @@ class Job:
         names = ", ".join(map(str, paths[:5])) + (f" and {len(paths) - 5} more" if len(paths) > 5 else "")
         extent = f"{runs}, {log.samples} samples over {log.duration:.4g} s, driven by {log.kind}"
         self.say(f"{key:<9} {names}: {extent}")
+        if "force" in self.options:  # whoever fits refuses what `check` calls an error
+            log.quality().refuse_errors(bool(self["force"]))
         for repair in log.repairs if repairs else ():
             self.say(f"{repair.level:<9} {repair}", style="yellow")
         if not partial:

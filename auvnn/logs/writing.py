@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from auvnn.errors import ConfigError, InputError
+from auvnn.errors import ConfigError, InputError, one_line
 from auvnn.logs.seal import file_hash, seal_of, write_seal
 
 if TYPE_CHECKING:
@@ -103,7 +103,12 @@ def _placed(frame: pl.DataFrame, path: Path) -> Path:
         seal_of(path).unlink(missing_ok=True)
         os.replace(temporary, path)
     except OSError as problem:
-        raise InputError(f"{path} cannot be written: {problem.strerror}") from problem
+        raise InputError(f"{path} cannot be written: {problem.strerror or one_line(problem, 200)}") from problem
+    except Exception as problem:
+        # What polars says of a full disk is no OSError.
+        if type(problem).__module__.split(".")[0] != "polars":
+            raise
+        raise InputError(f"{path} cannot be written: {one_line(problem, 200)}") from problem
     finally:
         Path(temporary).unlink(missing_ok=True)
     return path

@@ -74,7 +74,7 @@ def test_a_sealed_log_that_changed_is_refused_by_every_way_of_reading(kind):
     else:
         flipped(path, 60)
     for read in (Log.read, portions.verify):
-        with pytest.raises(InputError, match="differs from its seal|damaged"):
+        with pytest.raises(InputError, match=r"differs from its seal|damaged"):
             read(path)
     if kind == "csv":
         os.remove(seal_of(path))

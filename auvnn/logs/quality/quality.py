@@ -68,13 +68,14 @@ class Quality(Answer):
         """Findings that ask for care."""
         return self.of_level("warning")
 
-    def refuse_errors(self) -> None:
-        """Raise where the log must not be fitted.
+    def refuse_errors(self, force: bool = False) -> None:
+        """Raise where the log must not be fitted: contradictions, and logs in which nothing moves or is driven.
 
         Raises:
             InputError: there is a finding of level "error"; the message names the first and its cure.
         """
-        self._refuse(self.errors)
+        if not force:
+            self._refuse(self.errors, "; force=true fits it all the same")
 
     @property
     def contradictions(self) -> list[Finding]:

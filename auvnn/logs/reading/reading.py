@@ -39,7 +39,7 @@ from auvnn.logs.reading import (
 from auvnn.logs.reading.head import read_table
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.logs.reading.repair import Repair
-from auvnn.logs.run import Run
+from auvnn.logs.run import MIN_SAMPLES, Run
 from auvnn.logs.seal import compare, file_hash, sealed
 
 Array = NDArray[np.float64]
@@ -172,6 +172,7 @@ def collect(table: Table, plan: Mapping, file: Path, collector: Collector) -> No
     highest = max(number for number, _ in groups)
     for number, rows in groups:
         here = where if len(groups) == 1 else f"{where}, run {number}"
+        rows = _without_repeats(table, t[rows], rows, here, collector.repairs)
         stretches, notes = clock.order_in_time(t[rows], here)
         collector.repairs.extend(notes)
         for i, stretch in enumerate(stretches):
@@ -189,6 +190,26 @@ def collect(table: Table, plan: Mapping, file: Path, collector: Collector) -> No
             collector.repairs.extend(notes)
             run = _run(number if i == 0 else highest, columns, outside, plan, here, collector.repairs)
             collector.runs.append(run)
+
+
+def _without_repeats(
+    table: Table, t: Array, rows: NDArray[np.intp], where: str, repairs: list[Repair]
+) -> NDArray[np.intp]:
+    """Return the rows but those that are, stamp and values, an earlier row again: blocks that were written twice."""
+    if not (np.diff(t[np.isfinite(t)]) < 0.0).any():
+        return rows  # nothing is written twice where time only runs on, and most logs end here
+    _, first, inverse = np.unique(t, return_index=True, return_inverse=True, equal_nan=False)
+    earlier = first[inverse]
+    again = np.flatnonzero(earlier < np.arange(len(t)))
+    for column in table.columns.values():
+        one, other = column[rows[earlier[again]]], column[rows[again]]
+        same = one == other if column.dtype.kind != "f" else (one == other) | (np.isnan(one) & np.isnan(other))
+        again = again[same]
+    if len(again) < MIN_SAMPLES:
+        return rows
+    words = "rows that are earlier ones again, stamps and values, left out (a block written twice?)"
+    repairs.append(Repair(words, where, len(again), "warning", "export the log again if rows are missing elsewhere"))
+    return np.delete(rows, again)
 
 
 def _groups(table: Table, name: str, where: str, collector: Collector) -> list[tuple[int, NDArray[np.intp]]]:
