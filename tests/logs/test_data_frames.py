@@ -45,7 +45,12 @@ def test_times_in_the_index_of_pandas() -> None:
     pd = pytest.importorskip("pandas")
     table = make_log(1, n=120).to_pandas().drop(columns="run")
     stamps = pd.to_datetime("2026-01-01") + pd.to_timedelta(table["t"], unit="s")
-    for index in (stamps, stamps.dt.tz_localize("Europe/Oslo"), pd.to_timedelta(table["t"], unit="s"), table["t"]):
+    for index in (
+        stamps,
+        stamps.dt.tz_localize("Europe/Oslo"),
+        pd.to_timedelta(table["t"], unit="s"),
+        table["t"],
+    ):
         changed = table.drop(columns="t").set_index(pd.Index(index, name=None))
         back = Log.from_dataframe(changed).runs[0]
         np.testing.assert_allclose(back.t - back.t[0], LOG.runs[0].t, atol=1e-6)
@@ -90,7 +95,9 @@ def test_written_files_read_back(name: str, tmp_path: Path) -> None:
     for a, b in zip(LOG.runs, back.runs, strict=True):
         for (left, x), (right, y) in zip(a.columns(), b.columns(), strict=True):
             assert left == right
-            np.testing.assert_allclose(y - y[0] if left == "t" else y, x - x[0] if left == "t" else x, atol=1e-9)
+            np.testing.assert_allclose(
+                y - y[0] if left == "t" else y, x - x[0] if left == "t" else x, atol=1e-9
+            )
     with pytest.raises(InputError, match="is there already"):
         LOG.write(path)
     assert list(tmp_path.iterdir()) == [path]
