@@ -22,6 +22,7 @@ DRAWERS = Catalogue(
         "comparison": "auvnn.report.pages.comparison:PAGE",
         "diagnosis": "auvnn.report.pages.diagnosis:PAGE",
         "improvement": "auvnn.report.pages.improvement:PAGE",
+        "improve": "auvnn.report.pages.improve:PAGE",
         "adaptation": "auvnn.report.pages.adaptation:PAGE",
         "fleet": "auvnn.report.pages.fleet:PAGE",
         "training": "auvnn.report.pages.training:PAGE",

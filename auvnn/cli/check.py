@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from auvnn.cli.dry import foreseen
 from auvnn.cli.job import Answering, Job, Verb, files
 
 _STYLE = {"error": "red", "warning": "yellow"}
@@ -44,6 +45,11 @@ def _looked(job: Job) -> list[dict[str, object]]:
 def _run(job: Job) -> Answering:
     looked = _looked(job)
     log = job.log(repairs=False, partial=True)  # repairs are findings too
+    if job["seal"]:
+        from auvnn.logs.seal import file_hash, write_seal
+
+        for path in log.paths:
+            job.say(f"sealed    {write_seal(path, file_hash(path))}")
     quality = log.quality()
     if looked:
         quality = replace(quality, files=looked)
@@ -72,4 +78,5 @@ VERB = Verb(
     reads=("log", "mapping", "model"),
     writes=("quality.json", "report.html", "figures/"),
     run=_run,
+    foresee=foreseen,
 )

@@ -29,7 +29,10 @@ class Log:
         name: what to call the log in words and file names.
         paths: the files it was read from; empty for a log made in memory.
         repairs: what was mended or noted while reading.
-        sha256: of the files' bytes where it was read, of the samples where it was made in memory.
+        sha256: of the files' bytes where it was read, of the samples where it was made in memory; where only the
+            beginning of a file was read, of that.
+        unknown: columns that are kept and not used.
+        unsealed: files in which damage that leaves numbers readable cannot be seen.
 
     Raises:
         InputError: there is no run, a number occurs twice, or the runs' columns differ.
@@ -41,6 +44,7 @@ class Log:
     repairs: tuple[Repair, ...] = ()
     sha256: str = ""
     unknown: tuple[str, ...] = field(default=(), kw_only=True)
+    unsealed: tuple[Path, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         """Check that the runs belong together."""
@@ -145,6 +149,10 @@ class Log:
     def kind(self) -> str:
         """What actuates the vehicle: "thrusters" where there are thruster commands, else "wrench"."""
         return self.runs[0].kind
+
+    def drives(self, kind: str) -> bool:
+        """Whether every run has commands of a kind, "thrusters" or "wrench"."""
+        return all((run.thrusters if kind == "thrusters" else run.wrench) is not None for run in self.runs)
 
     @property
     def n_thrusters(self) -> int:
