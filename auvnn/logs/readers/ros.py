@@ -162,7 +162,8 @@ class _Columns:
         names = list(dict.fromkeys(name for part in self.parts for name in part))[:_FIELDS]
         columns = {}
         for name in names:
-            pieces = [p.get(name, np.full(n, np.nan)) for p, n in zip(self.parts, self.sizes, strict=True)]
+            # Taken out one by one: all of them twice would be the most that reading needs.
+            pieces = [p.pop(name, np.full(n, np.nan)) for p, n in zip(self.parts, self.sizes, strict=True)]
             columns[name] = np.concatenate(pieces)
         words = {}
         if self.decoder is not None:

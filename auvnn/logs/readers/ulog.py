@@ -41,35 +41,41 @@ class UlogReader(RecordingReader):
             # It prints what it finds damaged.
             with contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"):
                 log: Any = ULog(str(path))
+                notes, topics, facts = _contents(log, where, wanted)
         except MemoryError:
             raise InputError(f"{where}: is a damaged ULog: it asks for more memory than there is") from None
         except Exception as problem:  # it indexes, unpacks and looks up what the file says
             raise InputError(
                 f"{where}: is a damaged ULog ({type(problem).__name__}); copy it again"
             ) from None
-        notes: list[Repair] = []
-        if log.file_corruption:
-            notes.append(Repair("damaged parts left out", where, 1, "warning", "copy the log again"))
-        if log.dropouts:
-            lost = sum(d.duration for d in log.dropouts) / 1000.0
-            words = f"times at which the logger could not keep up, {lost:.2g} s together"
-            notes.append(Repair(words, where, len(log.dropouts), "warning"))
-        several = {d.name for d in log.data_list if d.multi_id}
-        start = int(log.start_timestamp)
-        topics = {}
-        for data in log.data_list:
-            name = f"{data.name}[{data.multi_id}]" if data.name in several else data.name
-            topic = _topic(name, data.data, start)
-            if topic is not None and (wanted is None or wanted(name, "ulog")):
-                topics[name] = topic
         if not topics and wanted is None:
             raise InputError(f"{where}: holds no messages")
-        facts = {
-            "parameters": {
-                k: float(v) for k, v in log.initial_parameters.items() if isinstance(v, (int, float))
-            }
-        }
         return Recording(topics, notes, facts)
+
+
+def _contents(
+    log: Any, where: str, wanted: Wanted | None
+) -> tuple[list[Repair], dict[str, Topic], dict[str, Any]]:
+    """Return notes, topics and facts of a parsed log; whatever it raises is damage."""
+    notes: list[Repair] = []
+    if log.file_corruption:
+        notes.append(Repair("damaged parts left out", where, 1, "warning", "copy the log again"))
+    if log.dropouts:
+        lost = sum(d.duration for d in log.dropouts) / 1000.0
+        words = f"times at which the logger could not keep up, {lost:.2g} s together"
+        notes.append(Repair(words, where, len(log.dropouts), "warning"))
+    several = {d.name for d in log.data_list if d.multi_id}
+    start = int(log.start_timestamp)
+    topics = {}
+    for data in log.data_list:
+        name = f"{data.name}[{data.multi_id}]" if data.name in several else data.name
+        topic = _topic(name, data.data, start)
+        if topic is not None and (wanted is None or wanted(name, "ulog")):
+            topics[name] = topic
+    facts = {
+        "parameters": {k: float(v) for k, v in log.initial_parameters.items() if isinstance(v, (int, float))}
+    }
+    return notes, topics, facts
 
 
 def _topic(name: str, columns: dict[str, Any], start: int) -> Topic | None:

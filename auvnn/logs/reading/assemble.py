@@ -81,7 +81,7 @@ def assemble(reader: RecordingReader, path: Path, plan: Mapping, until: float | 
     recording = reader.record(path, wanted, until)
     if set(recording.topics) == {""} and not plan.topics:
         return _flat(recording, plan, where)
-    table = from_recording(recording, plan, where)
+    table = from_recording(recording, plan, where, consume=True)
     table.repairs[:0] = [*recording.repairs, *notes]
     return table
 
@@ -113,13 +113,14 @@ def status_of(path: str) -> str:
     return "NKF4" if path.startswith("NK") else "XKF4"
 
 
-def from_recording(recording: Recording, plan: Mapping, where: str) -> Table:
+def from_recording(recording: Recording, plan: Mapping, where: str, consume: bool = False) -> Table:
     """Return the canonical table that a mapping makes of topics.
 
     Args:
         recording: with the topics that the mapping names.
         plan: the mapping.
         where: file, for messages.
+        consume: whether the recording may be emptied, to spare memory.
 
     Raises:
         InputError: a topic or a field is not there, or lies about its frame.
@@ -165,6 +166,9 @@ def from_recording(recording: Recording, plan: Mapping, where: str) -> Table:
     other_clocks.align(
         series, {n: r for n, r in plan.topics.items() if r.offset == "auto"}, where, result.repairs
     )
+    if consume:
+        recording.topics.clear()
+        times.known.clear()
     _merged(series, recording, plan, where, result)
     for name, value in constants.items():
         result.columns[name] = np.full(result.rows, value)
