@@ -31,7 +31,7 @@ from auvnn.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from auvnn.damping.bank import DampingBank
-    from auvnn.models.state_space import Linearisation
+    from auvnn.models.linearise import Linearisation
     from auvnn.models.trajectory import Trajectory
 
 
@@ -447,14 +447,14 @@ class GreyBox(nn.Module):
     def linearise(
         self, state: Tensor, command: Tensor, dt: float | None = None, **given: Any
     ) -> Linearisation:
-        """Return A and B at a state, with the actuators' states: see `auvnn.models.state_space.linearise`."""
-        from auvnn.models.state_space import linearise
+        """Return A and B at a state, with the actuators' states: see `auvnn.models.linearise.linearise`."""
+        from auvnn.models.linearise import linearise
 
         return linearise(self, state, command, dt, **given)
 
     def discrete_step(self, state: Tensor, command: Tensor, dt: float, **given: Any) -> Tensor:
-        """Return the state after one step: see `auvnn.models.state_space.discrete_step`."""
-        from auvnn.models.state_space import discrete_step
+        """Return the state after one step: see `auvnn.models.linearise.discrete_step`."""
+        from auvnn.models.linearise import discrete_step
 
         return discrete_step(self, state, command, dt, **given)
 

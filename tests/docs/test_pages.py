@@ -47,6 +47,7 @@ def place(tmp_path_factory):
     made.log.write(folder / "dives" / "first.parquet")
     (folder / "my-rov.yaml").write_text((config_dir() / "vehicle" / "rov95.yaml").read_text())
     auvnn.load("rov95").save(folder / "better" / "model")
+    auvnn.export(model, to="sdf", out=folder / "sim")
     return folder
 
 

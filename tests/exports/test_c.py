@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import subprocess
 import time
 
@@ -112,6 +113,18 @@ def test_its_own_test_program_passes_and_notices(cc, tmp_path):
     (tmp_path / "c" / "pipe.c").write_text(text.replace("rate[12] = ", "rate[12] = 1.001 * "))
     subprocess.run(run, cwd=tmp_path / "c", check=True)
     assert subprocess.run(["./pipe_test"], cwd=tmp_path / "c", capture_output=True).returncode == 1
+
+
+def test_the_example_of_the_page_runs(cc, tmp_path):
+    from auvnn.docs import page
+
+    export(model("rov95"), "c", tmp_path / "c")
+    [example] = re.findall(r"^```c\n(.*?)^```", page("exports"), re.MULTILINE | re.DOTALL)
+    (tmp_path / "c" / "example.c").write_text(example)
+    build = [cc, *STRICT, "-O1", "example.c", "rov95.c", "-lm", "-o", "example"]
+    subprocess.run(build, cwd=tmp_path / "c", check=True)
+    done = subprocess.run(["./example"], cwd=tmp_path / "c", capture_output=True, text=True, check=True)
+    assert re.fullmatch(r"[\d.]+ m north, d u_dot / d u = -[\d.]+ 1/s\n", done.stdout)
 
 
 def test_settled_actuators_are_where_they_stay(cc, tmp_path):
