@@ -6,11 +6,11 @@ import json
 import shutil
 import threading
 import time
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from auvnn.app.child import Child
+from auvnn.app.jobs.child import Child
+from auvnn.app.records import Job, Step
 from auvnn.app.script import Told
 from auvnn.app.source import Source
 from auvnn.errors import AuvnnError, ConfigError, one_line
@@ -18,49 +18,6 @@ from auvnn.errors import AuvnnError, ConfigError, one_line
 KINDS = ("compare", "diagnose", "add", "example")
 LONG = 100_000  # samples from which on the quality report takes seconds
 ANSWERS = {"compare": "comparison", "diagnose": "diagnosis", "add": "improvement"}
-
-
-@dataclass
-class Step:
-    """One model of the history.
-
-    Attributes:
-        source: name, file or folder from which it is loaded.
-        words: what it is.
-        effects: what was added to the one before it.
-        answer: folder of the improvement that made it.
-        error: held-out error, and that of the refitted model without the effects.
-    """
-
-    source: str
-    words: str
-    effects: tuple[str, ...] = ()
-    answer: Path | None = None
-    error: dict[str, float | None] = field(default_factory=dict)
-
-
-@dataclass
-class Job:
-    """A job that runs or has run."""
-
-    number: int
-    kind: str
-    words: str
-    out: Path
-    began: float
-    state: str = "running"
-    lines: list[str] = field(default_factory=list)
-    error: str = ""
-    effects: tuple[str, ...] = ()
-    seconds: float = 0.0
-
-    def told(self) -> dict[str, Any]:
-        """Return the job for the page."""
-        seconds = time.monotonic() - self.began if self.state == "running" else self.seconds
-        return {
-            "number": self.number, "kind": self.kind, "words": self.words, "state": self.state, "lines": self.lines[-8:],
-            "count": len(self.lines), "error": self.error, "seconds": round(seconds, 1), "effects": list(self.effects),
-        }  # fmt: skip
 
 
 class Session:
