@@ -26,7 +26,9 @@ __all__ = [
     "compare",
     "diagnose",
     "diagnose_files",
+    "export",
     "fleet",
+    "import_model",
     "improve",
     "load",
     "remove",
@@ -38,6 +40,8 @@ __all__ = [
 if TYPE_CHECKING:
     from auvnn.comparison import compare
     from auvnn.diagnosis import diagnose, diagnose_files
+    from auvnn.exports import export
+    from auvnn.imports import import_model
     from auvnn.improvement import add, fleet, improve
     from auvnn.logs import Log, check
     from auvnn.models import GreyBox, load, remove
@@ -57,7 +61,9 @@ _WHERE = {
     "compare": "auvnn.comparison",
     "diagnose": "auvnn.diagnosis",
     "diagnose_files": "auvnn.diagnosis",
+    "export": "auvnn.exports",
     "fleet": "auvnn.improvement",
+    "import_model": "auvnn.imports",
     "improve": "auvnn.improvement",
     "load": "auvnn.models",
     "remove": "auvnn.models",

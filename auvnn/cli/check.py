@@ -44,11 +44,17 @@ def _looked(job: Job) -> list[dict[str, object]]:
 
 def _run(job: Job) -> Answering:
     looked = _looked(job)
-    log = job.log(repairs=False)  # they are findings too
+    log = job.log(repairs=False, partial=True)  # repairs are findings too
+    if job["seal"]:
+        from auvnn.logs.seal import file_hash, write_seal
+
+        for path in log.paths:
+            job.say(f"sealed    {write_seal(path, file_hash(path))}")
     quality = log.quality()
     if looked:
         quality = replace(quality, files=looked)
     if job["model"] is not None:
+        log.refuse_unmeasured()
         from auvnn.checks import check_actuators
 
         checked = check_actuators(job.model(log), log)

@@ -15,6 +15,7 @@ from auvnn.cli.pages import PAGES
 from auvnn.cli.speech import complain
 from auvnn.cli.verbs import VERBS
 from auvnn.executors.safe_path import keep_safe
+from auvnn.threads import sleep_when_idle
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -52,6 +53,7 @@ def _dispatch(verb: str, rest: list[str]) -> int:
 def _prepare() -> None:
     """Let SIGTERM end a run as Ctrl-C does, import nothing from here, print every character, keep libraries quiet."""
     keep_safe()
+    sleep_when_idle()
 
     def end(_signal: int, _frame: Any) -> None:
         raise Terminated

@@ -15,6 +15,8 @@ VERBS = Catalogue(
         "add": "auvnn.cli.add:VERB",
         "improve": "auvnn.cli.improve:VERB",
         "remove": "auvnn.cli.remove:VERB",
+        "export": "auvnn.cli.export:VERB",
+        "import": "auvnn.cli.import:VERB",
         "adapt": "auvnn.cli.adapt:VERB",
         "fleet": "auvnn.cli.fleet:VERB",
         "demo": "auvnn.cli.demo:VERB",

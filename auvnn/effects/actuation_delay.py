@@ -6,7 +6,8 @@ from typing import Any
 
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Parameter
 
 
 class ActuationDelay(Effect):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from auvnn.effects.base import Body, Moment, axis_scale
+from auvnn.effects.base import axis_scale
 from auvnn.effects.factors import AxisFactors
+from auvnn.effects.hooks import Body, Moment
 
 
 class AddedMass(AxisFactors):

@@ -8,7 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 from auvnn.physics.fins import fin_frame, fin_wrench
 
 

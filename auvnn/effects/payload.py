@@ -8,7 +8,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import AXES, Body, Effect, Extent, Moment, Parameter
+from auvnn.effects.base import AXES, Effect
+from auvnn.effects.hooks import Body, Extent, Moment, Parameter
 from auvnn.physics.restoring import restoring_force
 
 GRASP = 0.3

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from torch import Tensor
 
-from auvnn.effects.base import Moment
+from auvnn.effects.hooks import Moment
 from auvnn.effects.proximity import Proximity
 
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Moment, Parameter
 from auvnn.effects.sizes import full_wrench
 
 

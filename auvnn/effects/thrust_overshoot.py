@@ -7,8 +7,9 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter
+from auvnn.effects.base import Effect
 from auvnn.effects.factors import actuators
+from auvnn.effects.hooks import Parameter
 
 # Rows whose filter is worked out as one product of matrices.
 CHUNK = 128

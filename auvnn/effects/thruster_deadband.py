@@ -7,7 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Parameter
 from auvnn.effects.sizes import full_wrench
 
 

@@ -6,8 +6,9 @@ from typing import Any
 
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Moment, Parameter
+from auvnn.effects.base import Effect
 from auvnn.effects.factors import actuators
+from auvnn.effects.hooks import Moment, Parameter
 
 
 class ThrusterGain(Effect):

@@ -8,7 +8,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter, Response
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Parameter, Response
 
 SMALL = 0.05
 """Step over time constant below which the power series holds to the last digits."""

@@ -7,7 +7,8 @@ from typing import Any
 
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter, Sensed
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Parameter, Sensed
 from auvnn.physics.attitude import quat_multiply, rotvec_to_quat
 
 

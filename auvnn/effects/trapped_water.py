@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 
 
 class TrappedWater(Effect):

@@ -7,7 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 
 # Parameter: (axis of the wrench, linear velocity, rate), as indices into [u v w p q r] and [X Y Z K M N].
 PRODUCTS = {

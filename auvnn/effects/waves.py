@@ -8,7 +8,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Extent, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Extent, Moment, Parameter
 from auvnn.physics.products import matvec
 
 SLOWEST, FASTEST = 0.4, 2.2

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import torch
 
-from auvnn import __version__
 from auvnn.answers import write_text
 from auvnn.exports.base import Target, Written
-from auvnn.exports.c_code import Dialect, block
+from auvnn.exports.c_code import Dialect, block, grouped
 from auvnn.exports.check import agreement
+from auvnn.exports.origin import ORIGIN
 from auvnn.exports.system import System
 from auvnn.models.rate import SIZE
 
@@ -61,7 +61,7 @@ def header(system: System, precision: str) -> str:
         if same
         else f" *\n * State s of the steps, in which the delay is exact:\n{listed(steps.state_names())}\n"
     )
-    return f"""/* {name}: equations of motion of an underwater vehicle, written by auvnn {__version__}.
+    return f"""/* {name}: equations of motion of an underwater vehicle, written by {ORIGIN}.
  *
  * SI units and radians; positions in NED, velocities in the body frame x forward, y starboard, z down;
  * the quaternion (w, x, y, z) turns body vectors into NED ones. No function allocates, and none has a state of its own.
@@ -115,8 +115,8 @@ def source(system: System, precision: str) -> str:
     rate, step, settled = (g.results for g in (system.actuator_rate, system.actuator_step, system.settled))
     k, whole, risen = flow.actuators.states, system.jacobian.results, _risen(system)
     parts = [
-        f'/* Written by auvnn {__version__}; see {name}.h. */\n#include "{name}.h"\n\n#include <math.h>\n',
-        say.helpers(),
+        f'/* Written by {ORIGIN}; see {name}.h. */\n#include "{name}.h"\n\n#include <math.h>\n',
+        say.helpers(_together(system)),
         say.function_of(
             f"static void {name}_motion(const {real} *y, const {real} *f, const {real} *u, {real} t, {real} *rate)",
             system.motion, {"rate": system.motion.results},
@@ -126,7 +126,8 @@ def source(system: System, precision: str) -> str:
             system.actuator_rate, {"thrust": rate[:n], "rate": rate[n:]}, ("rate",),
         ),
         say.function_of(
-            f"static void {name}_hold(const {real} *a, const {real} *u, {real} h, {real} *mean, {real} *rise, {real} *next)",
+            f"static void {name}_hold(const {real} *a, const {real} *u, {real} h, {real} *mean, {real} *rise, "
+            f"{real} *next)",
             system.actuator_step, {"mean": step[:n], "rise": step[n : 2 * n] if risen else (), "next": step[2 * n :]},
             ("rise", "next"),
         ),
@@ -154,6 +155,19 @@ def source(system: System, precision: str) -> str:
         _step(system, say, risen),
     ]  # fmt: skip
     return "\n".join(parts)
+
+
+def _together(system: System) -> set[str]:
+    """Return the functions that are called on many numbers at once."""
+    graphs = (
+        system.motion,
+        system.actuator_rate,
+        system.actuator_step,
+        system.unit,
+        system.settled,
+        system.jacobian,
+    )
+    return {g.scalars.operation[node] for g in graphs for node in grouped(g, g.results)[1]}
 
 
 def _risen(system: System) -> bool:
@@ -208,12 +222,13 @@ def tests(system: System, precision: str) -> str:
         rate = system.flow.rate(a["x"], a["u"], a["t"])
         after = system.steps.step(a["s"], a["u"], a["t"], a["h"])
     rows: dict[str, Any] = {
-        "time": a["t"], "length": a["h"], "state": a["x"], "step_state": a["s"], "input": a["u"], "rate": rate, "after": after
+        "time": a["t"], "length": a["h"], "state": a["x"], "step_state": a["s"], "input": a["u"], "rate": rate,
+        "after": after,
     }  # fmt: skip
     arrays = "\n".join(say.array(key, np.asarray(value).reshape(-1)) for key, value in rows.items())
     slope = "1e-3f" if say.single else "1e-6"
     rough = "2e-2f" if say.single else "1e-6"
-    return f"""/* Written by auvnn {__version__}: compares {name}.c with the model at {CASES} states; 0 if they agree. */
+    return f"""/* Written by {ORIGIN}: compares {name}.c with the model at {CASES} states; 0 if they agree. */
 #include "{name}.h"
 
 #include <math.h>

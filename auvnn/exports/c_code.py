@@ -12,9 +12,14 @@ from auvnn.compiled.scalars import FUNCTIONS
 from auvnn.exports.graph import Graph
 
 INFIX = {
-    "add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "ne": "!=", "and": "&&", "or": "||",
+    "add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "ne": "!=",
+    "and": "&&", "or": "||",
 }  # fmt: skip
 WIDTH = 118
+INLINE = ("sqrt", "floor", "ceil")
+"""Functions that are an instruction on most processors."""
+MANY = 4
+"""Calls of one function that are made together: between two of them compilers can keep nothing in registers."""
 
 
 @dataclass(frozen=True)
@@ -60,10 +65,21 @@ class Dialect:
         """
         s = graph.scalars
         wanted = [n for nodes in targets.values() for n in nodes]
-        lines = []
-        for node in s.needed(wanted):
+        lines, done = [], set()
+        order, groups = grouped(graph, wanted)
+        for node in order:
             name, operands = s.operation[node], s.operands[node]
-            if name in ("constant", "truth", "input"):
+            if name in ("constant", "truth", "input") or node in done:
+                continue
+            if node in groups:
+                members = groups[node]
+                lines.append(f"{self.type} i{node}[{len(members)}], o{node}[{len(members)}];")
+                lines += [
+                    f"i{node}[{k}] = {self._name(graph, s.operands[m][0])};" for k, m in enumerate(members)
+                ]
+                lines.append(f"{self.prefix}_many_{name}(i{node}, o{node}, {len(members)});")
+                lines += [f"const {self.type} t{m} = o{node}[{k}];" for k, m in enumerate(members)]
+                done.update(members)
                 continue
             given = [self._name(graph, n) for n in operands]
             if name in INFIX:
@@ -98,10 +114,15 @@ class Dialect:
             return name if name in ("t", "h") else f"{name}[{index}]"
         return f"t{node}"
 
-    def helpers(self) -> str:
-        """Return what the statements call."""
+    def helpers(self, functions: set[str]) -> str:
+        """Return what the statements call; `functions` are those that are called on many numbers at once."""
         t = self.type
-        return (
+        many = [
+            f"static void {self.prefix}_many_{name}(const {t} *in, {t} *out, int count)\n"
+            f"{{\n    for (int i = 0; i < count; i++) out[i] = {self.function(name)}(in[i]);\n}}\n"
+            for name in sorted(functions)
+        ]
+        return "".join(many) + (
             f"static inline {t} {self.prefix}_largest({t} a, {t} b) {{ return a > b || a != a ? a : b; }}\n"
             f"static inline {t} {self.prefix}_smallest({t} a, {t} b) {{ return a < b || a != a ? a : b; }}\n"
         )
@@ -132,3 +153,21 @@ class Dialect:
 def block(head: str, lines: Iterable[str]) -> str:
     """Return a function from its head and its statements."""
     return "\n".join([head, "{", *("    " + line for line in lines), "}", ""])
+
+
+def grouped(graph: Graph, wanted: Iterable[int]) -> tuple[list[int], dict[int, list[int]]]:
+    """Return the needed nodes in an order of computation, and by its first member each group of equal functions.
+
+    Functions that depend on equally many functions before them do not depend on one another.
+    """
+    s, depth = graph.scalars, {}
+    nodes = s.needed(wanted)
+    called = {n for n in nodes if s.operation[n] in FUNCTIONS and s.operation[n] not in INLINE}
+    for node in nodes:
+        depth[node] = max((depth[n] + (n in called) for n in s.inputs_of(node)), default=0)
+    order = sorted(nodes, key=lambda n: (depth[n], n in called, s.operation[n] if n in called else "", n))
+    found: dict[tuple[int, str], list[int]] = {}
+    for node in order:
+        if node in called:
+            found.setdefault((depth[node], s.operation[node]), []).append(node)
+    return order, {members[0]: members for members in found.values() if len(members) >= MANY}

@@ -39,7 +39,7 @@ class CasadiTarget(Target):
         notes = [
             *system.notes(),
             f"casadi.Function.load('{system.name}_rate.casadi')(x, u, t) gives the rate of x; {system.name}_step takes "
-            f"(s, u, t, h){', h = ' + format(system.dt, 'g') if system.delay else ''}; {system.name}_jacobian gives A and B",
+            f"(s, u, t, h), {system.name}_jacobian gives A and B",
         ]
         return Written(system.lost(), notes, {**agreement(system), **_compared(system, made)})
 

@@ -38,7 +38,7 @@ def agreement(system: System) -> dict[str, float]:
         }
     n = system.flow.actuators.size
     inputs = system.flow.split(a["u"])
-    given = {"fins": inputs.fins, "voltage": inputs.voltage, "altitude": inputs.altitude}
+    given: dict[str, Any] = {"fins": inputs.fins, "voltage": inputs.voltage, "altitude": inputs.altitude}
     slopes = linearise(system.model, a["x"], a["u"][:, :n], time=a["t"], **given)
     mine = evaluate(system.jacobian, a)
     split = system.flow.size**2

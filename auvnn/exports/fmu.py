@@ -11,11 +11,11 @@ from importlib.resources import files
 from pathlib import Path
 from xml.etree import ElementTree as xml
 
-from auvnn import __version__
 from auvnn.compiled import toolchain
 from auvnn.exports.base import Target, Written
 from auvnn.exports.c import header, source
 from auvnn.exports.check import agreement
+from auvnn.exports.origin import ORIGIN
 from auvnn.exports.system import System
 from auvnn.models.actuator_states import PADE
 from auvnn.models.rate import SIZE
@@ -69,7 +69,7 @@ def _settings(system: System, token: str) -> str:
     shown, rates = _shown(system), 0 if system.delay else _shown(system)
     start = ", ".join(f"{v!r}" for v in _start(system))
     inputs = ", ".join(f"{v!r}" for v in _start_inputs(system))
-    return f"""/* Written by auvnn {__version__}. */
+    return f"""/* Written by {ORIGIN}. */
 #include "{system.name}.h"
 
 #define MODEL(name) {system.name}_##name
@@ -104,7 +104,7 @@ def description(system: System, token: str) -> bytes:
     root = xml.Element("fmiModelDescription", {
         "fmiVersion": "3.0", "modelName": system.model.vehicle.name, "instantiationToken": token,
         "description": "Equations of motion of an underwater vehicle (NED, body x forward, y starboard, z down)",
-        "generationTool": f"auvnn {__version__}", "variableNamingConvention": "structured",
+        "generationTool": f"{ORIGIN}", "variableNamingConvention": "structured",
     })  # fmt: skip
     common = {"modelIdentifier": name, "canGetAndSetFMUState": "true"}
     if not delayed:

@@ -16,44 +16,13 @@ from auvnn.models.rate import SIZE, unit_attitude
 from auvnn.models.state_space import StateSpace
 
 RESERVED = frozenset(
-    [
-        "auto",
-        "break",
-        "case",
-        "char",
-        "const",
-        "continue",
-        "default",
-        "do",
-        "double",
-        "else",
-        "enum",
-        "extern",
-        "float",
-        "for",
-        "goto",
-        "if",
-        "inline",
-        "int",
-        "long",
-        "register",
-        "restrict",
-        "return",
-        "short",
-        "signed",
-        "sizeof",
-        "static",
-        "struct",
-        "switch",
-        "typedef",
-        "union",
-        "unsigned",
-        "void",
-        "volatile",
-        "while",
-        "main",
-    ]
+    (  # noqa: SIM905
+        "auto break case char const continue default do double else enum extern float for goto if inline int long "
+        "register restrict return short signed sizeof static struct switch typedef union unsigned void volatile "
+        "while main"
+    ).split()
 )
+"""Words that are no names in C."""
 
 
 class System:
@@ -200,6 +169,7 @@ class StepModule(nn.Module):
         self.space = space
 
     def forward(self, state: Tensor, inputs: Tensor, time: Tensor, h: Tensor) -> Tensor:
+        """Return the state after h seconds."""
         return self.space.step(state, inputs, time, h)
 
 
@@ -211,6 +181,7 @@ class RateModule(nn.Module):
         self.space = space
 
     def forward(self, state: Tensor, inputs: Tensor, time: Tensor) -> Tensor:
+        """Return the rate of the state."""
         return self.space.rate(state, inputs, time)
 
 

@@ -19,12 +19,14 @@ from auvnn.improvement.fits import GIVEN, REFITTED, Fits, fit_steps, unseen
 from auvnn.improvement.held_out import Judged, judge, words
 from auvnn.logs import Log
 from auvnn.logs.leakage import leakage
+from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.noise_floor import noise_floor
-from auvnn.metrics.one_step import choose_derivative
 from auvnn.metrics.rollouts import HORIZONS
 from auvnn.models import GreyBox
+from auvnn.threads import on_one_thread
 
 
+@on_one_thread
 def add(
     model: GreyBox,
     log: Log,

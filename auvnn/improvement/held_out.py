@@ -14,7 +14,8 @@ from auvnn.diagnosis.hypotheses.layout import Layout
 from auvnn.improvement.fits import REFITTED, Fits
 from auvnn.improvement.gains import paired_gain
 from auvnn.logs import Log
-from auvnn.metrics.one_step import choose_derivative, one_step, scores
+from auvnn.metrics.derivative import choose_derivative
+from auvnn.metrics.one_step import one_step, scores
 from auvnn.metrics.rollouts import Rolled, Scale, roll, rollout_table, scale_of
 
 # Pairs of parameters that the log cannot tell apart: their correlation, and how many are told.

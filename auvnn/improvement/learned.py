@@ -37,7 +37,7 @@ SUBSETS = (
     ("tilt", "velocity", "command"),
     INPUTS,
 )
-# Of terms that promise at least this share of what the best one does, the one with the fewest weights is taken.
+# Of terms that promise at least this share of what the best one does, the one with the fewest weights is fitted too.
 NEARLY = 0.8
 KINDS = ("polynomial", "residual_force")
 EFFECT = {"polynomial": "learned_drag", "residual_force": "residual_force"}
@@ -58,8 +58,10 @@ class Choice:
     words: str
 
 
-def choose(base: GreyBox, judge: Judge, state: State, kind: str) -> Choice | None:
-    """Return the learned term of a kind that promises most, or None where none promises anything.
+def choose(base: GreyBox, judge: Judge, state: State, kind: str) -> list[Choice]:
+    """Return the learned terms of a kind that are worth a fit, at most two; none where none promises anything.
+
+    The one that promises most, and of those that promise nearly as much the one with the fewest weights.
 
     Args:
         base: the model as given.
@@ -69,7 +71,7 @@ def choose(base: GreyBox, judge: Judge, state: State, kind: str) -> Choice | Non
     """
     name = EFFECT[kind]
     if name in state.recipe.effects or name in base.effect_names:
-        return None
+        return []
     recipe = _with(base, state.recipe, name, None, 1.0)
     layout, names, held = laid_out(base, recipe)
     begin = starting(layout, names, held, state, probes=False)
@@ -100,9 +102,10 @@ def choose(base: GreyBox, judge: Judge, state: State, kind: str) -> Choice | Non
                 words = " and ".join(inputs) if inputs else "velocity"
                 found.append((len(mine), Choice(trial, float(fall), words)))
     if not found:
-        return None
-    most = max(choice.fall for _, choice in found)
-    return min((c for c in found if c[1].fall >= NEARLY * most), key=lambda c: (c[0], -c[1].fall))[1]
+        return []
+    most = max(found, key=lambda c: c[1].fall)[1]
+    few = min((c for c in found if c[1].fall >= NEARLY * most.fall), key=lambda c: (c[0], -c[1].fall))[1]
+    return [most] if few is most else [most, few]
 
 
 def _with(base: GreyBox, recipe: Recipe, name: str, inputs: Sequence[str] | None, ridge: float) -> Recipe:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from auvnn.diagnosis.diagnose import diagnose
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.diagnosis.left_out import gain
 from auvnn.errors import AuvnnError, ConfigError
@@ -35,8 +36,9 @@ from auvnn.improvement.state import (
 )
 from auvnn.logs import Log
 from auvnn.logs.leakage import leakage
-from auvnn.metrics.one_step import choose_derivative
+from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
+from auvnn.threads import on_one_thread
 
 # Numerical failures of one step: the step is told and left out, the loop goes on.
 FAILURES = (FloatingPointError, np.linalg.LinAlgError, RuntimeError, ValueError, ArithmeticError, AuvnnError)
@@ -45,11 +47,12 @@ FITTED = 3
 # A diagnosis sees at most so many seconds of a log.
 DIAGNOSED = 300.0
 # Share of the time after which a diagnosis is broken off: prediction shall have its turn.
-PATIENCE = 0.4
+PATIENCE = 0.3
 # Rounds of diagnosis at most.
 ROUNDS = 3
 
 
+@on_one_thread
 def improve(
     model: GreyBox,
     log: Log,
@@ -223,8 +226,6 @@ class Walk:
 
     def diagnose(self) -> None:
         """Ask which causes are missing, and add those that pay, until none is named or none pays."""
-        from auvnn.diagnosis.diagnose import diagnose
-
         part = liveliest(self.log, DIAGNOSED)
         if part is not self.log:
             self.told(
@@ -372,26 +373,31 @@ class Walk:
         begin = self._before() or self.state
         self.say(f"looking at {kind.replace('_', ' ')}")
         try:
-            choice = learned.choose(self.model, self.judge, begin, kind)
+            choices = learned.choose(self.model, self.judge, begin, kind)
         except FAILURES as problem:
             self._failed(f"learning ({kind})", problem)
             return
         name = learned.EFFECT[kind]
-        if choice is None:
-            if name not in self.state.recipe.effects:
-                self.told(f"Learn: {name} promises nothing on what was left out.")
-            return
-        state = self._try(
-            lambda: fitted(self.model, self.judge, choice.recipe, begin, start=None, steps=4),
-            f"fitting {name}",
-        )
-        if state is not None:
-            self._take(
-                state,
-                name,
-                LEARNED,
-                f"of {choice.words}, held within {choice.recipe.ridge[name]:g} of its scale",
+        if not choices and name not in self.state.recipe.effects:
+            self.told(f"Learn: {name} promises nothing on what was left out.")
+        found = []
+        for choice in choices:
+            state = self._try(
+                lambda c=choice: fitted(self.model, self.judge, c.recipe, begin, steps=4),
+                f"fitting {name} of {choice.words}",
             )
+            if state is not None:
+                found.append((choice, state))
+        if not found:
+            return
+        choice, best = min(found, key=lambda item: item[1].left.total)
+        for other, state in found:
+            if other is not choice:
+                self._note(
+                    state, name, LEARNED, False, f"of {other.words}; of {choice.words} it foresees more"
+                )
+        held = choice.recipe.ridge[name]
+        self._take(best, name, LEARNED, f"of {choice.words}, held within {held:g} of its scale")
 
     def polish(self) -> None:
         """Fit what has been taken over other lengths of windows, and keep what foresees best."""

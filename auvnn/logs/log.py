@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from auvnn.errors import ConfigError, InputError
+from auvnn.logs.channels import VELOCITY
 from auvnn.logs.reading.repair import Repair
 from auvnn.logs.run import MIN_SAMPLES, Run
 
@@ -28,7 +29,10 @@ class Log:
         name: what to call the log in words and file names.
         paths: the files it was read from; empty for a log made in memory.
         repairs: what was mended or noted while reading.
-        sha256: of the files' bytes where it was read, of the samples where it was made in memory.
+        sha256: of the files' bytes where it was read, of the samples where it was made in memory; where only the
+            beginning of a file was read, of that.
+        unknown: columns that are kept and not used.
+        unsealed: files in which damage that leaves numbers readable cannot be seen.
 
     Raises:
         InputError: there is no run, a number occurs twice, or the runs' columns differ.
@@ -40,6 +44,7 @@ class Log:
     repairs: tuple[Repair, ...] = ()
     sha256: str = ""
     unknown: tuple[str, ...] = field(default=(), kw_only=True)
+    unsealed: tuple[Path, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         """Check that the runs belong together."""
@@ -170,6 +175,26 @@ class Log:
     def quality(self) -> Quality:
         """Return what was read, repaired, implausible and excited; computed once."""
         return self._quality
+
+    @property
+    def unmeasured(self) -> list[str]:
+        """What a model needs of every sample and no run has measured: of attitude, u, v, w, p, q, r."""
+        absent = [n for i, n in enumerate(VELOCITY) if all(np.isnan(run.nu[:, i]).all() for run in self.runs)]
+        attitude = all(np.isnan(run.quaternion).any(axis=1).all() for run in self.runs)
+        return (["attitude"] if attitude else []) + absent
+
+    def refuse_unmeasured(self) -> None:
+        """Raise where attitude or a velocity was not measured at all.
+
+        Raises:
+            InputError: naming what is not there.
+        """
+        if self.unmeasured:
+            raise InputError(
+                f"log '{self.name}': {', '.join(self.unmeasured)} not measured; comparing and fitting need attitude "
+                "and u, v, w, p, q, r in some samples. `auvnn check` reads such a log; a mapping can make velocities of "
+                "positions (difference: true)"
+            )
 
     def select(self, numbers: int | Iterable[int]) -> Log:
         """Return a log of the runs with these numbers, in this order."""

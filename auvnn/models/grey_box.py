@@ -31,8 +31,8 @@ from auvnn.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from auvnn.damping.bank import DampingBank
-    from auvnn.models.rollout import Trajectory
     from auvnn.models.state_space import Linearisation
+    from auvnn.models.trajectory import Trajectory
 
 
 def _tensor(value: Any) -> Tensor:

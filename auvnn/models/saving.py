@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 MODEL, WEIGHTS = "model.yaml", "weights.safetensors"
 SUBNETWORKS = "damping_subnetworks"
 STRUCTURE = "structure"
+UNCERTAINTY = "uncertainty"
 REGION = "trained_region"
 
 _readers: list[Callable[[Mapping[str, bytes], Path], object]] = []
@@ -50,7 +51,10 @@ def contents(model: GreyBox, path: Path) -> dict[str, bytes | str]:
     """Return the files that describe a model, by name, as they are written into the folder `path`."""
     data = model.vehicle.to_dict()
     data.pop("effects", None)  # the file's order must not depend on where the effects came from
-    data["effects"] = {str(e.name): e.values() for e in model.copied_effects()}
+    data["effects"] = {
+        str(e.name): {**e.values(), **({UNCERTAINTY: dict(e.uncertainty)} if e.uncertainty else {})}
+        for e in model.copied_effects()
+    }
     data["actuation"] = model.actuation
     files: dict[str, bytes | str] = {}
     described, learned = model.learned_parts()

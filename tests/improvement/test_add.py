@@ -296,7 +296,7 @@ def test_a_parameter_that_ends_at_its_bound_is_reported(model):
     found = add(GreyBox(small_vehicle(0.0)), log, "linear_damping")
     assert found.parameters["linear_damping"]["X"]["value"] == 0.01
     assert any(
-        "linear_damping.X ended at its bound 0.01 1: the data ask for more" in w for w in found.warnings
+        "linear_damping.X ended at its bound 0.01: the data ask for more" in w for w in found.warnings
     )
     assert found.accepted
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from auvnn.answers import Answer
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.training.confounding.confounded_effects import Confounding
+from auvnn.training.confounding.confounding import Confounding
 
 Array = NDArray[np.float64]
 

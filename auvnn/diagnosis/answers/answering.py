@@ -52,7 +52,8 @@ def answer(asked: Setting, state: State) -> Diagnosis:
         unexplained=_unexplained(state, verdict),
         depends_on=_depends(asked, state, verdict, notes),
         next_experiment=_next(asked, state, notes),
-        warnings=[*_warnings(asked, state), *notes],
+        warnings=[*_warnings(asked, state), *notes, *asked.notes],
+        absorbed=asked.absorbed,
         derivative={
             "method": f"none: free-running windows of {_length(state):g} s with estimated initial states",
             "bandwidth_hz": None,

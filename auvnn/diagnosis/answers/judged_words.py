@@ -43,10 +43,11 @@ def predicts(diagnosis: Diagnosis) -> list[str]:
     names = list(diagnosis.joint)
     if not names:
         return []
-    out = [
-        f"{_listed(names)} together predict a part of what is missing; that {'they are' if len(names) > 1 else 'it is'} "
-        "its cause is not claimed: too much is left for that."
-    ]
+    if len(names) > 1:
+        claim = f"{_listed(names)} together predict a part of what is missing; that they are its cause is not claimed"
+    else:
+        claim = f"{names[0]} predicts a part of what is missing; that it is its cause is not claimed"
+    out = [f"{claim}: too much is left for that."]
     for name, entry in diagnosis.joint.items():
         shares = {a: s for a, s in entry["explained_by_dof"].items() if s >= WORTH_A_WORD}
         where = ", ".join(f"{s:.0%} in {MOTIONS[a]}" for a, s in sorted(shares.items(), key=lambda x: -x[1]))

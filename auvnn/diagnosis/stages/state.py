@@ -40,6 +40,8 @@ class Setting:
         costs: whether to work out what each name costs.
         advice: whether to work out what to drive next, for an ambiguous answer.
         whiteness: whether to test what is left for correlations.
+        absorbed: what the learned damping may have taken in that is no damping; None without any.
+        notes: what to say of the model and the log besides.
         say: told in words what is being done.
     """
 
@@ -55,6 +57,8 @@ class Setting:
     costs: bool
     advice: bool
     whiteness: bool
+    absorbed: Any
+    notes: tuple[str, ...]
     say: Callable[[str], None]
 
     def chooser(self, windows: Windows) -> Chooser:

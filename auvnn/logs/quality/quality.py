@@ -185,4 +185,8 @@ def _assess(log: Log) -> Quality:
     clocks = kinematics.clocks(log, agreement) if order is None else {}
     depth = vertical.check_vertical(log)
     found = findings.collect(log, channels, agreement, directions, order, clocks, depth)
+    if log.unsealed:
+        few = ", ".join(path.name for path in log.unsealed[:3]) + (", ..." if len(log.unsealed) > 3 else "")
+        words = f"no checksum in or beside {few}: damage that leaves numbers readable cannot be seen"
+        found.append(Finding("info", "checksum", words, "seal the log as it is: auvnn check seal=true"))
     return Quality(log, channels, found, agreement, directions, condition, runs)

@@ -47,6 +47,8 @@ class Table:
         seconds: names of columns that already hold seconds, because the file stored dates or durations.
         repairs: what the reader mended or noted.
         rest: what is left of the mapping to be done with the rows; None for the mapping that was given.
+        sha256: of the file's bytes, where the reader had all of them; empty elsewhere.
+        checked: whether the file carries checksums of all its numbers, and they were compared.
     """
 
     columns: dict[str, NDArray[Any]]
@@ -55,6 +57,8 @@ class Table:
     seconds: set[str] = field(default_factory=set)
     repairs: list[Repair] = field(default_factory=list)
     rest: Mapping | None = None
+    sha256: str = ""
+    checked: bool = False
 
     @property
     def names(self) -> list[str]:
@@ -133,6 +137,14 @@ class Reader(ABC):
         columns = {name: column[part] for name, column in whole.columns.items()}
         text = {name: column[part] for name, column in whole.text.items()}
         return Table(columns, len(range(*part.indices(whole.rows))), text, set(whole.seconds), [])
+
+    def verify(self, path: Path) -> None:
+        """Compare the file with what it states of itself, before it is read in parts, which cannot show that.
+
+        Raises:
+            InputError: it is damaged.
+        """
+        return
 
     def first_stamp(self, path: Path, column: str) -> float | None:
         """Return the date in a column's first row, s since 1970; None where the column holds no dates.

@@ -16,6 +16,7 @@ from auvnn.logs.known import lies, propose
 from auvnn.logs.readers.base import Table
 from auvnn.logs.reading import attitude, frames, other_clocks, rates
 from auvnn.logs.reading.mapping import Column, Mapping
+from auvnn.logs.reading.mapping_more import More
 from auvnn.logs.reading.rates import Series
 from auvnn.logs.reading.repair import Repair
 from auvnn.logs.recording import PRIMARY, Recording, Topic, base_name, topic_of
@@ -173,7 +174,7 @@ def from_recording(recording: Recording, plan: Mapping, where: str) -> Table:
                 # A vehicle that knows its speed ahead alone says nothing of the others.
                 result.columns.setdefault(name, np.full(result.rows, np.nan))
     world = tuple(n for n in VELOCITY[:3] if n in plan.columns and plan.columns[n].more.world)
-    rest = {n: Column(n, more=plan.columns[n].more) for n in world}
+    rest = {n: Column(n, more=More(world=True)) for n in world}
     result.rest = Mapping(
         columns=rest, heading=plan.heading, where=plan.where, run="file" if plan.run == "file" else None
     )
@@ -182,7 +183,7 @@ def from_recording(recording: Recording, plan: Mapping, where: str) -> Table:
 
 
 def _together(places: _Places, times: _Times) -> _Places:
-    """Return angles of several topics as if they were of one, that with the most messages: turns cannot be told singly."""
+    """Return angles of several topics as if they were of one, that with the most messages."""
     base = max(places, key=lambda p: len(places[p][0][1].t))
     topic = places[base][0][1]
     t = times.of(topic) - base[1]

@@ -16,6 +16,7 @@ from auvnn.logs.readers.ros2_folder import ros2_files
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.logs.reading.reading import Collector, collect
 from auvnn.logs.run import Run
+from auvnn.logs.seal import compare, file_hash, sealed
 
 Array = NDArray[np.float64]
 
@@ -42,6 +43,17 @@ def rows_in(path: Path) -> int:
         InputError: it cannot be read.
     """
     return choose(path)[0].rows(path)
+
+
+def verify(path: Path) -> None:
+    """Compare a file that is to be read in parts with its own hash, and with its seal.
+
+    Raises:
+        InputError: it differs from what was written, or sealed.
+    """
+    choose(path)[0].verify(path)
+    if sealed(path) is not None:
+        compare(path, file_hash(path))
 
 
 def read_portion(path: Path, mapping: Mapping, first: int, count: int) -> Portion:
@@ -92,9 +104,11 @@ def log_files(places: Iterable[str | Path]) -> list[Path]:
                 )
             found += inside
         elif not place.exists() and any(sign in str(place) for sign in "*?["):
-            root = Path(place.anchor) if place.is_absolute() else Path()
-            pattern = str(place.relative_to(root)) if place.is_absolute() else str(place)
-            inside = sorted(p for p in root.glob(pattern) if p.is_file())
+            # A folder whose own name holds such signs is there, and is no pattern.
+            root, parts = Path(place.anchor), list(place.parts[1 if place.is_absolute() else 0 :])
+            while parts and (root / parts[0]).exists():
+                root = root / parts.pop(0)
+            inside = sorted(p for p in root.glob(str(Path(*parts))) if p.is_file())
             if not inside:
                 raise InputError(f"{place}: no file matches this pattern")
             found += inside

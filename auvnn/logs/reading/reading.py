@@ -40,6 +40,7 @@ from auvnn.logs.reading.head import read_table
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.logs.reading.repair import Repair
 from auvnn.logs.run import Run
+from auvnn.logs.seal import compare, file_hash, sealed
 
 Array = NDArray[np.float64]
 
@@ -54,6 +55,7 @@ class Reading:
     repairs: tuple[Repair, ...]
     sha256: str
     unknown: tuple[str, ...]
+    unsealed: tuple[Path, ...]
 
 
 @dataclass
@@ -83,18 +85,24 @@ def read(
         raise ConfigError(f"log files named twice: {', '.join(sorted(doubled))}")
     plan = Mapping.read(mapping)
     collector = Collector()
-    hashes = []
+    hashes: list[str] = []
+    unsealed: list[Path] = []
     for file in paths:
         before = _stamp(file)
         reader, notes = choose(file)
         collector.repairs.extend(notes)
         with np.errstate(all="ignore"):
-            table = read_table(reader, file, plan, max_duration)
-        hashes.append(file_hash(file))
+            table, read = read_table(reader, file, plan, max_duration)
+        if read is None:
+            hashes.append(table.sha256 or file_hash(file))
+        else:
+            # Of a file that is far longer no more is read for this than for its first seconds.
+            hashes.append(file_hash(file, read))
         if _stamp(file) != before:
             raise InputError(
                 f"{file}: changed while it was read; wait until the recording or the copy is done"
             )
+        collector.repairs.extend(_compared(file, hashes[-1], read is None, table, unsealed))
         collector.repairs.extend(table.repairs)
         first = len(collector.runs)
         # Damaged numbers may overflow on their way; what comes of it is masked and counted.
@@ -108,8 +116,23 @@ def read(
     digest = hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest()
     name = paths[0].stem if len(paths) == 1 else f"{paths[0].stem} and {len(paths) - 1} more"
     return Reading(
-        tuple(collector.runs), name, tuple(paths), tuple(collector.repairs), digest, tuple(collector.unknown)
-    )
+        tuple(collector.runs), name, tuple(paths), tuple(collector.repairs), digest, tuple(collector.unknown),
+        tuple(unsealed),
+    )  # fmt: skip
+
+
+def _compared(file: Path, digest: str, whole: bool, table: Table, unsealed: list[Path]) -> list[Repair]:
+    """Compare a file with its seal, and note a seal that could not be compared, or that nothing can be.
+
+    Raises:
+        InputError: the file is not what was sealed.
+    """
+    if not whole:
+        words = "sealed, but only its beginning was read: the seal was not compared"
+        return [Repair(words, str(file), 1, "info")] if sealed(file) is not None else []
+    if not compare(file, digest) and not table.checked:
+        unsealed.append(file)
+    return []
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
@@ -118,19 +141,6 @@ def _stamp(path: Path) -> tuple[int, int] | None:
     except (OSError, ValueError):
         return None
     return state.st_size, state.st_mtime_ns
-
-
-def file_hash(path: Path) -> str:
-    """Return the SHA-256 of a file's bytes.
-
-    Raises:
-        InputError: it cannot be read.
-    """
-    try:
-        with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError as problem:
-        raise InputError(f"{path}: disappeared while it was read: {problem}") from None
 
 
 def _number_apart(collector: Collector, first: int, file: Path, several: bool) -> None:

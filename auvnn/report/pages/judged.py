@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from auvnn.report.html import Table
+from auvnn.report.html import HtmlTable
 from auvnn.report.pages import common
 from auvnn.report.view import View
 from auvnn.report.words import finite, number, percent
@@ -13,12 +13,12 @@ from auvnn.report.words import finite, number, percent
 AXES = ("X", "Y", "Z", "K", "M", "N")
 
 
-def judged_tables(view: View) -> list[Table]:
+def judged_tables(view: View) -> list[HtmlTable]:
     """Return the tables, empty ones included: the page leaves these out."""
     return [_costs(view), *_joint(view), _left(view), _moved(view)]
 
 
-def _costs(view: View) -> Table:
+def _costs(view: View) -> HtmlTable:
     rows = []
     for name, entry in view.mapping("matters").items():
         worst = entry.get("worst") or {}
@@ -36,10 +36,10 @@ def _costs(view: View) -> Table:
         f"{percent(tolerance.get('cost'))} or more, or exerts {percent(tolerance.get('force'))} or more."
     )
     head = ["effect", "matters", "cost", "worst velocity", "fall of the error", "share", *AXES]
-    return Table("Does it matter?", head, rows, caption)
+    return HtmlTable("Does it matter?", head, rows, caption)
 
 
-def _joint(view: View) -> list[Table]:
+def _joint(view: View) -> list[HtmlTable]:
     joint = view.mapping("joint")
     if not joint:
         return []
@@ -57,18 +57,18 @@ def _joint(view: View) -> list[Table]:
     )
     values = {str(n): e["parameters"] for n, e in joint.items() if e.get("parameters")}
     return [
-        Table(
+        HtmlTable(
             "What predicts a part",
             ["effect", "confounded with", "fall of the error", *AXES],
             rows,
             caption,
             words=2,
         ),
-        Table("Their values together", common.PARAMETER_HEAD, common.parameter_rows(values), words=2),
+        HtmlTable("Their values together", common.PARAMETER_HEAD, common.parameter_rows(values), words=2),
     ]
 
 
-def _left(view: View) -> Table:
+def _left(view: View) -> HtmlTable:
     rows = [
         [
             a,
@@ -90,10 +90,10 @@ def _left(view: View) -> Table:
         f"s; its share of the actuators'.{more}"
     )
     head = ["degree of freedom", "rms", "upper limit", "would have shown", "correlation time", "share"]
-    return Table("What is left", head, rows, caption)
+    return HtmlTable("What is left", head, rows, caption)
 
 
-def _moved(view: View) -> Table:
+def _moved(view: View) -> HtmlTable:
     rows = [
         [
             f"{m.get('group')}.{m.get('coefficient')}",
@@ -105,7 +105,7 @@ def _moved(view: View) -> Table:
     caption = (
         "Factors on what the model's file states. Deviations: in standard deviations that the file states."
     )
-    return Table(
+    return HtmlTable(
         "Stated coefficients that moved far", ["coefficient", "stated", "fitted", "deviations"], rows, caption
     )
 
