@@ -49,8 +49,6 @@ class Session:
         self.looked = threading.Event()
         self.child = Child(work, self._hear)
 
-    # --- log -----------------------------------------------------------------------------------------------------
-
     def open(self, source: Source) -> None:
         """Read a log and make it the one that the page works on; what was found on another one is forgotten.
 
@@ -111,8 +109,6 @@ class Session:
         self.answers, self.summaries, self.views, self.stale = {}, {}, {}, set()
         self.history, self.taken_back = self.history[:1], []
         self.version += 1
-
-    # --- jobs ----------------------------------------------------------------------------------------------------
 
     def refuse_busy(self) -> None:
         """Refuse what would change the ground under a job.
@@ -214,8 +210,6 @@ class Session:
         self.views.pop(kind, None)
         self.stale.discard(kind)
 
-    # --- the model's history -------------------------------------------------------------------------------------
-
     def keep(self) -> None:
         """Go on with the model of the last fit.
 
@@ -253,8 +247,6 @@ class Session:
         self.stale |= {"comparison", "diagnosis"} & set(self.answers)
         self.views.pop("trial", None)
         self.version += 1
-
-    # --- answers -------------------------------------------------------------------------------------------------
 
     def answer(self, kind: str) -> dict[str, Any]:
         """Return an answer with what goes beside it.

@@ -70,8 +70,6 @@ class Pages:
         routes += [Route("/report/{kind}", self.report), Mount("/static", StaticFiles(directory=STATIC))]
         return Starlette(routes=routes)
 
-    # --- log -----------------------------------------------------------------------------------------------------
-
     def log(self, asked: Asked) -> Any:
         """Columns, mapping and extent of the log."""
         source = self._source()
@@ -159,8 +157,6 @@ class Pages:
             raise ConfigError("there is no log yet: drop a file, or choose one")
         return source
 
-    # --- model and jobs ------------------------------------------------------------------------------------------
-
     def model(self, asked: Asked) -> Any:
         """Choose a built-in vehicle, or a model by its path."""
         self.session.choose_model(os.path.expanduser(str(asked.get("source", ""))))
@@ -171,8 +167,6 @@ class Pages:
         effects = [str(e) for e in asked.get("effects") or []]
         self.session.start(str(asked.get("kind")), effects, asked.get("force") is True)
         return self.session.state()
-
-    # --- views ---------------------------------------------------------------------------------------------------
 
     def where(self) -> Any:
         """The comparison, read back once."""
@@ -229,8 +223,6 @@ class Pages:
         if horizon not in HORIZONS:
             raise ConfigError(f"horizon {horizon}: choose {', '.join(HORIZONS)}")
         return self.trial().run(effects, horizon, number, low, high, points, asked.get("whole") is not False)
-
-    # --- taking home ---------------------------------------------------------------------------------------------
 
     def script(self, asked: Asked) -> Any:
         """The commands and the script, and where they would be saved."""
