@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+KINDS = ("compare", "diagnose", "add", "example")
+
 
 @dataclass
 class Step:
@@ -49,3 +51,13 @@ class Job:
             "number": self.number, "kind": self.kind, "words": self.words, "state": self.state, "lines": self.lines[-8:],
             "count": len(self.lines), "error": self.error, "seconds": round(seconds, 1), "effects": list(self.effects),
         }  # fmt: skip
+
+
+def words_of(kind: str, effects: list[str]) -> str:
+    """Return what a job does, as a person reads it."""
+    return {
+        "compare": "Comparing model and log",
+        "diagnose": "Looking for what is missing",
+        "add": f"Fitting {', '.join(effects)}",
+        "example": "Making the example",
+    }[kind]

@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from auvnn.app.jobs.child import Child
-from auvnn.app.records import Job, Step
+from auvnn.app.records import ANSWERS, KINDS, Job, Step, words_of
 from auvnn.app.script import Told
 from auvnn.app.source import Source
 from auvnn.errors import AuvnnError, ConfigError, one_line
 
-KINDS = ("compare", "diagnose", "add", "example")
 LONG = 100_000  # samples from which on the quality report takes seconds
 ANSWERS = {"compare": "comparison", "diagnose": "diagnosis", "add": "improvement"}
 
@@ -143,10 +142,7 @@ class Session:
                     raise ConfigError("no effect is switched on: switch one on first")
                 order["effects"] = effects
             self._numbers += 1
-            words = {
-                "compare": "Comparing model and log", "diagnose": "Looking for what is missing",
-                "add": f"Fitting {', '.join(effects or [])}", "example": "Making the example",
-            }[kind]  # fmt: skip
+            words = words_of(kind, effects or [])
             out = self.work / "answers" / f"{self._numbers}_{kind}"
             order.update(job=self._numbers, out=str(out))
             self.job = Job(self._numbers, kind, words, out, time.monotonic(), effects=tuple(effects or ()))
