@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 KINDS = ("compare", "diagnose", "add", "example")
+ANSWERS = {"compare": "comparison", "diagnose": "diagnosis", "add": "improvement"}
 
 
 @dataclass

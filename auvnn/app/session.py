@@ -16,7 +16,6 @@ from auvnn.app.source import Source
 from auvnn.errors import AuvnnError, ConfigError, one_line
 
 LONG = 100_000  # samples from which on the quality report takes seconds
-ANSWERS = {"compare": "comparison", "diagnose": "diagnosis", "add": "improvement"}
 
 
 class Session:
@@ -42,7 +41,6 @@ class Session:
         self.job: Job | None = None
         self.saved: list[str] = []
         self.reading = ""
-        self.model_error = ""
         self._numbers = 0
         self.views: dict[str, Any] = {}
         self.looked = threading.Event()
@@ -254,8 +252,9 @@ class Session:
             folder = self.answers.get(kind)
         if folder is None:
             raise ConfigError(f"there is no {kind} yet")
-        answer = json.loads((folder / f"{kind}.json").read_text(encoding="utf-8"))
-        more = json.loads((folder / "more.json").read_text(encoding="utf-8"))
+        answer, more = (
+            json.loads((folder / f"{n}.json").read_text(encoding="utf-8")) for n in (kind, "more")
+        )
         return {**answer, "more": more}
 
     def told(self) -> Told:
