@@ -28,8 +28,7 @@ class Session:
     """
 
     def __init__(self, work: Path, out: Path, model: str | None = None) -> None:
-        self.work = work
-        self.out = out
+        self.work, self.out = work, out
         self.lock = threading.RLock()
         self.version = 1
         self.source: Source | None = None
@@ -40,8 +39,7 @@ class Session:
         self.stale: set[str] = set()
         self.job: Job | None = None
         self.saved: list[str] = []
-        self.reading = ""
-        self._numbers = 0
+        self.reading, self._numbers = "", 0
         self.views: dict[str, Any] = {}
         self.looked = threading.Event()
         self.child = Child(work, self._hear)
