@@ -2,7 +2,7 @@
 
 The page is a thin shell over the same Python calls as the commands: `Log.read`, `quality`, `compare`, `diagnose`,
 `add`, `rollout`. It states no physics and no statistics of its own. What takes long runs in a child process
-(`worker`), which can be stopped; what must follow a slider runs in the server (`trial`), by the compiled engine.
+(`jobs`), which can be stopped; what must follow a slider runs in the server (`trial`), by the compiled engine.
 
 The server answers this machine alone: it listens on the loopback address, each address begins with a random token,
 host and origin are checked (`guard`), and the page asks no other host for anything.

@@ -6,61 +6,16 @@ import json
 import shutil
 import threading
 import time
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from auvnn.app.child import Child
+from auvnn.app.jobs.child import Child
+from auvnn.app.records import ANSWERS, KINDS, Job, Step, words_of
 from auvnn.app.script import Told
 from auvnn.app.source import Source
 from auvnn.errors import AuvnnError, ConfigError, one_line
 
-KINDS = ("compare", "diagnose", "add", "example")
 LONG = 100_000  # samples from which on the quality report takes seconds
-ANSWERS = {"compare": "comparison", "diagnose": "diagnosis", "add": "improvement"}
-
-
-@dataclass
-class Step:
-    """One model of the history.
-
-    Attributes:
-        source: name, file or folder from which it is loaded.
-        words: what it is.
-        effects: what was added to the one before it.
-        answer: folder of the improvement that made it.
-        error: held-out error, and that of the refitted model without the effects.
-    """
-
-    source: str
-    words: str
-    effects: tuple[str, ...] = ()
-    answer: Path | None = None
-    error: dict[str, float | None] = field(default_factory=dict)
-
-
-@dataclass
-class Job:
-    """A job that runs or has run."""
-
-    number: int
-    kind: str
-    words: str
-    out: Path
-    began: float
-    state: str = "running"
-    lines: list[str] = field(default_factory=list)
-    error: str = ""
-    effects: tuple[str, ...] = ()
-    seconds: float = 0.0
-
-    def told(self) -> dict[str, Any]:
-        """Return the job for the page."""
-        seconds = time.monotonic() - self.began if self.state == "running" else self.seconds
-        return {
-            "number": self.number, "kind": self.kind, "words": self.words, "state": self.state, "lines": self.lines[-8:],
-            "count": len(self.lines), "error": self.error, "seconds": round(seconds, 1), "effects": list(self.effects),
-        }  # fmt: skip
 
 
 class Session:
@@ -73,8 +28,7 @@ class Session:
     """
 
     def __init__(self, work: Path, out: Path, model: str | None = None) -> None:
-        self.work = work
-        self.out = out
+        self.work, self.out = work, out
         self.lock = threading.RLock()
         self.version = 1
         self.source: Source | None = None
@@ -85,14 +39,10 @@ class Session:
         self.stale: set[str] = set()
         self.job: Job | None = None
         self.saved: list[str] = []
-        self.reading = ""
-        self.model_error = ""
-        self._numbers = 0
+        self.reading, self._numbers = "", 0
         self.views: dict[str, Any] = {}
         self.looked = threading.Event()
         self.child = Child(work, self._hear)
-
-    # --- log -----------------------------------------------------------------------------------------------------
 
     def open(self, source: Source) -> None:
         """Read a log and make it the one that the page works on; what was found on another one is forgotten.
@@ -155,8 +105,6 @@ class Session:
         self.history, self.taken_back = self.history[:1], []
         self.version += 1
 
-    # --- jobs ----------------------------------------------------------------------------------------------------
-
     def refuse_busy(self) -> None:
         """Refuse what would change the ground under a job.
 
@@ -190,10 +138,7 @@ class Session:
                     raise ConfigError("no effect is switched on: switch one on first")
                 order["effects"] = effects
             self._numbers += 1
-            words = {
-                "compare": "Comparing model and log", "diagnose": "Looking for what is missing",
-                "add": f"Fitting {', '.join(effects or [])}", "example": "Making the example",
-            }[kind]  # fmt: skip
+            words = words_of(kind, effects or [])
             out = self.work / "answers" / f"{self._numbers}_{kind}"
             order.update(job=self._numbers, out=str(out))
             self.job = Job(self._numbers, kind, words, out, time.monotonic(), effects=tuple(effects or ()))
@@ -257,8 +202,6 @@ class Session:
         self.views.pop(kind, None)
         self.stale.discard(kind)
 
-    # --- the model's history -------------------------------------------------------------------------------------
-
     def keep(self) -> None:
         """Go on with the model of the last fit.
 
@@ -297,8 +240,6 @@ class Session:
         self.views.pop("trial", None)
         self.version += 1
 
-    # --- answers -------------------------------------------------------------------------------------------------
-
     def answer(self, kind: str) -> dict[str, Any]:
         """Return an answer with what goes beside it.
 
@@ -309,8 +250,9 @@ class Session:
             folder = self.answers.get(kind)
         if folder is None:
             raise ConfigError(f"there is no {kind} yet")
-        answer = json.loads((folder / f"{kind}.json").read_text(encoding="utf-8"))
-        more = json.loads((folder / "more.json").read_text(encoding="utf-8"))
+        answer, more = (
+            json.loads((folder / f"{n}.json").read_text(encoding="utf-8")) for n in (kind, "more")
+        )
         return {**answer, "more": more}
 
     def told(self) -> Told:

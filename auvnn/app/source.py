@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from auvnn.app.division import split
 from auvnn.app.logview import columns, findings, guesses, overview, raw_columns
 from auvnn.errors import AuvnnError, one_line
 from auvnn.logs import Log
@@ -106,3 +105,11 @@ def _runs(log: Log) -> list[dict[str, Any]]:
         {"number": r.number, "samples": r.samples, "begin": float(r.t[0]), "end": float(r.t[-1])}
         for r in log.runs
     ]
+
+
+def split(log: Log) -> tuple[Log, Log | None, str]:
+    """Return what to fit on and what is held out, or all and nothing where the log is too short to be divided."""
+    try:
+        return log.split()
+    except AuvnnError as problem:
+        return log, None, str(problem)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import tempfile
@@ -13,23 +12,22 @@ from typing import Any
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, JSONResponse, Response
+from starlette.responses import HTMLResponse, Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
-from auvnn.answers import plain
 from auvnn.app import saving
+from auvnn.app.answering import Asked, answering, refused, said, span
 from auvnn.app.cures import changed, offered
 from auvnn.app.guard import REPORT_POLICY
 from auvnn.app.logview import traces
 from auvnn.app.script import commands, python
 from auvnn.app.session import Session
 from auvnn.app.source import Source
-from auvnn.errors import AuvnnError, ConfigError, InputError, one_line
+from auvnn.errors import ConfigError, InputError
 from auvnn.vehicle.library import builtin_vehicles
 
 STATIC = Path(__file__).parent / "static"
-Asked = dict[str, Any]
 
 
 class Pages:
@@ -52,7 +50,7 @@ class Pages:
             "vehicles": lambda asked: builtin_vehicles(),
             "answer": lambda asked: self.session.answer(str(asked.get("kind"))),
             "where": lambda asked: self.where().map(),
-            "where-traces": lambda asked: self.where().traces(*_span(asked)),
+            "where-traces": lambda asked: self.where().traces(*span(asked)),
             "where-marks": lambda asked: self.where().marks(
                 str(asked.get("regime")), int(asked.get("bin", -1))
             ),
@@ -67,12 +65,10 @@ class Pages:
             "save": self.save,
         }  # fmt: skip
         routes = [Route("/", _page), Route("/api/upload", self.upload, methods=["PUT"])]
-        routes += [Route(f"/api/{name}", _answering(call)) for name, call in gets.items()]
-        routes += [Route(f"/api/{name}", _answering(call), methods=["POST"]) for name, call in posts.items()]
+        routes += [Route(f"/api/{name}", answering(call)) for name, call in gets.items()]
+        routes += [Route(f"/api/{name}", answering(call), methods=["POST"]) for name, call in posts.items()]
         routes += [Route("/report/{kind}", self.report), Mount("/static", StaticFiles(directory=STATIC))]
         return Starlette(routes=routes)
-
-    # --- log -----------------------------------------------------------------------------------------------------
 
     def log(self, asked: Asked) -> Any:
         """Columns, mapping and extent of the log."""
@@ -90,7 +86,7 @@ class Pages:
 
     def traces(self, asked: Asked) -> Any:
         """Traces of one group of channels."""
-        number, low, high, points = _span(asked)
+        number, low, high, points = span(asked)
         log = self._source().log
         if log is None:
             raise ConfigError("there is no log that could be drawn")
@@ -111,9 +107,9 @@ class Pages:
                     await run_in_threadpool(stream.write, chunk)
             beside.rename(path)
         except OSError as problem:
-            return _refused(f"{name}: cannot be kept ({os.strerror(problem.errno or 0)})")
+            return refused(f"{name}: cannot be kept ({os.strerror(problem.errno or 0)})")
         use = request.query_params.get("use", "log")
-        return await run_in_threadpool(_said, self._use, {"use": use, "path": str(path)})
+        return await run_in_threadpool(said, self._use, {"use": use, "path": str(path)})
 
     def open(self, asked: Asked) -> Any:
         """Open a file of this machine by its path."""
@@ -161,8 +157,6 @@ class Pages:
             raise ConfigError("there is no log yet: drop a file, or choose one")
         return source
 
-    # --- model and jobs ------------------------------------------------------------------------------------------
-
     def model(self, asked: Asked) -> Any:
         """Choose a built-in vehicle, or a model by its path."""
         self.session.choose_model(os.path.expanduser(str(asked.get("source", ""))))
@@ -173,8 +167,6 @@ class Pages:
         effects = [str(e) for e in asked.get("effects") or []]
         self.session.start(str(asked.get("kind")), effects, asked.get("force") is True)
         return self.session.state()
-
-    # --- views ---------------------------------------------------------------------------------------------------
 
     def where(self) -> Any:
         """The comparison, read back once."""
@@ -196,7 +188,7 @@ class Pages:
             folder = self.session.answers.get("improvement")
         if folder is None:
             raise ConfigError("nothing has been fitted yet")
-        return held_out_traces(folder, *_span(asked))
+        return held_out_traces(folder, *span(asked))
 
     def trial(self) -> Any:
         """Model and log for free runs by hand."""
@@ -224,15 +216,13 @@ class Pages:
         effects = asked.get("effects") or {}
         if not isinstance(effects, dict) or not all(isinstance(v, dict) for v in effects.values()):
             raise ConfigError("effects are given as {name: {parameter: value}}")
-        number, low, high, points = _span(asked)
+        number, low, high, points = span(asked)
         from auvnn.app.trial import HORIZONS
 
         horizon = str(asked.get("horizon", "full"))
         if horizon not in HORIZONS:
             raise ConfigError(f"horizon {horizon}: choose {', '.join(HORIZONS)}")
         return self.trial().run(effects, horizon, number, low, high, points, asked.get("whole") is not False)
-
-    # --- taking home ---------------------------------------------------------------------------------------------
 
     def script(self, asked: Asked) -> Any:
         """The commands and the script, and where they would be saved."""
@@ -253,66 +243,10 @@ class Pages:
             folder = self.session.answers.get(request.path_params["kind"])
         path = None if folder is None else folder / "report.html"
         if path is None or not path.is_file():
-            return _refused("the report is not drawn yet: try again in a moment", 404)
+            return refused("the report is not drawn yet: try again in a moment", 404)
         text = await run_in_threadpool(path.read_text, "utf-8")
         return HTMLResponse(text, headers={"content-security-policy": REPORT_POLICY})
 
 
 async def _page(request: Request) -> Response:
     return HTMLResponse((STATIC / "index.html").read_text(encoding="utf-8"))
-
-
-def _answering(call: Callable[[Asked], Any]) -> Callable[[Request], Any]:
-    """Turn a function of what was asked into an address; what the user gave wrong is one line with status 400."""
-
-    async def answer(request: Request) -> Response:
-        asked: Asked = dict(request.query_params)
-        if request.method == "POST":
-            try:
-                body = await request.json()
-            except (json.JSONDecodeError, UnicodeDecodeError):
-                return _refused("what was sent is not JSON")
-            if not isinstance(body, dict):
-                return _refused("what was sent is not an object")
-            asked = body
-        return await run_in_threadpool(_said, call, asked)
-
-    return answer
-
-
-def _said(call: Callable[[Asked], Any], asked: Asked) -> Response:
-    try:
-        return JSONResponse(plain(call(asked)))
-    except AuvnnError as error:
-        return _refused(one_line(error, 2000))
-    except (ValueError, TypeError, KeyError) as error:
-        if os.environ.get("AUVNN_DEBUG") == "1":
-            raise
-        return _refused(
-            f"a fault of the program, not of your input ({type(error).__name__}: {one_line(error, 300)})", 500
-        )
-
-
-def _refused(words: str, status: int = 400) -> Response:
-    return JSONResponse({"error": words}, status)
-
-
-def _span(asked: Asked) -> tuple[int | None, float | None, float | None, int]:
-    """Return run, begin and end in s, and how many points, as asked for."""
-
-    def number(key: str) -> float | None:
-        value = asked.get(key)
-        if value is None or value == "":
-            return None
-        try:
-            return float(value)
-        except (TypeError, ValueError):
-            raise ConfigError(f"{key}={value} is no number") from None
-
-    run, points = number("run"), number("points")
-    return (
-        None if run is None else int(run),
-        number("from"),
-        number("to"),
-        int(min(max(points or 1600, 16), 8000)),
-    )

@@ -145,3 +145,20 @@ def settled(page: Any, seconds: float = 60) -> None:
             return
         page.wait_for_timeout(150)
     raise AssertionError("the page did not come to rest")
+
+
+def busy() -> float:
+    """Return by how much everything takes longer here than on a machine that does nothing else."""
+    return max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
+
+
+def barriers(page, where: str) -> list[str]:
+    """Return what axe finds serious on the screen in view; nothing where axe is not at hand."""
+    script = axe()
+    if script is None:
+        return []
+    page.evaluate(script.read_text(encoding="utf-8"))
+    found = page.evaluate(
+        "axe.run().then(r => r.violations.map(v => [v.impact, v.id, v.nodes.map(n => n.html).slice(0, 3)]))"
+    )
+    return [f"{where}: {v}" for v in found if v[0] in ("serious", "critical")]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import os
 import resource
 import time
 import urllib.error
@@ -13,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.app.app_browser import Watched, axe, browser, drawn, served, settled, title, why_not
+from tests.app.app_browser import Watched, barriers, browser, busy, drawn, served, settled, title, why_not
 from tests.log_samples import frame, make_log
 
 REASON = why_not()
@@ -30,23 +29,6 @@ DROP = """async ([text, name]) => {
 def drop(page, path: Path) -> None:
     """Drop a file on the page, as a person does with the mouse."""
     page.evaluate(DROP, [base64.b64encode(path.read_bytes()).decode(), path.name])
-
-
-def busy() -> float:
-    """Return by how much everything takes longer here than on a machine that does nothing else."""
-    return max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
-
-
-def barriers(page, where: str) -> list[str]:
-    """Return what axe finds serious on the screen in view; nothing where axe is not at hand."""
-    script = axe()
-    if script is None:
-        return []
-    page.evaluate(script.read_text(encoding="utf-8"))
-    found = page.evaluate(
-        "axe.run().then(r => r.violations.map(v => [v.impact, v.id, v.nodes.map(n => n.html).slice(0, 3)]))"
-    )
-    return [f"{where}: {v}" for v in found if v[0] in ("serious", "critical")]
 
 
 @pytest.fixture(scope="module")

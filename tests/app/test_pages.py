@@ -211,7 +211,7 @@ def test_a_stopped_job_leaves_nothing_and_the_next_one_runs(asker, dive):
 
 def test_the_child_ends_when_its_server_is_gone():
     child = subprocess.Popen(
-        [sys.executable, "-m", "auvnn.app.worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        [sys.executable, "-m", "auvnn.app.jobs.worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
     assert child.stdin is not None
     child.stdin.close()

@@ -89,7 +89,7 @@ class Child:
         environment["PYTHONPATH"] = os.pathsep.join(p or os.getcwd() for p in sys.path)
         with (self.folder / "worker.log").open("a", encoding="utf-8") as said:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "auvnn.app.worker"],
+                [sys.executable, "-m", "auvnn.app.jobs.worker"],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=said,
                 env=environment, text=True, encoding="utf-8", start_new_session=True,
             )  # fmt: skip

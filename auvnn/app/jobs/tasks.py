@@ -12,7 +12,7 @@ import numpy as np
 import torch
 
 from auvnn.answers import Answer, plain, write_text
-from auvnn.app.division import split
+from auvnn.app.source import split
 from auvnn.comparison import compare
 from auvnn.comparison.compare import write_predictions
 from auvnn.diagnosis import diagnose

@@ -1,4 +1,4 @@
-"""The child process that does what takes long: `python -m auvnn.app.worker`, orders in, reports out, by lines of JSON."""
+"""The child process that does what takes long: orders in, reports out, by lines of JSON."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def main() -> None:
 
     threading.Thread(target=listen, daemon=True).start()
     warnings.simplefilter("ignore")
-    from auvnn.app.tasks import Tasks
+    from auvnn.app.jobs.tasks import Tasks
 
     tasks = Tasks()
     while True:
