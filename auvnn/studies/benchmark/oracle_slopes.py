@@ -49,16 +49,17 @@ class Course:
         dt = float(task.t[1] - task.t[0])
         each = max(1, round(FINE / dt))
         rows = np.arange(0, len(task.t), each)
-        few = {
-            n: None if getattr(motion, n) is None else getattr(motion, n)[:runs]
-            for n in ("eta", "nu", "nu_dot", "position", "quaternion", "velocity", "rate", "command", "fins")
-        }
+        m = motion
+        few = Motion(
+            m.eta[:runs], m.nu[:runs], m.nu_dot[:runs], m.position[:runs], m.quaternion[:runs], m.velocity[:runs],
+            m.rate[:runs], m.command[:runs], None if m.fins is None else m.fins[:runs],
+        )  # fmt: skip
         task = replace(
             task,
             laws=replace(task.laws, wander=None),
             voltage=None if task.voltage is None else task.voltage[:runs],
         )
-        return cls(task, Motion(**few), rows, each * dt)
+        return cls(task, few, rows, each * dt)
 
     @property
     def runs(self) -> int:
@@ -177,7 +178,8 @@ def lightness(course: Course, effects: Values) -> Array:
     task = course.task
     actuators = Actuators(task.vehicle, task.actuation, effects, task.laws)
     equations = Equations(task.vehicle, effects, task.strangers, actuators, task.bottom, task.laws)
-    return np.asarray(np.linalg.inv(equations.matrix(0.5 * float(task.t[-1]), np.ones((1, 1))).reshape(6, 6)))
+    matrix = equations.matrix(0.5 * float(task.t[-1]), np.ones((1, 1))).reshape(6, 6)
+    return np.linalg.inv(matrix).astype(np.float64)
 
 
 def reports(course: Course, effects: Values) -> tuple[Array, Array, Array]:
