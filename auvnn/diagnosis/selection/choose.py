@@ -269,14 +269,29 @@ class Chooser:
                 taken = self._settled(without, self.layout, base)
         return taken, gone
 
-    def without(self, taken: FittedHypothesis, base: Sequence[str], names: Sequence[str]) -> FittedHypothesis:
-        """Return the explanation refitted without some of its effects."""
+    def without(
+        self,
+        taken: FittedHypothesis,
+        base: Sequence[str],
+        names: Sequence[str],
+        sigma: Array | None = None,
+    ) -> FittedHypothesis:
+        """Return the explanation refitted without some of its effects.
+
+        Args:
+            taken: the explanation.
+            base: effects that are free whatever is chosen.
+            names: effects to do without.
+            sigma: weights to keep, so that the two can be compared; those that follow from the errors by default.
+        """
         model = taken.fitted.model.rebuilt(taken.fitted.model.copied_effects())
         for name in names:
             set_parameters(model, [name], self.layout.means[name])
         left = tuple(e for e in taken.effects if e not in names)
         guess = replace(self.layout, model=model)
-        return fit_hypothesis(self.layout, self.windows, base, left, start=taken.fitted, guess=guess)
+        return fit_hypothesis(
+            self.layout, self.windows, base, left, start=taken.fitted, guess=guess, sigma=sigma
+        )
 
     def _refitted(
         self, candidate: Score, at: Layout, base: list[str], chosen: list[str], current: FittedHypothesis

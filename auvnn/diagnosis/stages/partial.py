@@ -36,8 +36,9 @@ def kept(asked: Setting, state: State, names: Sequence[str]) -> FittedHypothesis
         if others:
             found = chooser.without(found, asked.base, others)
         while left:
-            beside = {n: without(asked, state, found, n) for n in left}
-            sizes = {n: _errors(found, beside[n]) for n in left}
+            # In the same weights, or their densities could not be compared.
+            sigma = found.fitted.sigma
+            sizes = {n: _errors(found, chooser.without(found, asked.base, [n], sigma)) for n in left}
             for n in left:
                 if at_bound(asked.layout, found, n):
                     sizes[n] = -np.inf

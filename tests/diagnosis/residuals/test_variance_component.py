@@ -125,7 +125,9 @@ def test_a_name_is_refuted_on_weaker_grounds_than_adequacy(model, monkeypatch, p
 
     monkeypatch.setattr("auvnn.diagnosis.stages.what_is_left.variance_component_test", half_left)
     found = diagnose(model, log, ["net_buoyancy"], advice=False, whiteness=False)
-    assert (found.verdict, found.unexplained) == (verdict, pytest.approx(0.5))
+    assert found.verdict == verdict
+    # Where what is left cannot be told from noise, no share of it is unexplained.
+    assert (found.unexplained > 0.0) == (verdict == "partial")
     assert found.nearest == (["net_buoyancy"] if verdict == "partial" else [])
 
 
