@@ -33,6 +33,13 @@ def _run(job: Job) -> Answering:
         say(f"error     {step['step']}: {error}")
     gain = f"{data['gain']['value']:.4g} +- {data['gain']['std']:.2g}" if data["gain"]["std"] else "unknown"
     verdict = "accepted" if data["accepted"] else "not accepted: the held-out error does not fall enough"
+    minded = [w for entry in data["by_effect"].values() for w in entry["reservations"]]
+    if data["accepted"] and minded:
+        verdict = f"accepted, but mind: {'; '.join(dict.fromkeys(minded))}"
+    for name, entry in data["by_effect"].items() if len(data["by_effect"]) > 1 else ():
+        own, pays = entry["gain"], "earns its place" if entry["accepted"] else "does not earn its place"
+        fall = f"{own['value']:.4g} +- {own['std']:.2g}" if own["std"] else "unknown"
+        say(f"effect    {name} {pays} beside the others (fall of the held-out error: {fall})")
     say(f"result    {verdict} (fall from the refitted model: {gain})", style="bold")
     return better
 

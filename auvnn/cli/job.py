@@ -94,8 +94,14 @@ class Job:
             self.say(f"assumed   {warning}", style="yellow")
         return model
 
-    def log(self, key: str = "log", *, repairs: bool = True) -> Log:
-        """Read the log of `log=`, or of another option, and say what was mended in it."""
+    def log(self, key: str = "log", *, repairs: bool = True, partial: bool = False) -> Log:
+        """Read the log of `log=`, or of another option, and say what was mended in it.
+
+        Args:
+            key: the option.
+            repairs: whether to say what was mended.
+            partial: whether it may lack attitude or velocities altogether.
+        """
         from auvnn.logs import Log
 
         paths = files(self.options, key)
@@ -113,6 +119,8 @@ class Job:
         self.say(f"{key:<9} {names}: {extent}")
         for repair in log.repairs if repairs else ():
             self.say(f"{repair.level:<9} {repair}", style="yellow")
+        if not partial:
+            log.refuse_unmeasured()
         return log
 
     def mapping(self) -> Path | None:

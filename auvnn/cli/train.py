@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 from typing import Any
 
 from auvnn.cli.dry import foreseen
 from auvnn.cli.folder import WORK
 from auvnn.cli.job import Answering, Job, Verb, files
+from auvnn.cli.working import take_away
 from auvnn.errors import ConfigError
 
 
@@ -68,7 +68,7 @@ def _in_parts(job: Job) -> Any:
 
 def _options(job: Job) -> dict[str, Any]:
     if job["overwrite"] and not job["resume"]:
-        shutil.rmtree(job.checkpoint, ignore_errors=True)
+        take_away(job.checkpoint)
     same = {key: job[key] for key in ("scheme", "damping", "objective", "seed", "derivative", "force")}
     return {**same, "checkpoint": job.checkpoint, "resume": bool(job["resume"]), "progress": job.say.progress}
 

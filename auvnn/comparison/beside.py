@@ -9,7 +9,7 @@ import numpy as np
 
 from auvnn.errors import InputError
 from auvnn.logs import Log
-from auvnn.metrics.one_step import Derivative
+from auvnn.metrics.derivative import Derivative
 from auvnn.metrics.regression import Regression, baseline, worse_than
 from auvnn.metrics.rollouts import NAMES, Rolled, Scale, roll, scale_of
 from auvnn.models import GreyBox

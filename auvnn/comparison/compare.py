@@ -16,7 +16,8 @@ from auvnn.comparison.beside import beside
 from auvnn.comparison.locate import AXES, failures, locate
 from auvnn.errors import ConfigError
 from auvnn.logs import Log
-from auvnn.metrics.one_step import OneStep, choose_derivative, one_step, scores
+from auvnn.metrics.derivative import choose_derivative
+from auvnn.metrics.one_step import OneStep, one_step, scores
 from auvnn.metrics.rollouts import HORIZONS, NAMES, Rolled, rollout_table, scale_of
 from auvnn.models import GreyBox
 from auvnn.models.excursions import region_of, words_of
@@ -91,6 +92,7 @@ def compare(
         ConfigError: a horizon that is no positive number.
     """
     wanted = tuple(_horizon(h) for h in horizons)
+    log.refuse_unmeasured()
     how = choose_derivative(log, derivative)
     parts = one_step(model, log, how)
     scale = scale_of(log)

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from auvnn.checks.doubts import doubts
 from auvnn.comparison.beside import stands
 from auvnn.diagnosis.answers.answer import Diagnosis
+from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.diagnosis.hypotheses.layout import lay_out
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
-from auvnn.diagnosis.runaway import windows_that_hold
 from auvnn.diagnosis.search import search
-from auvnn.diagnosis.state import Searched, Setting
-from auvnn.diagnosis.tolerance import Tolerance
-from auvnn.errors import ConfigError
+from auvnn.diagnosis.stages.runaway import windows_that_hold
+from auvnn.diagnosis.stages.state import Searched, Setting
+from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.normal_equations import TRUST, motion
+from auvnn.estimation.prediction_error import SINGULAR
 from auvnn.logs import Log
-from auvnn.metrics.one_step import choose_derivative
+from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
 from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
@@ -109,6 +113,9 @@ def searched(
     known, spread = with_drag_only(model, log)
     windows, notes = windows_that_hold(known, log, window)
     layout = lay_out(known, usable, spread)
+    absorbed = confounded_effects(model, log)
+    notes += [] if spread is None else [LEARNED]
+    notes += [] if absorbed is None else absorbed.words()
     asked = Setting(
         model=model,
         log=log,
@@ -122,15 +129,15 @@ def searched(
         costs=costs,
         advice=advice,
         whiteness=whiteness,
+        absorbed=absorbed,
+        notes=(*notes, *doubts(model, log)),
         say=say,
     )
-    found, under_way = search(asked, windows)
-    found.warnings += notes
-    if spread is not None:
-        found.warnings.append(LEARNED)
-    found.absorbed = confounded_effects(model, log)
-    if found.absorbed is not None:
-        found.warnings += found.absorbed.words()
-    found.warnings += doubts(model, log)
-    found.baseline = stands(model, log, choose_derivative(log))
-    return found, under_way
+    try:
+        found, under_way = search(asked, windows)
+    except (np.linalg.LinAlgError, SINGULAR) as problem:
+        raise InputError(
+            f"{log.name} cannot be diagnosed with {model.vehicle.name}: free running grows without bound, so that the "
+            f"sums of its tests cannot be solved ({problem}); choose shorter windows with window=, and check the model"
+        ) from None
+    return replace(found, baseline=stands(model, log, choose_derivative(log))), under_way

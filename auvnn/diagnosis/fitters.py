@@ -21,8 +21,9 @@ from auvnn.diagnosis.score_tests.shape_search import search_shapes
 from auvnn.errors import ConfigError
 from auvnn.estimation.prediction_error import Fitted, fit
 from auvnn.estimation.priors import limits, parameters_of, set_parameters
+from auvnn.estimation.scaling import unit_of
 from auvnn.logs import Log
-from auvnn.metrics.one_step import Derivative, choose_derivative
+from auvnn.metrics.derivative import Derivative, choose_derivative
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 
@@ -189,7 +190,7 @@ def newton(fitted: Fitted, held: Any, keep: NDArray[np.bool_]) -> NDArray[np.flo
     if free.any():
         hessian = sums.hessian[keep].sum(0) + np.diag(held.precision)
         slope = sums.slope[keep].sum(0) - held.precision * (theta - held.mean)
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(hessian)[free], 1e-300))
+        unit = unit_of(hessian[np.ix_(free, free)])
         even = hessian[np.ix_(free, free)] * unit[:, None] * unit
         step[free] = np.linalg.lstsq(even, slope[free] * unit, rcond=1e-12)[0] * unit
     return np.clip(theta + step, low, high)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from auvnn.diagnosis.answering import answer
 from auvnn.diagnosis.answers.answer import Diagnosis
-from auvnn.diagnosis.stages import fit_null, look, regroup
-from auvnn.diagnosis.state import Searched, Setting
-from auvnn.diagnosis.what_is_left import what_is_left
+from auvnn.diagnosis.answers.answering import answer
+from auvnn.diagnosis.stages.look import fit_null, look, regroup
+from auvnn.diagnosis.stages.state import Searched, Setting
+from auvnn.diagnosis.stages.what_is_left import what_is_left
 from auvnn.metrics.windows import Windows
 
 

@@ -29,6 +29,7 @@ from auvnn.estimation.normal_equations import (
     residual_std,
 )
 from auvnn.estimation.priors import Priors, bounded_step, limits, parameters_of, set_parameters
+from auvnn.estimation.scaling import unit_of
 from auvnn.estimation.sensitivity import Response
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import Windows
@@ -75,8 +76,12 @@ class Fitted:
         """Return the covariance (P, P) of the parameters under white noise of `sigma`."""
         precision = self.statistics.total + np.diag(self.priors.precision)
         # In units of each parameter's own: what is hardly known must not pass for rounding beside what is well known.
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(precision), 1e-300))
-        return np.linalg.pinv(precision * unit[:, None] * unit, hermitian=True) * unit[:, None] * unit
+        unit = unit_of(precision)
+        covariance = np.linalg.pinv(precision * unit[:, None] * unit, hermitian=True) * unit[:, None] * unit
+        # Of what the sums say nothing, no more is known than before.
+        dead = np.flatnonzero(unit == 0.0)
+        covariance[dead, dead] = 1.0 / np.maximum(self.priors.precision[dead], 1e-30)
+        return covariance
 
 
 def fit(
@@ -154,8 +159,9 @@ def fit(
             break
         hessian = statistics.total + np.diag(priors.precision)
         gradient = statistics.slope.sum(0) - priors.precision * (theta - priors.mean)
-        normal, scale = even(hessian)
-        gradient = np.where(np.diag(normal) > 0, gradient, 0.0)
+        unit = unit_of(hessian)
+        normal, gradient = hessian * unit[:, None] * unit, np.where(unit > 0.0, gradient, 0.0)
+        scale = np.where(unit > 0.0, 1.0 / np.where(unit > 0.0, unit, 1.0), 1.0)
         now = cost_of(here, sigma) + penalty(theta)
         for _attempt in range(8):
             step = (
@@ -205,23 +211,6 @@ def fit(
     initial = moved(initial, torch.as_tensor(a))
     total = float(statistics.cost.sum()) + penalty(theta)
     return Fitted(model, names, theta, initial, sigma, statistics, priors, total, converged, taken)
-
-
-def even(square: Array) -> tuple[Array, Array]:
-    """Return a symmetric matrix in units in which its diagonal is one, and these units, (P,).
-
-    A parameter of which the sums say nothing, or less than nothing because a window of enormous errors has rounded it
-    away, gets a row of zeros: no step is taken in it.
-
-    Args:
-        square: (P, P).
-    """
-    diagonal = np.diag(square)
-    alive = diagonal > 1e-300
-    unit = np.where(alive, np.sqrt(np.where(alive, diagonal, 1.0)), 1.0)
-    with np.errstate(over="ignore", invalid="ignore"):
-        normal = np.where(alive[:, None] & alive, square / unit[:, None] / unit, 0.0)
-    return normal, unit
 
 
 def _answered(

@@ -5,7 +5,8 @@ refits with effects and compares before and after, `gains` says by how much free
 `fleet` fits the same effects over many dives, `trend` asks whether a parameter changes from dive to dive.
 """
 
-from auvnn.improvement.add import Improvement, add
+from auvnn.improvement.add import add
+from auvnn.improvement.added import Improvement
 from auvnn.improvement.answer import Improved, Step
 from auvnn.improvement.fleet import Fleet, fleet
 from auvnn.improvement.loop import improve

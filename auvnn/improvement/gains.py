@@ -1,11 +1,10 @@
-"""By how much free running improves, how sure that is, and what nothing can improve on."""
+"""By how much free running improves, and how sure that is."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.metrics.floor import noise_floor
 from auvnn.metrics.rollouts import Rolled, Scale
 
 Array = NDArray[np.float64]
@@ -25,6 +24,3 @@ def paired_gain(before: Rolled, after: Rolled, scale: Scale) -> tuple[float, flo
     if n < 2:
         return value, float("inf")
     return value, float(np.sqrt((n - 1) / n * np.sum((np.array(without) - np.mean(without)) ** 2)))
-
-
-__all__ = ["noise_floor", "paired_gain"]

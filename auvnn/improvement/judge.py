@@ -12,8 +12,8 @@ from auvnn.diagnosis.left_out import LeftOut
 from auvnn.errors import InputError
 from auvnn.improvement.free_run import Task, predicted
 from auvnn.logs import Log
+from auvnn.metrics.derivative import Derivative
 from auvnn.metrics.folds import Folds
-from auvnn.metrics.one_step import Derivative
 from auvnn.metrics.regression import Regression
 from auvnn.metrics.rollouts import WARMUP, Scale, scale_of, scored
 from auvnn.metrics.windows import Windows, cut_windows

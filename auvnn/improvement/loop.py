@@ -36,7 +36,7 @@ from auvnn.improvement.state import (
 )
 from auvnn.logs import Log
 from auvnn.logs.leakage import leakage
-from auvnn.metrics.one_step import choose_derivative
+from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
 from auvnn.threads import on_one_thread
 

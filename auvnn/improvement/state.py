@@ -18,7 +18,7 @@ from auvnn.effects import Effect
 from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
 from auvnn.improvement.free_run import STEPS, FreeRunFit, fit_free_run
 from auvnn.improvement.judge import NEWTON, Judge
-from auvnn.metrics.one_step import Derivative
+from auvnn.metrics.derivative import Derivative
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]

@@ -31,7 +31,8 @@ from auvnn.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from auvnn.damping.bank import DampingBank
-    from auvnn.models.rollout import Trajectory
+    from auvnn.models.state_space import Linearisation
+    from auvnn.models.trajectory import Trajectory
 
 
 def _tensor(value: Any) -> Tensor:
@@ -442,6 +443,20 @@ class GreyBox(nn.Module):
         from auvnn.models.rollout import rollout
 
         return rollout(self, eta0, nu0, commands, times, **options)
+
+    def linearise(
+        self, state: Tensor, command: Tensor, dt: float | None = None, **given: Any
+    ) -> Linearisation:
+        """Return A and B at a state, with the actuators' states: see `auvnn.models.state_space.linearise`."""
+        from auvnn.models.state_space import linearise
+
+        return linearise(self, state, command, dt, **given)
+
+    def discrete_step(self, state: Tensor, command: Tensor, dt: float, **given: Any) -> Tensor:
+        """Return the state after one step: see `auvnn.models.state_space.discrete_step`."""
+        from auvnn.models.state_space import discrete_step
+
+        return discrete_step(self, state, command, dt, **given)
 
     def learned_parts(self) -> tuple[dict[str, Any], dict[str, Tensor] | None]:
         """Return how what was learned is built again, as entries of a model file, and its weights; None without any."""

@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from auvnn.logs import Log, Run
+from auvnn.metrics.derivative import Derivative
 from auvnn.metrics.folds import Folds
-from auvnn.metrics.one_step import Derivative
 from auvnn.metrics.regression import Regression, baseline, regressors, worse_than
 from auvnn.metrics.rollouts import scale_of, scored
 from auvnn.metrics.windows import cut_windows

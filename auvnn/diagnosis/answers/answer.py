@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from auvnn.answers import Answer
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.training.confounding.confounded_effects import Confounding
+from auvnn.training.confounding.confounding import Confounding
 
 Array = NDArray[np.float64]
 
@@ -78,6 +78,15 @@ class Diagnosis(Answer):
 
         return tell(self)
 
+    @property
+    def judged_words(self) -> list[str]:
+        """What each name costs and what is left, as plain sentences."""
+        from auvnn.diagnosis.answers import judged_words
+        from auvnn.diagnosis.answers.moved import moved_words
+
+        told = judged_words.predicts(self) if self.verdict == "partial" else judged_words.costs(self)
+        return [*told, *judged_words.left(self), *moved_words(self.moved)]
+
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
         from auvnn.answers import plain
@@ -101,6 +110,7 @@ class Diagnosis(Answer):
             "moved",
             "tolerance",
             "judged_by",
+            "judged_words",
             "next_experiment",
             "warnings",
             "global_p_value",

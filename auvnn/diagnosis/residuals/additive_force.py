@@ -19,6 +19,7 @@ from auvnn.diagnosis.hypotheses.layout import Layout, shapes
 from auvnn.diagnosis.residuals.input_forces import AXES, InputForces
 from auvnn.diagnosis.score_tests.score import variance_inflation
 from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
+from auvnn.estimation.scaling import unit_of
 from auvnn.estimation.sensitivity import Response
 from auvnn.metrics.windows import Windows
 
@@ -210,7 +211,7 @@ def _need(sums: _ForceSums, layout: Layout, own: NDArray[np.int64], scale: Array
     # Of the force as little is assumed as keeps what the log does not see at nought.
     precision = np.concatenate([sums.precision, 1e-4 * scale**-2.0])
     inner = sums.products(free, free) + np.diag(precision)
-    unit = 1.0 / np.sqrt(np.maximum(np.diag(inner), 1e-300))
+    unit = unit_of(inner)
     covariance = np.linalg.pinv(inner * unit[:, None] * unit, hermitian=True) * unit[:, None] * unit
     away = np.concatenate([sums.away, np.zeros(len(own))])
     step = covariance @ (sums.slope.sum(0)[free] - precision * away)

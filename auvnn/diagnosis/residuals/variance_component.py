@@ -19,7 +19,7 @@ from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.residuals.input_forces import AXES
-from auvnn.diagnosis.unnamed_size import Size, sizes
+from auvnn.diagnosis.residuals.unnamed_size import Size, sizes
 from auvnn.effects import Body, Effect, Moment, Parameter
 from auvnn.estimation.normal_equations import linearise, normal_equations
 from auvnn.metrics.windows import Windows

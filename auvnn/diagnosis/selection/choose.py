@@ -99,7 +99,7 @@ class Chooser:
         for candidate in leading:
             try:
                 tried.append(self._refitted(candidate, at, base, chosen, current))
-            except FitError as problem:
+            except (FitError, np.linalg.LinAlgError) as problem:
                 failed[candidate.effect] = f"its fit failed: {problem}"
         found = self._among(tried, clear, at, base, current)
         return replace(found, failed=failed)
