@@ -1,4 +1,4 @@
-"""The whole loop: what is hidden is found, what is not there is not added, nothing ends in a fault, the test chooses nothing."""
+"""The whole loop: what is hidden is found, what is not there is not added, and the test log chooses nothing."""
 
 from __future__ import annotations
 

@@ -67,10 +67,18 @@ def budget(
             text, (error, i), xytext=(3, 0), textcoords="offset points", va="center", fontsize=8,
             bbox={"fc": "white", "ec": "none", "pad": 0.4},
         )  # fmt: skip
-    for name, error in across.items():
+    # Names of the lines stand one above the other: the lines may be close.
+    for level, (name, error) in enumerate(sorted(across.items(), key=lambda item: -item[1])):
         ax.axvline(error, color=style.INK, lw=1.0, ls=LINES.get(name, "-"), zorder=0.5)
         ax.annotate(
-            f"{name} {error:.3g}", (error, -0.62), ha="center", va="bottom", fontsize=8, annotation_clip=False
+            f"{name} {error:.3g}",
+            (error, -0.6),
+            xytext=(2, 2 + 10 * level),
+            textcoords="offset points",
+            ha="left",
+            va="bottom",
+            fontsize=8,
+            annotation_clip=False,
         )
     if logarithmic:
         ax.set_xscale("log")
