@@ -103,7 +103,9 @@ def _placed(frame: pl.DataFrame, path: Path) -> Path:
         seal_of(path).unlink(missing_ok=True)
         os.replace(temporary, path)
     except OSError as problem:
-        raise InputError(f"{path} cannot be written: {problem.strerror or one_line(problem, 200)}") from problem
+        raise InputError(
+            f"{path} cannot be written: {problem.strerror or one_line(problem, 200)}"
+        ) from problem
     except Exception as problem:
         # What polars says of a full disk is no OSError.
         if type(problem).__module__.split(".")[0] != "polars":

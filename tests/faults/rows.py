@@ -386,7 +386,9 @@ def table() -> str:
     """Return a table of all rows with their tests: `python -m tests.faults.rows` prints it."""
     own: dict[int, list[str]] = {}
     for file in sorted(Path(__file__).parent.glob("test_*.py")):
-        for match in re.finditer(r"^def (test_row_(\d+)_\w+)", file.read_text(encoding="utf-8"), re.MULTILINE):
+        for match in re.finditer(
+            r"^def (test_row_(\d+)_\w+)", file.read_text(encoding="utf-8"), re.MULTILINE
+        ):
             own.setdefault(int(match[2]), []).append(f"tests/faults/{file.name}::{match[1]}")
     lines = []
     for row, what in ROWS.items():

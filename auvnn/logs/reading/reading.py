@@ -203,12 +203,16 @@ def _without_repeats(
     again = np.flatnonzero(earlier < np.arange(len(t)))
     for column in table.columns.values():
         one, other = column[rows[earlier[again]]], column[rows[again]]
-        same = one == other if column.dtype.kind != "f" else (one == other) | (np.isnan(one) & np.isnan(other))
+        same = (
+            one == other if column.dtype.kind != "f" else (one == other) | (np.isnan(one) & np.isnan(other))
+        )
         again = again[same]
     if len(again) < MIN_SAMPLES:
         return rows
     words = "rows that are earlier ones again, stamps and values, left out (a block written twice?)"
-    repairs.append(Repair(words, where, len(again), "warning", "export the log again if rows are missing elsewhere"))
+    repairs.append(
+        Repair(words, where, len(again), "warning", "export the log again if rows are missing elsewhere")
+    )
     return np.delete(rows, again)
 
 
