@@ -59,7 +59,7 @@ def test_row_10_a_dataflash_format_that_is_unknown():
 def test_row_16_a_block_that_unpacks_to_gigabytes(size):
     bomb = zlib.compress(bytes(50_000_000), 9)
     assert len(bomb) < 100_000
-    with pytest.raises(InputError, match="size|damaged"):
+    with pytest.raises(InputError, match=r"size|damaged"):
         unpack("zlib", bomb, size, "log", limit=1_000_000)
 
 
