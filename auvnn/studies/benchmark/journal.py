@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,30 @@ def code_fingerprint() -> str:
         if path.relative_to(root).parts[0] not in ASIDE:
             digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:12]
+
+# What ends each line: the beginning of the SHA-256 of the row without it. A flipped bit in a number is another number.
+_SUM = re.compile(rb', "sum": "([0-9a-f]{16})"\}\s*$')
+
+
+def _digest(text: bytes) -> str:
+    return hashlib.sha256(text).hexdigest()[:16]
+
+
+def _checked(line: bytes, summed: bool) -> bytes:
+    """Return a line's row without its checksum; rows of a file in which none has one are taken as they are.
+
+    Raises:
+        ValueError: it is damaged.
+    """
+    found = _SUM.search(line)
+    if found is None:
+        if summed:
+            raise ValueError("no checksum")
+        return line
+    text = line[: found.start()] + b"}"
+    if _digest(text).encode() != found[1]:
+        raise ValueError("another checksum")
+    return text
 
 
 class Journal:
@@ -54,17 +79,18 @@ class Journal:
             return {}
         wanted, found = set(todo), {}
         lines = self.path.read_bytes().split(b"\n")
+        summed = any(_SUM.search(line) for line in lines)
         for number, line in enumerate(lines, start=1):
             if not line.strip():
                 continue
             try:
-                row = json.loads(line)
+                row = json.loads(_checked(line, summed))
                 case = Case.of_row(row)
             except (ValueError, TypeError, AttributeError):
                 if number == len(lines):
                     break
                 raise InputError(
-                    f"{self.path}: line {number} is no row of a benchmark; take it out, or choose another out="
+                    f"{self.path}: line {number} is no row of a benchmark, or damaged; take it out, or choose another out="
                 ) from None
             if case in wanted and (any_code or row.get("code") == self.code):
                 found[case] = row
@@ -81,7 +107,7 @@ class Journal:
                 if stream.read(1) != b"\n":
                     # What a killed run left unfinished: nobody can read on from the middle of a line.
                     self._mend(stream)
-            stream.write(text.encode() + b"\n")
+            stream.write(f'{text[:-1]}, "sum": "{_digest(text.encode())}"}}\n'.encode())
             stream.flush()
             os.fsync(stream.fileno())
         return json.loads(text)
