@@ -28,7 +28,9 @@ def clean_names(names: list[str], where: str) -> tuple[list[str], list[Repair]]:
         InputError: a name occurs twice, or there are more than any log has.
     """
     if len(names) > MOST_COLUMNS:
-        raise InputError(f"{where}: has {len(names)} columns; a log has at most {MOST_COLUMNS}: is this its header line?")
+        raise InputError(
+            f"{where}: has {len(names)} columns; a log has at most {MOST_COLUMNS}: is this its header line?"
+        )
     cleaned = [_CONTROL.sub("?", name).strip() for name in names]
     strange = sum(_CONTROL.search(name) is not None for name in names)
     twice = sorted(n for n, times in Counter(cleaned).items() if n and times > 1)

@@ -121,7 +121,9 @@ def _check(data: bytes | FileBytes, size: int, where: str) -> Contents:
             if len(meta_of[3]) == 1:
                 places.setdefault(meta_of[3][0].decode(), []).append((begin, begin + meta_of[7]))
     flat, nested = _columns(meta[2])
-    notes = {e[1].decode("utf-8", "replace"): e.get(2, b"").decode("utf-8", "replace") for e in meta.get(5, [])}
+    notes = {
+        e[1].decode("utf-8", "replace"): e.get(2, b"").decode("utf-8", "replace") for e in meta.get(5, [])
+    }
     if any(len(places.get(name, [])) != len(groups) for name in flat):
         raise ThriftError("a column is missing in a part of the file")
     return Contents(rows, flat, nested, total, tuple(int(group[3]) for group in groups), places, start, notes,

@@ -17,7 +17,9 @@ _FIRST = 64_000_000  # bytes of the file with which to begin
 _MORE = 4.0
 
 
-def read_table(reader: Reader, path: Path, plan: Mapping, max_duration: float | None) -> tuple[Table, int | None]:
+def read_table(
+    reader: Reader, path: Path, plan: Mapping, max_duration: float | None
+) -> tuple[Table, int | None]:
     """Return a file's table under canonical names, the whole of it or its first seconds.
 
     Gaps do not count as time, nor do steps back. Of a long file ever larger parts are read until one is long
