@@ -43,7 +43,9 @@ def from_dataframe(data: Any, mapping: Any = None, name: str = "data frame") -> 
         table = plan.apply(_table(data, name), name)
         collector.repairs.extend(table.repairs)
         collect(table, plan, Path(name), collector)
-    return Reading(tuple(collector.runs), name, (), tuple(collector.repairs), "", tuple(collector.unknown))
+    return Reading(
+        tuple(collector.runs), name, (), tuple(collector.repairs), "", tuple(collector.unknown), ()
+    )
 
 
 def _table(data: Any, where: str) -> Table:
