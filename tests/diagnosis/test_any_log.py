@@ -47,7 +47,9 @@ def nonsense(random, model, runs, samples, rate):
         t = np.arange(samples) / rate
         size = float(random.choice([0.01, 1.0, 5.0]))
         nu = size * np.cumsum(random.normal(size=(samples, 6)), axis=0) / np.sqrt(samples)
-        quaternion = np.concatenate([np.ones((samples, 1)), 0.3 * sines(t, 3, int(random.integers(1 << 30)))], axis=1)
+        quaternion = np.concatenate(
+            [np.ones((samples, 1)), 0.3 * sines(t, 3, int(random.integers(1 << 30)))], axis=1
+        )
         quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
         command = np.clip(random.normal(size=(samples, model.actuators.size)), -1, 1)
         fins = len(model.vehicle.fins)
@@ -87,7 +89,11 @@ def some_case(seed):
     runs, rate = int(random.choice([1, 1, 2, 4])), float(random.choice([5.0, 10.0, 20.0]))
     samples = int(random.choice([60, 200, 400]))
     names = EFFECTS.names()
-    asked = None if random.random() < 0.1 else list(random.choice(names, size=int(random.integers(2, 8)), replace=False))
+    asked = (
+        None
+        if random.random() < 0.1
+        else list(random.choice(names, size=int(random.integers(2, 8)), replace=False))
+    )
     truth = GreyBox(small_vehicle()) if model.vehicle.name == "small" and random.random() < 0.7 else None
     if truth is None:
         log = nonsense(random, model, runs, samples, rate)

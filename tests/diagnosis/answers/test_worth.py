@@ -52,7 +52,9 @@ def test_each_cost_is_that_of_the_name_beside_the_other(two):
         assert own["cv_before"] > own["cv_after"] and 0.0 < own["explained"] < 1.0
     # One candidate's figures are its own: the shares of two that act apart do not each claim the whole.
     assert sum(by_name[n]["explained"] for n in NAMES) < 1.2
-    assert by_name["constant_force"]["cv_before"] != pytest.approx(by_name["net_buoyancy"]["cv_before"], rel=1e-3)
+    assert by_name["constant_force"]["cv_before"] != pytest.approx(
+        by_name["net_buoyancy"]["cv_before"], rel=1e-3
+    )
     assert any(line.startswith("constant_force: without it") for line in two.story)
     json.dumps(two.to_dict(), allow_nan=False)
 
@@ -93,7 +95,13 @@ def test_a_coefficient_that_moved_far_is_told_with_how_far(model):
 
 @pytest.mark.parametrize(
     ("value", "wanted"),
-    [(None, (0.1, 0.02)), (0, (0.0, 0.0)), (0.5, (0.5, 0.1)), ({"cost": 0.3}, (0.3, 0.02)), ({"force": 0.0}, (0.1, 0.0))],
+    [
+        (None, (0.1, 0.02)),
+        (0, (0.0, 0.0)),
+        (0.5, (0.5, 0.1)),
+        ({"cost": 0.3}, (0.3, 0.02)),
+        ({"force": 0.0}, (0.1, 0.0)),
+    ],
 )
 def test_a_tolerance_is_read(value, wanted):
     read = Tolerance.of(value)
