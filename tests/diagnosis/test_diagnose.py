@@ -24,7 +24,17 @@ from tests.small_logs import make_log, sines, small_vehicle
 
 CURRENT = {"v_north": 0.15, "v_east": -0.10}
 AXES = "XYZKMN"
-KEYS = {"effect", "p_value", "explained", "cv_before", "cv_after", "parameters", "confusable_with", "needs"}
+KEYS = {
+    "reason",
+    "effect",
+    "p_value",
+    "explained",
+    "cv_before",
+    "cv_after",
+    "parameters",
+    "confusable_with",
+    "needs",
+}
 
 
 @pytest.fixture(scope="module")

@@ -84,7 +84,9 @@ def worth(asked: Setting, state: State, beside: Mapping[str, FittedHypothesis]) 
     found, model = state.current, asked.layout.model
     actuators = actuators_of(model, state.windows)
     costs: dict[str, Cost] = {}
-    whole = _errors(asked, state, found) if asked.costs else None
+    # Where nothing is there and nothing is left, there is nothing to work out.
+    asked_for = asked.costs and bool(beside or state.left is not None)
+    whole = _errors(asked, state, found) if asked_for else None
     forces = forces_of(found, state.windows, list(beside))
     for name, other in beside.items():
         asked.say(f"asking what {name} costs")
