@@ -2,8 +2,8 @@
 
     python experiments/improve/run.py DATA [OUT] [--seconds=600] [--no-diagnosis]
 
-DATA is the folder with the six CSV files of Beluga, OUT where the answer goes. Model, mapping, the runs that are
-fitted and how much of them are those of `experiments/beluga`.
+DATA is the folder with Beluga's six CSV files, OUT where the answer goes. Model, mapping, the runs that are fitted and
+how much of them are those of `experiments/beluga`.
 """
 
 from __future__ import annotations
