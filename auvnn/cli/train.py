@@ -74,9 +74,6 @@ def _options(job: Job) -> dict[str, Any]:
 
 
 VERB = Verb(
-    summary="train the damping subnetworks on a log",
-    reads=("log", "mapping", "model", "test"),
-    writes=("training.json", "model/", "report.html", "figures/"),
-    run=_run,
-    foresee=foreseen,
-)
+    "train the damping subnetworks on a log", ("log", "mapping", "model", "test"),
+    ("training.json", "model/", "report.html", "figures/"), _run, foresee=foreseen,
+)  # fmt: skip

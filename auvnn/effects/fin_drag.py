@@ -25,6 +25,9 @@ class FinDrag(FinEffect):
     cause = "the fins drag, more so when they are turned"
     symbol = "C_D"
     reference = "Hoerner (1965), Fluid-Dynamic Drag, chapter 7"
+    confused_with = ("quadratic_damping", "thruster_gain")
+    manoeuvre = "survey"
+    told_apart_by = "straight legs and turns at the same throttle"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

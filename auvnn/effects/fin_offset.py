@@ -22,6 +22,9 @@ class FinOffset(FinEffect):
     cause = "a fin stands at another angle than commanded"
     symbol = "delta_0"
     reference = "Prestero (2001), Verification of a six-degree of freedom simulation model, section 4.5"
+    confused_with = ("cg_offset", "constant_force", "fin_gain")
+    manoeuvre = "survey"
+    told_apart_by = "straight legs at several speeds"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

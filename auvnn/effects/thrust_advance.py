@@ -26,6 +26,9 @@ class ThrustAdvance(Effect):
     cause = "thrust falls with the advance ratio of the propeller"
     symbol = "K_T(J)"
     reference = "Carlton (2012), Marine Propellers and Propulsion, chapter 6"
+    confused_with = ("thrust_inflow_loss", "quadratic_damping", "thruster_gain")
+    manoeuvre = "coast_down"
+    told_apart_by = "coasting, pushes from rest, and steady speed with several throttles"
     plainer = ("thruster_gain", "thrust_inflow_loss")
 
     @classmethod

@@ -28,6 +28,7 @@ def code_fingerprint() -> str:
             digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:12]
 
+
 # What ends each line: the beginning of the SHA-256 of the row without it. A flipped bit in a number is another number.
 _SUM = re.compile(rb', "sum": "([0-9a-f]{16})"\}\s*$')
 
@@ -90,7 +91,7 @@ class Journal:
                 if number == len(lines):
                     break
                 raise InputError(
-                    f"{self.path}: line {number} is no row of a benchmark, or damaged; take it out, or choose another out="
+                    f"{self.path}: line {number} is no row of a benchmark, or damaged: take it out, or name another out="
                 ) from None
             if case in wanted and (any_code or row.get("code") == self.code):
                 found[case] = row
