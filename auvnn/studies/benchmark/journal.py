@@ -90,7 +90,8 @@ class Journal:
                 if number == len(lines):
                     break
                 raise InputError(
-                    f"{self.path}: line {number} is no row of a benchmark, or damaged; take it out, or choose another out="
+                    f"{self.path}: line {number} is no row of a benchmark, or damaged; take it out, "
+                    "or choose another out="
                 ) from None
             if case in wanted and (any_code or row.get("code") == self.code):
                 found[case] = row
