@@ -129,6 +129,8 @@ class DampingBank(nn.Module):
         Raises:
             ConfigError: an unknown form, option or axis, or a value out of range.
         """
+        if not isinstance(description, (str, Mapping)):
+            raise ConfigError(f"damping is {description!r}: give a form's name, or {{form: name, ...}}")
         plain = {"form": description} if isinstance(description, str) else dict(description)
         each = plain.pop("each", None) or {}
         if not isinstance(each, Mapping):

@@ -76,6 +76,11 @@ def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None 
     bank = DampingBank.from_description(networks)
     expected = {k: (tuple(v.shape), v.dtype) for k, v in bank.state_dict().items()}
     bank.load_state_dict(tensors_from_bytes(files[WEIGHTS], expected))
+    for name in ("input_scale", "output_scale"):
+        if not bool((getattr(bank, name) > 0.0).all()):
+            raise ModelError(
+                f"{path / WEIGHTS}: {name} must be positive in each direction: train the model again"
+            )
     bank.region = None if region is None else Region.read(region, str(path / MODEL))
     return GreyBox(model.vehicle, model.copied_effects(), bank, model.actuation)
 
