@@ -295,9 +295,7 @@ def test_a_parameter_that_ends_at_its_bound_is_reported(model):
     log = make_log(GreyBox(small_vehicle(**bare)), runs=3, duration=8.0, size=0.5)
     found = add(GreyBox(small_vehicle(0.0)), log, "linear_damping")
     assert found.parameters["linear_damping"]["X"]["value"] == 0.01
-    assert any(
-        "linear_damping.X ended at its bound 0.01: the data ask for more" in w for w in found.warnings
-    )
+    assert any("linear_damping.X ended at its bound 0.01: the data ask for more" in w for w in found.warnings)
     assert found.accepted
 
 
