@@ -74,9 +74,6 @@ def _run(job: Job) -> Answering:
 
 
 VERB = Verb(
-    summary="quality report of a log: what was read, repaired, implausible, excited",
-    reads=("log", "mapping", "model"),
-    writes=("quality.json", "report.html", "figures/"),
-    run=_run,
-    foresee=foreseen,
-)
+    "quality report of a log: what was read, repaired, implausible, excited", ("log", "mapping", "model"),
+    ("quality.json", "report.html", "figures/"), _run, foresee=foreseen,
+)  # fmt: skip

@@ -85,9 +85,9 @@ def test_a_model_driven_by_a_wrench_stays_so_on_a_log_that_has_both(here, capsys
     command = table.select([f"thruster_{k}" for k in range(1, 9)]).to_numpy()
     wrench = 40.0 * command * abs(command) @ allocation.T
     table = table.with_columns(**{f"tau_{a}": wrench[:, k] for k, a in enumerate("XYZKMN")})
-    table.write_csv("both.csv")
+    table.write_csv("wrench.csv")
     GreyBox(small_vehicle(), actuation="wrench").save("known")
-    status, _, err = told(capsys, "compare", "model=known", "log=both.csv", "out=compared")
+    status, _, err = told(capsys, "compare", "model=known", "log=wrench.csv", "out=compared")
     assert status == 0, err
     found = json.loads(Path("compared/comparison.json").read_text())
     assert found["rollout"]["5"]["total"] < 0.1, (

@@ -43,7 +43,9 @@ def place(tmp_path_factory):
     made = auvnn.simulate(model, "multisine", "realistic", runs=2, duration=8.0, seed=1)
     for name in ("dive", "other-dive"):
         made.log.write(folder / f"{name}.parquet")
-    (folder / "dives").mkdir()
+    for name in ("dives", "made"):
+        (folder / name).mkdir()
+    made.log.write(folder / "made" / "log.parquet")
     made.log.write(folder / "dives" / "first.parquet")
     (folder / "my-rov.yaml").write_text((config_dir() / "vehicle" / "rov95.yaml").read_text())
     auvnn.load("rov95").save(folder / "better" / "model")
