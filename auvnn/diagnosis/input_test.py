@@ -102,7 +102,7 @@ def _by_part(
     for answer in answers(asked, windows, fitted.initial, [*explanation.names, str(probe.name)]):
         part = windows.pick(slice(begin, begin + len(answer.error)))
         begin += len(answer.error)
-        each = [Response(answer.error, answer.state, answer.parameters[..., c]) for c in columns]
+        each = [Response(answer.error, answer.state, answer.parameters[..., c], answer.force) for c in columns]
         yield [reduce(part, [one], sigma)[0] for one in each]
 
 

@@ -1,0 +1,334 @@
+"""Names beside a stochastic force: the search goes on where a force is left that no name explains.
+
+Where no force is left, nothing here is asked and the answer is that of the search without one. Else the law of the
+force is estimated at the fit without any name (`noise_law`), and the effects are asked for again with the windows'
+errors weighed by it. An effect that is absent from the model inflates the variance that then hides it: those that lead
+with the variance at zero are therefore fitted too, and every explanation is judged by its marginal likelihood at the
+law that is most likely with it.
+
+Reference: Kristensen, Madsen and Joergensen (2004), Automatica 40(2) 225-237.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from auvnn.diagnosis.explain import Explanation, explain
+from auvnn.diagnosis.noise_law import Estimate, estimate, force_sums
+from auvnn.diagnosis.nuisance import Layout, begun, scales, shapes
+from auvnn.diagnosis.null_tests import NullTests, Tested
+from auvnn.diagnosis.pays import pays
+from auvnn.diagnosis.rivals import ALPHA_REFUTED, ODDS
+from auvnn.diagnosis.score import Score
+from auvnn.effects import effect_class
+from auvnn.metrics.force_law import ForceLaw, cell_for
+from auvnn.metrics.windows import Windows
+from auvnn.training.free_parameters import parameters_of, set_parameters
+from auvnn.training.window_sums import answers, reduce, spread
+
+Array = NDArray[np.float64]
+# A name is given where chance would seldom do as well among all effects that were asked for.
+ALPHA_NAME = 0.01
+# Fitted in full: so many of those that lead with the force's variance, and with it at zero; and judged by laws of their own.
+LEADERS, WITHOUT, JUDGED = 4, 2, 3
+# Members of a group that the log cannot tell apart, at most.
+GROUP = 3
+STEPS = 4
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An explanation with the law of the force that is most likely with it.
+
+    Attributes:
+        explanation: fitted under the law of the explanation before it.
+        estimate: its own law, and its likelihood there.
+        misfit: minus twice the log marginal likelihood, departure of the parameters in it, their volume aside.
+        evidence: logarithm of the marginal likelihood, up to what all hypotheses of a log share.
+    """
+
+    explanation: Explanation
+    estimate: Estimate
+    misfit: float
+    evidence: float
+
+    @property
+    def name(self) -> str:
+        """The effect that came last."""
+        return self.explanation.effects[-1] if self.explanation.effects else ""
+
+
+@dataclass(frozen=True)
+class BesideForce:
+    """What was found beside a stochastic force.
+
+    Attributes:
+        steps: of the search.
+        groups: explanations between which the log cannot decide.
+        last: the fit with what was found, under the law of the force.
+        windows: with that law.
+        estimate: the law.
+        tried: all that were fitted at first, the best first.
+        p_value: of there being nothing with a name.
+    """
+
+    steps: list[dict[str, Any]]
+    groups: list[list[str]]
+    last: Explanation
+    windows: Windows
+    estimate: Estimate
+    tried: list[Explanation]
+    p_value: float
+
+    @property
+    def names(self) -> list[str]:
+        """Effects that were named or tied, in order."""
+        return [e for s in self.steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"]]
+
+
+class ForceSearch:
+    """The search beside a stochastic force, of one log.
+
+    Args:
+        layout: stated values.
+        windows: of the log, without a law.
+        usable: effects that can be asked for.
+        base: effects that are free anyway.
+        floor: (18,) below which no channel is trusted.
+        say: told in words what is being done.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        windows: Windows,
+        usable: Sequence[str],
+        base: Sequence[str],
+        floor: Array,
+        say: Callable[[str], None],
+    ) -> None:
+        """Begin without a law."""
+        self.layout, self.windows, self.usable, self.base = layout, windows, list(usable), list(base)
+        self.floor, self.say = floor, say
+        self.sigma = np.full(18, np.inf)
+        self.cell = 0.5
+
+    def begin(self, first: Explanation, sigma: Array) -> Hypothesis | None:
+        """Return the explanation without any name under the law of the force; None where no variance is above zero.
+
+        Args:
+            first: the fit without any effect.
+            sigma: (18,) the sensors' white noise.
+        """
+        self.say("estimating the law of the force that is left")
+        found = estimate(force_sums(first, self.windows, sigma, self.cell))
+        if found.law is None:
+            return None
+        self.cell = cell_for(found.law.time[found.law.axes])
+        first = self._again(first, found.law, sigma)
+        under = replace(self.windows, law=found.law)
+        sums, _, _ = reduce(
+            under, answers(first.fitted.model, under, first.fitted.initial, first.names), sigma, leverage=True
+        )
+        self.sigma = np.where(np.isfinite(sigma), spread(sums, self.floor, len(first.fitted.theta)), np.inf)
+        found = estimate(force_sums(first, self.windows, self.sigma, self.cell))
+        if found.law is None:
+            return None
+        return self.judged(self._again(first, found.law, self.sigma), found.law)
+
+    def _again(self, found: Explanation, law: ForceLaw, sigma: Array) -> Explanation:
+        """Return an explanation fitted under a law."""
+        return explain(
+            self.layout, replace(self.windows, law=replace(law, cell=self.cell)), self.base, found.effects,
+            start=found.fitted, guess=replace(self.layout, model=found.fitted.model), sigma=sigma, iterations=STEPS,
+        )  # fmt: skip
+
+    def judged(self, explanation: Explanation, law: ForceLaw) -> Hypothesis:
+        """Return an explanation with the law that is most likely with it, and what they are worth."""
+        sums = force_sums(explanation, self.windows, self.sigma, law.cell)
+        found = estimate(sums, law, law.axes)
+        size, mean, shape = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=bool)]
+        for name in explanation.names:
+            stated = name in self.layout.spreads and name not in explanation.effects
+            own = self.layout.spreads[name] if stated else scales(self.layout, name)
+            size.append(np.broadcast_to(own, self.layout.means[name].shape))
+            mean.append(self.layout.means[name])
+            shape.append(shapes(self.layout, name))
+        sizes, means, fixed = np.concatenate(size), np.concatenate(mean), np.concatenate(shape)
+        theta, priors = explanation.fitted.theta + found.step, explanation.fitted.priors
+        data = found.value - float(priors.precision @ (theta - priors.mean) ** 2)
+        away = np.where(fixed, 0.0, (theta - means) / sizes)
+        information = found.information * sizes[:, None] * sizes
+        volume = float(np.linalg.slogdet(information + np.eye(len(sizes)))[1])
+        misfit = data + float(away @ away)
+        return Hypothesis(explanation, found, misfit, -0.5 * (misfit + volume))
+
+    def run(self, null: Hypothesis, leading: Sequence[str], most: int) -> BesideForce:
+        """Search for one effect after the other.
+
+        Args:
+            null: from `begin`.
+            leading: effects that lead with the variance at zero, the first first.
+            most: look for at most this many.
+        """
+        current, chosen = null, []
+        steps: list[dict[str, Any]] = []
+        groups: list[list[str]] = []
+        tried: list[Explanation] = []
+        whole = 1.0
+        while True:
+            law = current.estimate.law
+            assert law is not None
+            under = replace(self.windows, law=law)
+            grouped = {m for g in groups for m in g}
+            remaining = [n for n in self.usable if n not in chosen and n not in grouped]
+            if not remaining or len(chosen) >= most:
+                break
+            self.say(f"testing {len(remaining)} effects beside the force")
+            base = [*self.base, *[c for c in chosen if c not in self.base]]
+            tested = NullTests(self.layout, under, self.say)(current.explanation, remaining, base, chosen)
+            fitted = self._fitted(tested, under, current, base, chosen, leading if not chosen else ())
+            if not chosen:
+                tried = fitted
+            found = [self.judged(e, law) for e in fitted[:JUDGED]]
+            found.sort(key=lambda h: -h.evidence)
+            sure = {
+                h.name: min(1.0, len(remaining) * self._p_value(h, current)) for h in found
+            }
+            if not chosen:
+                whole = min([tested.p_value, *sure.values()], default=1.0)
+            good = [
+                h
+                for h in found
+                if h.evidence > current.evidence + ODDS
+                and sure[h.name] < ALPHA_NAME
+                and pays(h.explanation, self._without(h, current, under))
+            ]
+            if not good:
+                break
+            best, group = good[0], self._tied(good)
+            if len(group) > GROUP:
+                break
+            names = [h.name for h in group]
+            steps.append({"verdict": "ambiguous" if len(group) > 1 else "named", "effects": names, "p_value": sure[best.name]})
+            if len(group) > 1:
+                groups.append(names)
+            current = self._taken(group[0])
+            chosen.append(group[0].name)
+        current, steps, groups = self._needed(current, steps, groups)
+        law = current.estimate.law
+        assert law is not None
+        return BesideForce(
+            steps, groups, current.explanation, replace(self.windows, law=law), current.estimate, tried, whole
+        )
+
+    def _p_value(self, after: Hypothesis, before: Hypothesis) -> float:
+        degrees = len(self.layout.columns[after.name])
+        return float(chi2.sf(max(before.misfit - after.misfit, 0.0), degrees))
+
+    def _fitted(
+        self,
+        tested: Tested,
+        under: Windows,
+        current: Hypothesis,
+        base: list[str],
+        chosen: list[str],
+        leading: Sequence[str],
+    ) -> list[Explanation]:
+        """Return the leading effects fitted in full beside what was chosen, the smallest misfit first."""
+        scores = {n: s for n, s in tested.scores.items() if s.degrees}
+        order = sorted(scores, key=lambda n: -scores[n].evidence)[:LEADERS]
+        by_gain = sorted(scores, key=lambda n: scores[n].degrees - scores[n].gain)[:2]
+        names = dict.fromkeys([*order, *by_gain, *[n for n in leading if n in scores][:WITHOUT]])
+        fitted = [self._one(n, scores[n], tested.at, under, current, base, chosen) for n in names]
+        count = {e.effects[-1]: len(self.layout.columns[e.effects[-1]]) for e in fitted}
+        return sorted(fitted, key=lambda e: e.fitted.cost + count[e.effects[-1]])
+
+    def _one(
+        self,
+        name: str,
+        score: Score,
+        at: Layout,
+        under: Windows,
+        current: Hypothesis,
+        base: list[str],
+        chosen: list[str],
+    ) -> Explanation:
+        """Return an effect fitted from what its test estimates, or from nearer its null where that goes astray."""
+        self.say(f"fitting {name} beside the force")
+        known, start = parameters_of(at.model, [name]), begun(self.layout, name, score.estimate)
+        shape, best = shapes(self.layout, name), None
+        for share in (1.0, 0.3, 0.05):
+            guess = at.model.rebuilt(at.model.copied_effects())
+            set_parameters(guess, [name], np.where(shape, start, known + share * (start - known)))
+            found = explain(
+                self.layout, under, base, [*chosen, name], start=current.explanation.fitted, guess=replace(at, model=guess),
+                sigma=self.sigma, iterations=STEPS,
+            )  # fmt: skip
+            if best is None or found.fitted.cost < best.fitted.cost:
+                best = found
+            if best.fitted.cost <= current.explanation.fitted.cost:
+                break
+        assert best is not None
+        return best
+
+    def _without(self, after: Hypothesis, current: Hypothesis, under: Windows) -> Explanation:
+        """Return the fit without the effect that came last; a coefficient that is uncertain anyway stays as stated."""
+        if after.name not in self.base:
+            return current.explanation
+        fitted = current.explanation.fitted
+        return explain(
+            self.layout, under, [n for n in self.base if n != after.name], after.explanation.effects[:-1],
+            start=fitted, sigma=self.sigma, iterations=STEPS,
+        )  # fmt: skip
+
+    def _tied(self, good: list[Hypothesis]) -> list[Hypothesis]:
+        """Return the best and those that the log cannot tell from it, the plainer one first."""
+        best = good[0]
+        for other in good[1:]:
+            # Evidence weighs how large parameters might have been, which is a guess: it must not outvote the fit.
+            extra = len(self.layout.columns[other.name])
+            if best.misfit - other.misfit > chi2.isf(ALPHA_REFUTED, extra):
+                best = other
+        rest = [h for h in good if h is not best and best.evidence - h.evidence < ODDS]
+        mine = len(self.layout.columns[best.name])
+        rest = [h for h in rest if h.misfit - best.misfit < chi2.isf(ALPHA_REFUTED, mine)]
+        plainer = effect_class(best.name).plainer
+        return sorted([best, *rest], key=lambda h: h.name not in plainer)
+
+    def _taken(self, best: Hypothesis) -> Hypothesis:
+        """Return a hypothesis fitted under its own law."""
+        law = best.estimate.law
+        assert law is not None
+        return self.judged(self._again(best.explanation, law, self.sigma), law)
+
+    def _needed(
+        self, current: Hypothesis, steps: list[dict[str, Any]], groups: list[list[str]]
+    ) -> tuple[Hypothesis, list[dict[str, Any]], list[list[str]]]:
+        """Withdraw what is no longer needed beside what came after it."""
+        for name in current.explanation.effects[:-1]:
+            self.say(f"asking whether {name} is still needed")
+            law = current.estimate.law
+            assert law is not None
+            fitted = current.explanation.fitted
+            model = fitted.model.rebuilt(fitted.model.copied_effects())
+            set_parameters(model, [name], self.layout.means[name])
+            left = tuple(e for e in current.explanation.effects if e != name)
+            without = explain(
+                self.layout, replace(self.windows, law=law), self.base, left, start=fitted,
+                guess=replace(self.layout, model=model), sigma=self.sigma, iterations=STEPS,
+            )  # fmt: skip
+            other = self.judged(without, law)
+            if other.evidence < current.evidence:
+                continue
+            current = other
+            step = next(s for s in steps if name in s["effects"])
+            groups = [g for g in groups if name not in g]
+            steps = [*steps, {"verdict": "withdrawn", "effects": list(step["effects"]), "p_value": step["p_value"]}]
+        return current, steps, groups
