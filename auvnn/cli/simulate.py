@@ -28,7 +28,7 @@ def _run(job: Job) -> Answering:
         model, job["excitation"], job["noise"], hidden, job["seed"],
         runs=job["runs"], duration=job["duration"], rate=job["rate"], coefficients=job["coefficients"],
         actuation=job["actuation"], accelerations=job["accelerations"], max_step=job["max_step"], bottom=job["bottom"],
-        plant=job["plant"],
+        plant=job["plant"], world=job["world"],
     )  # fmt: skip
     made.log.write(job.folder / "log.parquet")
     if job["commands"]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import AuvnnError, ConfigError
+from auvnn.plants.laws import USUAL, Laws
 from auvnn.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -46,6 +47,7 @@ class Task:
         voltage: V, (R, T), or None.
         bottom: depth of a flat bottom, m, or None.
         max_step: longest step of an integrator that does not choose its own, s.
+        laws: where the world departs from the usual equations; only the plant `numpy` obeys them.
     """
 
     vehicle: Vehicle
@@ -63,6 +65,7 @@ class Task:
     voltage: Array | None = None
     bottom: float | None = None
     max_step: float = 0.01
+    laws: Laws = USUAL
 
 
 @dataclass(frozen=True)
@@ -155,6 +158,18 @@ def refuse(plant: Plant, effects: Iterable[str]) -> None:
         why = plant.refuses(effect)
         if why:
             raise ConfigError(f"plant {plant.name} cannot hold the effect {effect}: {why}")
+
+
+def refuse_laws(plant: Plant, task: Task) -> None:
+    """Refuse a world with other laws, for plants that have none but the usual ones.
+
+    Raises:
+        ConfigError: the task has other laws.
+    """
+    if not task.laws.usual:
+        raise ConfigError(
+            f"plant {plant.name} knows the usual laws only, not those of a world: use plant=numpy"
+        )
 
 
 def refuse_learned(plant: Plant, task: Task) -> None:

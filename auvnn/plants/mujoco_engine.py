@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import ConfigError, MissingExtra, one_line
-from auvnn.plants.base import LIMIT, Look, Motion, Plant, Task, drive, refuse, refuse_learned
+from auvnn.plants.base import LIMIT, Look, Motion, Plant, Task, drive, refuse, refuse_laws, refuse_learned
 from auvnn.plants.independent.equations import Held
 from auvnn.plants.independent.plant import SUPPORTED
 from auvnn.plants.independent.stretch import Beyond, Stretch
@@ -71,6 +71,7 @@ class MujocoPlant(Plant):
         """Run the engine."""
         refuse(self, (*task.effects, *task.strangers))
         refuse_learned(self, task)
+        refuse_laws(self, task)
         return drive(_Scene(task, engine()), task, look)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -20,15 +20,18 @@ from auvnn.plants import PLANTS, Motion, Task
 from auvnn.plants.base import refuse
 from auvnn.plants.strangers import STRANGERS
 from auvnn.simulate.excitations import EXCITATIONS, make_excitation
-from auvnn.simulate.noise import Draws, make_noise
+from auvnn.simulate.noise import make_noise
 from auvnn.simulate.plant import as_hidden, drawn_factors, make_plant, typical_values
+from auvnn.simulate.worlds import World, make_world
+from auvnn.simulate.worlds.law import disturbed, drawn_laws
+from auvnn.simulate.worlds.sensing import Sensing
 
 Array = NDArray[np.float64]
 
 COEFFICIENTS = ("exact", "drawn")
 # Every kind of random number has a stream of its own: another noise must not change the manoeuvre.
 STREAMS = ("excitation", "noise", "hidden", "voltage", "added_mass", "linear_damping", "quadratic_damping",
-           "inertia", "altitude")  # fmt: skip
+           "inertia", "altitude", "law", "force", "sensing")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,7 @@ def simulate(
     max_step: float = 0.01,
     bottom: float | None = None,
     plant: str = "own",
+    world: str | Mapping[str, Any] | World | None = None,
 ) -> Simulation:
     """Make a log: the model with effects hidden in it, driven and measured.
 
@@ -90,6 +94,8 @@ def simulate(
             nominal model's deepest point, only where a hidden effect needs it.
         plant: what makes the motion: `own`, the model's own equations; `numpy`, independent ones with an adaptive
             solver; `mujoco`, a physics engine. Excitation, sampling and sensors' noise are the same for all.
+        world: what departs from the assumptions of models: `between`, `disturbed_10`, `disturbed_25`, `shaped`,
+            `sensors`, `conventions`, `everything`, or a mapping of options. Other laws need `plant="numpy"`.
 
     Returns:
         Log, truth and plant.
@@ -104,6 +110,8 @@ def simulate(
         raise ConfigError(f"accelerations = {accelerations!r}: true or false is needed, or null")
     manner = make_excitation(excitation, EXCITATIONS)
     condition = make_noise(noise)
+    around = make_world(world)
+    every = around.every(rate)
     maker = PLANTS.get(plant)()
     model = _actuated(model, actuation)
     truth_hidden: dict[str, dict[str, float]] = {}
@@ -133,20 +141,35 @@ def simulate(
     hiding = make_plant(model, truth_hidden, factors)
     hiding.bottom = bottom
 
-    t = np.arange(round(duration * rate) + 1) / rate
+    # Rows of what is commanded; the log has every so many of them.
+    t = np.arange(every * round(duration * rate) + 1) / (every * rate)
     with torch.inference_mode():
         plan = manner.plan(model, t, [_generator(seed, "excitation", i) for i in range(runs)])
-        draws = Draws(condition, len(t), [_generator(seed, "noise", i) for i in range(runs)])
+        sensing = Sensing(
+            around.sensors, condition, 1.0 / (every * rate), len(t),
+            [_generator(seed, "noise", i) for i in range(runs)], [_generator(seed, "sensing", i) for i in range(runs)],
+            _generator(seed, "law", 2),
+        )  # fmt: skip
         voltage = _battery(model, t, [_generator(seed, "voltage", i) for i in range(runs)])
     task = Task(
         model.vehicle, model.actuation, {str(e.name): e.values() for e in hiding.members}, strangers, hiding,
         plan.eta0, plan.nu0, t, plan.command, plan.fins, plan.controller, plan.under_way, voltage, bottom, max_step,
+        drawn_laws(around, model.vehicle, model.actuation, _generator(seed, "law", 0)),
     )  # fmt: skip
-
-    def look(k: int, position: Array, quaternion: Array, nu: Array) -> tuple[Array, Array, Array]:
-        return draws.added("x", position, k), draws.turned(quaternion, k), draws.added("u", nu, k)
-
-    motion = maker.move(task, look)
+    wandering: dict[str, Any] = {}
+    if around.disturbance.share > 0.0:
+        bare = make_plant(model, {}, factors)
+        known = replace(
+            task, effects={str(e.name): e.values() for e in bare.members}, strangers={}, model=bare
+        )
+        # A controller keeps a memory, so the trial is flown by one of its own.
+        own = manner.plan(model, t, [_generator(seed, "excitation", i) for i in range(runs)])
+        forces = [_generator(seed, "force", i) for i in range(runs)]
+        known, wandering = disturbed(
+            around, maker, replace(known, controller=own.controller), _generator(seed, "law", 1), forces
+        )
+        task = replace(task, laws=known.laws)
+    motion = maker.move(task, sensing.look)
     logged = condition.accelerations if accelerations is None else accelerations
     altitude = None
     if bottom is not None:
@@ -154,7 +177,7 @@ def simulate(
         streams = [_generator(seed, "altitude", i) for i in range(runs)]
         noisy = np.stack([size * g.standard_normal(len(t)) for g in streams])
         altitude = bottom - motion.eta[..., 2] + noisy
-    made = _runs(t, motion, voltage, draws, model.actuation, altitude, logged)
+    made = _runs(t, motion, voltage, sensing, model.actuation, altitude, logged, every)
     log = Log.from_runs(made, name=f"{model.vehicle.name}-{manner.name}-{seed}")
     truth = {
         "schema": "auvnn/truth/1",
@@ -177,7 +200,25 @@ def simulate(
         },
         "notes": list(plan.notes),
     }
-    return Simulation(log, truth, hiding, plan.set_points)
+    if world is not None:
+        truth["world"] = _told(around, task, sensing, wandering)
+    return Simulation(log, truth, hiding, {n: points[:, ::every] for n, points in plan.set_points.items()})
+
+
+def _told(world: World, task: Task, sensing: Sensing, wandering: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a world and what was drawn of it, as plain data."""
+    laws = task.laws
+    return {
+        **world.to_dict(),
+        "true_names": list(world.true_names),
+        "drawn": {
+            "exponent": None if laws.exponent is None else laws.exponent.tolist(),
+            "speed": None if laws.speed is None else laws.speed.tolist(),
+            "thrust_phase": None if laws.phase is None or laws.thrust == 0.0 else laws.phase.tolist(),
+            "tilt": sensing.tilt.tolist(),
+            "force": dict(wandering) or None,
+        },
+    }
 
 
 def bottom_below(
@@ -243,26 +284,29 @@ def _runs(
     t: Array,
     motion: Motion,
     battery: Array | None,
-    draws: Draws,
+    sensing: Sensing,
     actuation: str,
     altitude: Array | None,
     rates: bool,
+    every: int,
 ) -> list[Run]:
-    position, nu = draws.added("x", motion.position), draws.added("u", motion.velocity)
-    quaternion = draws.turned(motion.quaternion)
-    rate = draws.added("du", motion.rate) if rates else None
+    draws, thin = sensing.recorded, slice(None, None, every)
+    position, quaternion, nu = (
+        x[:, thin] for x in sensing.record(motion.position, motion.quaternion, motion.velocity)
+    )
+    rate = draws.added("du", motion.rate)[:, thin] if rates else None
     voltage = None
     if battery is not None:
-        voltage = draws.added("voltage", battery[..., None])[..., 0]
-    command = motion.command
+        voltage = draws.added("voltage", battery[..., None])[:, thin, 0]
+    command, stamps = motion.command[:, thin], sensing.stamps(t)[:, thin]
     return [
         Run(
-            number=i, t=t, quaternion=quaternion[i], nu=nu[i], nu_dot=None if rate is None else rate[i],
-            position=position[i], fins=None if motion.fins is None else motion.fins[i],
+            number=i, t=stamps[i], quaternion=quaternion[i], nu=nu[i], nu_dot=None if rate is None else rate[i],
+            position=position[i], fins=None if motion.fins is None else motion.fins[i, thin],
             wrench=command[i] if actuation == "wrench" else None,
             thrusters=command[i] if actuation == "thrusters" else None,
             voltage=None if voltage is None else voltage[i],
-            altitude=None if altitude is None else altitude[i],
+            altitude=None if altitude is None else altitude[i, thin],
         )
         for i in range(len(nu))
     ]  # fmt: skip

@@ -74,6 +74,20 @@ def _shape(
     return shape
 
 
+def drawn_direction(
+    model: GreyBox, effect: str, log: Log, seed: int
+) -> tuple[tuple[Parameter, ...], Array, dict[str, float]]:
+    """Return an effect's parameters, a random direction in units of their scales, rms one, and a plausible shape."""
+    member = model.with_effects({effect: {}}).effect(effect)
+    described = tuple(member.parameters_of)
+    generator = np.random.default_rng(np.random.SeedSequence(int(seed), spawn_key=(101,)))
+    direction = generator.normal(size=len(described))
+    direction = np.where([p.low == p.null for p in described], np.abs(direction), direction)
+    shape = _shape(type(member), described, log, generator)
+    live = direction[[not p.shape for p in described]]
+    return described, direction / max(float(np.sqrt(np.mean(live**2))), 1e-6), shape
+
+
 def sized(
     model: GreyBox,
     effect: str,
@@ -127,7 +141,9 @@ def sized(
     bottom = None
     if "altitude" in type(layout.model.effect(effect)).channels:
         bottom = bottom_below(model, excitation, seed, runs=runs, duration=duration, rate=rate)
-    felt = accelerations is True and bool(ACCELERATION_NOISE.keys() & set(type(layout.model.effect(effect)).channels))
+    felt = accelerations is True and bool(
+        ACCELERATION_NOISE.keys() & set(type(layout.model.effect(effect)).channels)
+    )
     made = simulate(
         model, excitation, "realistic", None, seed,
         runs=runs, duration=duration, rate=rate, max_step=0.025, bottom=bottom, accelerations=felt,

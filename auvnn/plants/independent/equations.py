@@ -16,6 +16,7 @@ from auvnn.plants.independent.sizes import sphere_radius
 from auvnn.plants.independent.thrust import Actuators
 from auvnn.plants.independent.vectors import cross, cross_matrix, dot, times
 from auvnn.plants.independent.water import water
+from auvnn.plants.laws import USUAL, Laws
 from auvnn.plants.strangers import STRANGERS
 from auvnn.plants.strangers.base import Seen
 from auvnn.vehicle import Vehicle
@@ -31,13 +32,15 @@ class Around:
     """The water where the vehicles are.
 
     Attributes:
-        flow: velocity through it, body axes, (R, 3).
+        flow: velocity through it, body axes, as all but the drag feel it, (R, 3).
+        dragged: the same, as the drag feels it.
         gain: rate of its own velocity as the turning body sees it, (R, 3), or None where it is still.
         walls: of each boundary, share of the added mass and its slope with depth, (R, 1) each.
         grown: factor on the added mass, (R, 1).
     """
 
     flow: Array
+    dragged: Array
     gain: Array | None
     walls: list[tuple[Array, Array]]
     grown: Array
@@ -66,6 +69,7 @@ class Equations:
         strangers: effects outside the catalogue.
         actuators: of the vehicle.
         bottom: depth, m, or None.
+        laws: where the world departs from these equations.
     """
 
     def __init__(
@@ -75,15 +79,17 @@ class Equations:
         strangers: Mapping[str, Values],
         actuators: Actuators,
         bottom: float | None,
+        laws: Laws = USUAL,
     ) -> None:
         """Work out what does not change."""
+        self.laws = laws
         self.vehicle, self.effects, self.actuators, self.bottom = vehicle, effects, actuators, bottom
         self.hull = build(vehicle, effects)
         self.loads = [(name, LOADS[name], values) for name, values in effects.items() if name in LOADS]
         self.strangers = [(n, STRANGERS.get(n), values) for n, values in strangers.items()]
         self.fins = None
         if vehicle.fins:
-            self.fins = Fins(vehicle, effects.get("fin_stall", {}).get("factor", 1.0))
+            self.fins = Fins(vehicle, effects.get("fin_stall", {}).get("factor", 1.0), laws.separation)
         self.moves = any(n in effects for n in ("ocean_current", "current_shear", "waves"))
         self.held = grasp(effects["payload"]["time"], vehicle) if "payload" in effects else None
         self.radius = sphere_radius(vehicle)
@@ -130,11 +136,11 @@ class Equations:
         if self.drags[0]:
             out -= nu @ hull.linear.T
         if self.drags[1]:
-            out -= (np.abs(nu) * nu) @ hull.quadratic.T
+            out -= self.laws.powers(nu) @ hull.quadratic.T
         for place, axes, linear, quadratic in hull.parts:
             arm = np.broadcast_to(place, flow.shape)
             own = np.concatenate([(flow + cross(turn, arm)) @ axes, turn @ axes], axis=-1)
-            law = -(linear + quadratic * np.abs(own)) * own
+            law = -linear * own - quadratic * self.laws.powers(own)
             force, moment = law[:, :3] @ axes.T, law[:, 3:] @ axes.T
             out += np.concatenate([force, moment + cross(arm, force)], axis=-1)
         return out
@@ -154,17 +160,18 @@ class Equations:
     def around(self, t: float, place: Array, rotation: Array, v: Array, turn: Array) -> Around:
         """Return what the water does where the vehicles are."""
         depth = place[:, 2:]
-        flow, gain = v, None
+        flow, dragged, gain = v, v, None
         if self.moves:
             stream, change = water(self.effects, self.vehicle, t, place, times(rotation, v))
             to_body = rotation.transpose(0, 2, 1)
             along = times(to_body, stream)
-            flow, gain = v - along, times(to_body, change) - cross(turn, along)
+            felt, dragged = self.laws.relative * along, v - along
+            flow, gain = v - felt, self.laws.relative * times(to_body, change) - cross(turn, felt)
         walls = [self._wall(n, depth) for n in self.walls]
         grown = np.ones_like(depth)
         for f, _ in walls:
             grown = grown * (1.0 + f)
-        return Around(flow, gain, walls, grown)
+        return Around(flow, dragged, gain, walls, grown)
 
     def inertial(self, t: float, v: Array, turn: Array, near: Around) -> dict[str, Array]:
         """Return what motion itself asks for, of the body and of the water, (R, 6) each."""
@@ -177,9 +184,8 @@ class Equations:
         p, m = impulse[:, :3], impulse[:, 3:]
         out = {
             "inertia of the body": np.concatenate([force, moment], axis=-1),
-            "inertia of the water": -np.concatenate(
-                [cross(turn, p), cross(turn, m) + cross(near.flow, p)], axis=-1
-            ),
+            "inertia of the water": -self.laws.added_coriolis
+            * np.concatenate([cross(turn, p), cross(turn, m) + cross(near.flow, p)], axis=-1),
         }
         if near.gain is not None:
             out["water acceleration"] = near.grown * (near.gain @ self.hull.added[:, :3].T)
@@ -199,7 +205,7 @@ class Equations:
         """Return every other force and moment by name, (R, 6) each; shapes as in `terms`."""
         command, angles, voltage = held
         down, flow = rotation[:, 2, :], near.flow
-        drag = self.drag(flow, turn)
+        drag = self.drag(near.dragged, turn)
         out = {"drag": drag}
         share = self._more_drag(t, near)
         if share is not None:
@@ -218,10 +224,12 @@ class Equations:
             a = (near.grown * np.diagonal(self.hull.added)[:3]).T
             instant = Instant(
                 self.vehicle, t, place, rotation, down, v, turn, flow, command,
-                self.hull.buoyancy, self.hull.cb, (a[2] - a[0], a[1] - a[0]),
+                self.hull.buoyancy, self.hull.cb, (a[2] - a[0], a[1] - a[0]), self.laws.separation,
             )  # fmt: skip
             for name, load, values in self.loads:
                 out[f"force of {name}"] = np.concatenate(load(values, instant), axis=-1)
+        if self.laws.wander is not None:
+            out["a wandering force"] = self.laws.wander.at(t)
         if self.strangers:
             seen = Seen(self.vehicle, t, place, rotation, flow, turn, out["thrust"])
             for name, member, values in self.strangers:

@@ -21,10 +21,12 @@ class Fins:
     Args:
         vehicle: whose fins.
         factor: on all stall angles.
+        separation: share of the lift that is c_La a cos(a) / sqrt(1 + (a / a_0)^4) instead: it stalls gently.
     """
 
-    def __init__(self, vehicle: Vehicle, factor: float = 1.0) -> None:
+    def __init__(self, vehicle: Vehicle, factor: float = 1.0, separation: float = 0.0) -> None:
         """Collect geometry."""
+        self.separation = separation
         fins = vehicle.fins
         self.place, self.axis = np.array([f.position for f in fins]), np.array([f.axis for f in fins])
         self.size = 0.5 * vehicle.water_density * np.array([f.area for f in fins])
@@ -58,6 +60,9 @@ class Fins:
         sine = np.sin(attack)
         plate = 2.0 * np.sign(sine) * sine**2 * np.cos(attack)
         lift = blend * self.slope * attack + (1.0 - blend) * plate
+        if self.separation:
+            gentle = self.slope * attack * np.cos(attack) / np.sqrt(1.0 + (attack / self.stall) ** 4)
+            lift = lift + self.separation * (gentle - lift)
         speed = np.sqrt((local * local).sum(-1))
         force = (self.size * lift * speed)[..., None] * cross(axis, local)
         return force.sum(1), cross(self.place[None] + 0 * force, force).sum(1)

@@ -37,6 +37,7 @@ class Instant:
         buoyancy: N, of the hull with what effects make of it.
         cb: its centre, m, (3,).
         stretch: A33 - A11 and A22 - A11, kg, (R,) each, of the added mass as it is at the moment.
+        separation: share of the hull's lift that fades as the hull turns broadside.
     """
 
     vehicle: Vehicle
@@ -51,6 +52,7 @@ class Instant:
     buoyancy: float
     cb: Array
     stretch: tuple[Array, Array]
+    separation: float = 0.0
 
     def to_body(self, vector: Array) -> Array:
         """Turn a world vector (R, 3) into body axes."""
@@ -70,6 +72,8 @@ def constant(values: Values, at: Instant) -> Load:
 def lift(values: Values, at: Instant) -> Load:
     """Forces and moments of the hull in u v and u w."""
     u, v, w = at.flow.T
+    ahead = u * u / np.maximum(u * u + v * v + w * w, 1e-12)
+    u = u * (1.0 - at.separation * (1.0 - ahead))
     return (
         _columns(0.0, values["Yuv"] * u * v, values["Zuw"] * u * w),
         _columns(0.0, values["Muw"] * u * w, values["Nuv"] * u * v),

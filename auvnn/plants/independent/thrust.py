@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from auvnn.plants.independent.sizes import full_effort
+from auvnn.plants.laws import USUAL, Laws
 from auvnn.vehicle import Table, Vehicle
 
 Array = NDArray[np.float64]
@@ -26,10 +27,14 @@ class Actuators:
         vehicle: whose thrusters.
         actuation: "thrusters" or "wrench".
         effects: all of them, in order.
+        laws: where the world departs from the stated curves.
     """
 
-    def __init__(self, vehicle: Vehicle, actuation: str, effects: Mapping[str, Values]) -> None:
+    def __init__(
+        self, vehicle: Vehicle, actuation: str, effects: Mapping[str, Values], laws: Laws = USUAL
+    ) -> None:
         """Collect geometry and curves."""
+        self.laws = laws
         self.vehicle, self.wrench = vehicle, actuation == "wrench"
         if self.wrench:
             self.forces, self.turns = np.eye(6)[:3], np.eye(6)[3:]
@@ -55,7 +60,7 @@ class Actuators:
     def settled(self, command: Array) -> Array:
         """Return the thrust that commands (R, n) give in the end, N."""
         if self.wrench:
-            return command
+            return self.laws.curved(command, command / self.full)
         out = np.empty_like(command)
         for i, unit in enumerate(self.vehicle.thrusters):
             c = command[:, i]
@@ -63,7 +68,7 @@ class Actuators:
                 out[:, i] = np.interp(c, unit.curve.command, unit.curve.thrust)
             else:
                 out[:, i] = np.where(c > 0, unit.max_forward * c**2, -unit.max_reverse * c**2)
-        return out
+        return self.laws.curved(out, command)
 
     def hold(self, command: Array, begin: float, end: float) -> None:
         """Take new commands (R, n) at time `begin`, s, held up to `end`."""

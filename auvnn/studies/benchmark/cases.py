@@ -39,7 +39,8 @@ class Case:
     Attributes:
         vehicle: built-in name.
         hidden: effect, several joined by "+", a stranger to the catalogue, or "nothing".
-        size: small, medium or large, one for each of several effects joined by "+"; "none" with nothing hidden.
+        size: small, medium or large, one for each of several effects joined by "+", or what it costs of the 5 s error,
+            such as "40%"; "none" with nothing hidden.
         noise: condition.
         excitation: manoeuvre.
         coefficients: "exact" or "drawn".
@@ -54,6 +55,8 @@ class Case:
         candidates: names that the diagnosis may give; None for the whole catalogue.
         kind: "effect", "several", "stranger" or "nothing".
         part: of a plan.
+        world: what departs from the model's assumptions; the usual one if empty.
+        oracle: whether it is worked out what an oracle sees that knows the world's law.
     """
 
     vehicle: str
@@ -73,6 +76,8 @@ class Case:
     candidates: tuple[str, ...] | None = None
     kind: str = "effect"
     part: str = ""
+    world: str = ""
+    oracle: bool = False
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -108,6 +113,7 @@ class Case:
 KEYS = (
     "effects", "sizes", "noises", "excitations", "vehicles", "coefficients", "repeats", "seed", "runs", "duration",
     "rate", "plants", "accelerations", "loops", "pairs", "triples", "strangers", "held_out", "ties", "candidates",
+    "worlds", "balanced", "costs", "variants", "oracle",
 )  # fmt: skip
 OF_A_PLAN = ("name", "common", "parts", "targets")
 
@@ -181,20 +187,24 @@ def _combined(options: Mapping[str, Any], part: str) -> list[Case]:
     for name in candidates:
         EFFECTS.get(name)
     repeats, seed = _count(options, "repeats"), _count(options, "seed") + _count(options, "shift")
-    out = []
-    for vehicle, plant, noise, excitation, accelerations, coefficients in itertools.product(
+    out: list[Case] = []
+    worlds = _several(options, "worlds") or [""]
+    if _count(options, "balanced"):
+        return _balanced(options, part, asked, candidates, worlds)
+    for vehicle, plant, noise, excitation, accelerations, coefficients, world in itertools.product(
         _several(options, "vehicles"),
         _several(options, "plants", "own") or ["own"],
         _several(options, "noises"),
         _manoeuvres(options),
         _several(options, "accelerations") or [None],
         _several(options, "coefficients"),
+        worlds,
     ):
         shared = dict(
             vehicle=vehicle, noise=noise, excitation=excitation, coefficients=str(coefficients), plant=str(plant),
             accelerations=accelerations, runs=int(options["runs"]), duration=float(options["duration"]),
             rate=float(options["rate"]), held_out=_count(options, "held_out"), ties=bool(options.get("ties")),
-            candidates=tuple(candidates) or None, part=part,
+            candidates=tuple(candidates) or None, part=part, world=str(world), oracle=bool(options.get("oracle")),
         )  # fmt: skip
         names = _names(asked, load_vehicle(vehicle), noise, accelerations, str(plant))
         for hidden in names:
@@ -211,6 +221,40 @@ def _combined(options: Mapping[str, Any], part: str) -> list[Case]:
                 hidden, size = together([n for n in names if n != NOTHING], sizes, count, seed + k)
                 out.append(Case(hidden=hidden, size=size, seed=seed + k, kind="several", **shared))
     return out
+
+
+def _balanced(
+    options: Mapping[str, Any],
+    part: str,
+    asked: Sequence[str],
+    candidates: Sequence[str],
+    worlds: Sequence[Any],
+) -> list[Case]:
+    """Return a part's logs where they are to be balanced: see `designs`."""
+    from auvnn.studies.benchmark.designs import balanced
+
+    plant, noise = (
+        str((_several(options, k) or [d])[0]) for k, d in (("plants", "own"), ("noises", "realistic"))
+    )
+    accelerations = (_several(options, "accelerations") or [None])[0]
+    shared = dict(
+        noise=noise, coefficients=str(options["coefficients"]), plant=plant, accelerations=accelerations,
+        runs=int(options["runs"]), duration=float(options["duration"]), rate=float(options["rate"]),
+        held_out=_count(options, "held_out"), ties=bool(options.get("ties")), candidates=tuple(candidates) or None,
+        part=part, world=str(worlds[0]), oracle=bool(options.get("oracle")),
+    )  # fmt: skip
+    variants = [dict(v) for v in _several(options, "variants")] or [{"world": str(w)} for w in worlds]
+    for variant in variants:
+        for key in variant:
+            if key not in ("world", "rate", "excitation", "noise"):
+                raise ConfigError(unknown_name("key of a variant", str(key), ("world", "rate", "noise")))
+    vehicles = [str(v) for v in _several(options, "vehicles")]
+    able = {v: set(can_be_hidden(load_vehicle(v), noise, accelerations, plant)) for v in vehicles}
+    return balanced(
+        asked, _count(options, "balanced"), [float(c) for c in _several(options, "costs")], vehicles,
+        _several(options, "loops") or list(LOOPS), variants, _count(options, "seed") + _count(options, "shift"),
+        lambda name, vehicle: name in able[vehicle], shared, [str(e) for e in _several(options, "excitations")],
+    )  # fmt: skip
 
 
 def apart(name: str) -> int:

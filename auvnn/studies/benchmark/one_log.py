@@ -17,6 +17,8 @@ from auvnn.studies.benchmark.strangers import axis_of, said_axis, sized_stranger
 
 # The plant's step, s: the error of 2e-5 m/s that the longer one leaves is far below any noise, but not below none.
 STEP_WITHOUT_NOISE, STEP_WITH_NOISE = 0.01, 0.025
+# At least so many samples per second where an effect of a stated cost is sized.
+SIZING_RATE = 20.0
 
 
 def run_case(case: Case) -> dict[str, Any]:
@@ -73,11 +75,14 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
     step = STEP_WITHOUT_NOISE if case.noise == "none" else STEP_WITH_NOISE
     # Only an independent plant is named: a package without any has its own equations alone.
     more: dict[str, Any] = {} if case.plant == "own" else {"plant": case.plant}
+    if case.world:
+        more["world"] = case.world
     if case.accelerations is not None:
         more["accelerations"] = case.accelerations
     # Further runs of the same plant follow those that are diagnosed; they do not change them.
     whole = {**conditions(case), **more, "runs": case.runs + case.held_out}
     made = simulate(model, hidden=hidden, coefficients=case.coefficients, max_step=step, **whole)
+    begun["world_law"] = made.truth.get("world")
     numbers = [run.number for run in made.log.runs]
     log = made.log.select(numbers[: case.runs]) if case.held_out else made.log
     simulated = time.monotonic()
@@ -139,9 +144,20 @@ def _hidden(case: Case, model: Any) -> dict[str, dict[str, float]]:
         return {case.hidden: sized_stranger(model, case.hidden, case.size, **how)}
     logged = make_noise(case.noise).accelerations if case.accelerations is None else case.accelerations
     return {
-        name: sized(model, name, size, **conditions(case), accelerations=logged)
+        name: _costly(case, model, name, size)
+        if size.endswith("%")
+        else sized(model, name, size, **conditions(case), accelerations=logged)
         for name, size in zip(case.effects, case.sizes, strict=True)
     }
+
+
+def _costly(case: Case, model: Any, name: str, size: str) -> dict[str, float]:
+    """Return an effect of a stated cost, found at a moderate rate: commands between samples would only take time."""
+    from auvnn.studies.benchmark.costs import costly
+
+    world = {"name": case.world, "control_rate": 0.0} if case.world else None
+    how = {**conditions(case), "rate": max(case.rate, SIZING_RATE), "coefficients": case.coefficients}
+    return costly(model, name, 0.01 * float(size[:-1]), plant=case.plant, world=world, **how)
 
 
 def _ties(case: Case, model: Any, log: Any, truth: Mapping[str, Any], found: Any) -> dict[str, Any]:
