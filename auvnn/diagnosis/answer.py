@@ -39,6 +39,8 @@ class Diagnosis(Answer):
     acts_in: dict[str, float] = field(default_factory=dict)
     nearest: list[str] = field(default_factory=list)
     whole_log: dict[str, Any] | None = None
+    left: dict[str, dict[str, float]] = field(default_factory=dict)
+    commands: dict[str, Any] | None = None
 
     @property
     def surfaces(self) -> list[dict[str, Any]]:
@@ -74,6 +76,8 @@ class Diagnosis(Answer):
             "residual_tests",
             "story",
             "whole_log",
+            "left",
+            "commands",
         )
         absorbed = None if self.absorbed is None else self.absorbed.to_dict()
         return plain(

@@ -8,6 +8,7 @@ from auvnn.diagnosis.answer import Diagnosis
 from auvnn.diagnosis.cut import candidates_for, windows_for
 from auvnn.diagnosis.doubts import doubts
 from auvnn.diagnosis.learned_drag import reduced
+from auvnn.diagnosis.noise_law_answer import beside_what_is_left
 from auvnn.diagnosis.nuisance import lay_out
 from auvnn.diagnosis.search import Search
 from auvnn.errors import ConfigError, InputError
@@ -94,6 +95,7 @@ def searched(
     layout = lay_out(known, usable, spread)
     search = Search(layout, windows, usable, say, advice, whiteness)
     found = search.run(model, log, needs, max_effects)
+    found, search = beside_what_is_left(found, search, model, log, needs, max_effects)
     if spread is not None:
         found.warnings.append(LEARNED)
     found.absorbed = absorption(model, log)

@@ -117,7 +117,9 @@ def force_sums(explanation: Explanation, windows: Windows, sigma: Array, cell: f
     statistics, _, _ = reduce(windows, joined(), sigma)
     force = 0.02 * float(vehicle.mass) * float(vehicle.gravity)
     steps = (times[:, 1:] - times[:, :-1]).numpy()
-    runs = [float(times[windows.run == r].max() - times[windows.run == r].min()) for r in np.unique(windows.run)]
+    runs = [
+        float(times[windows.run == r].max() - times[windows.run == r].min()) for r in np.unique(windows.run)
+    ]
     shortest = 2.0 * float(np.median(steps[steps > 0]))
     priors = fitted.priors
     return ForceSums(
@@ -178,7 +180,9 @@ class Likelihood:
             inner = inner + torch.eye(len(own), dtype=inner.dtype)
             root = torch.linalg.cholesky(inner)
             half = torch.linalg.solve_triangular(root, right, upper=False)
-            value += float(2.0 * torch.log(torch.diagonal(root, dim1=-2, dim2=-1)).sum() - (half[..., 0] ** 2).sum())
+            value += float(
+                2.0 * torch.log(torch.diagonal(root, dim1=-2, dim2=-1)).sum() - (half[..., 0] ** 2).sum()
+            )
             along = (half[..., 1:].mT @ half).sum(0).numpy()
             square, slope = square - along[:, 1:], slope - along[:, 0]
         pull = slope - self.precision * self.away
@@ -192,7 +196,9 @@ class Likelihood:
         mean = (factor @ white).squeeze(-1)
         spread = factor @ torch.cholesky_inverse(root) @ factor.mT
         second = (spread.sum(0) + mean.mT @ mean).numpy()
-        blocks = np.stack([second[k * size : (k + 1) * size, k * size : (k + 1) * size] for k in range(len(axes))])
+        blocks = np.stack(
+            [second[k * size : (k + 1) * size, k * size : (k + 1) * size] for k in range(len(axes))]
+        )
         return value, step, square, mean.numpy(), blocks
 
     def sloped(self, axes: Sequence[int], x: Array) -> tuple[float, Array]:
@@ -227,8 +233,12 @@ class Likelihood:
             start: to begin from, by default the best of a few sizes.
         """
         axes = list(axes)
-        low = np.concatenate([np.log(1e-4 * self.sums.sizes[axes]), np.full(len(axes), np.log(self.sums.times[0]))])
-        high = np.concatenate([np.log(1e2 * self.sums.sizes[axes]), np.full(len(axes), np.log(self.sums.times[1]))])
+        low = np.concatenate(
+            [np.log(1e-4 * self.sums.sizes[axes]), np.full(len(axes), np.log(self.sums.times[0]))]
+        )
+        high = np.concatenate(
+            [np.log(1e2 * self.sums.sizes[axes]), np.full(len(axes), np.log(self.sums.times[1]))]
+        )
         if start is None:
             start = self._start(axes)
         found = minimize(
@@ -275,7 +285,9 @@ def estimate(sums: ForceSums, start: ForceLaw | None = None, only: Sequence[int]
         gains = []
         for k in range(count):
             rest = [j for j in range(count) if j != k]
-            law = likelihood.law([axes[j] for j in rest], np.exp(x[rest]), np.exp(x[[count + j for j in rest]]))
+            law = likelihood.law(
+                [axes[j] for j in rest], np.exp(x[rest]), np.exp(x[[count + j for j in rest]])
+            )
             gains.append(likelihood.of(law if rest else None)[0] - plain)
             p_values[axes[k]] = boundary_p_value(gains[-1])
         weakest = int(np.argmin(gains))

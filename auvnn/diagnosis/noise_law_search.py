@@ -35,7 +35,8 @@ from auvnn.training.window_sums import answers, reduce, spread
 Array = NDArray[np.float64]
 # A name is given where chance would seldom do as well among all effects that were asked for.
 ALPHA_NAME = 0.01
-# Fitted in full: so many of those that lead with the force's variance, and with it at zero; and judged by laws of their own.
+# Fitted in full: so many of those that lead with the force's variance, and with it at zero; and so many are judged by
+# laws of their own.
 LEADERS, WITHOUT, JUDGED = 4, 2, 3
 # Members of a group that the log cannot tell apart, at most.
 GROUP = 3
@@ -76,6 +77,8 @@ class BesideForce:
         estimate: the law.
         tried: all that were fitted at first, the best first.
         p_value: of there being nothing with a name.
+        first: the fit without any name, under the law of the force.
+        first_law: that law.
     """
 
     steps: list[dict[str, Any]]
@@ -85,6 +88,8 @@ class BesideForce:
     estimate: Estimate
     tried: list[Explanation]
     p_value: float
+    first: Explanation
+    first_law: ForceLaw | None
 
     @property
     def names(self) -> list[str]:
@@ -198,9 +203,7 @@ class ForceSearch:
                 tried = fitted
             found = [self.judged(e, law) for e in fitted[:JUDGED]]
             found.sort(key=lambda h: -h.evidence)
-            sure = {
-                h.name: min(1.0, len(remaining) * self._p_value(h, current)) for h in found
-            }
+            sure = {h.name: min(1.0, len(remaining) * self._p_value(h, current)) for h in found}
             if not chosen:
                 whole = min([tested.p_value, *sure.values()], default=1.0)
             good = [
@@ -216,7 +219,13 @@ class ForceSearch:
             if len(group) > GROUP:
                 break
             names = [h.name for h in group]
-            steps.append({"verdict": "ambiguous" if len(group) > 1 else "named", "effects": names, "p_value": sure[best.name]})
+            steps.append(
+                {
+                    "verdict": "ambiguous" if len(group) > 1 else "named",
+                    "effects": names,
+                    "p_value": sure[best.name],
+                }
+            )
             if len(group) > 1:
                 groups.append(names)
             current = self._taken(group[0])
@@ -225,7 +234,15 @@ class ForceSearch:
         law = current.estimate.law
         assert law is not None
         return BesideForce(
-            steps, groups, current.explanation, replace(self.windows, law=law), current.estimate, tried, whole
+            steps,
+            groups,
+            current.explanation,
+            replace(self.windows, law=law),
+            current.estimate,
+            tried,
+            whole,
+            null.explanation,
+            null.estimate.law,
         )
 
     def _p_value(self, after: Hypothesis, before: Hypothesis) -> float:
@@ -268,8 +285,8 @@ class ForceSearch:
             guess = at.model.rebuilt(at.model.copied_effects())
             set_parameters(guess, [name], np.where(shape, start, known + share * (start - known)))
             found = explain(
-                self.layout, under, base, [*chosen, name], start=current.explanation.fitted, guess=replace(at, model=guess),
-                sigma=self.sigma, iterations=STEPS,
+                self.layout, under, base, [*chosen, name], start=current.explanation.fitted,
+                guess=replace(at, model=guess), sigma=self.sigma, iterations=STEPS,
             )  # fmt: skip
             if best is None or found.fitted.cost < best.fitted.cost:
                 best = found
@@ -330,5 +347,8 @@ class ForceSearch:
             current = other
             step = next(s for s in steps if name in s["effects"])
             groups = [g for g in groups if name not in g]
-            steps = [*steps, {"verdict": "withdrawn", "effects": list(step["effects"]), "p_value": step["p_value"]}]
+            steps = [
+                *steps,
+                {"verdict": "withdrawn", "effects": list(step["effects"]), "p_value": step["p_value"]},
+            ]
         return current, steps, groups

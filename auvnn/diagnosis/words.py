@@ -33,6 +33,15 @@ def parameters(candidate: dict[str, Any]) -> str:
     )
 
 
+def stochastic(left: dict[str, dict[str, float]]) -> str:
+    """Return the stochastic force that is left as a sentence."""
+    parts = [
+        f"{MOTIONS[axis]} {told['rms']:.2g} {'N' if axis in 'XYZ' else 'N m'} over {told['correlation_time']:.2g} s"
+        for axis, told in left.items()
+    ]
+    return f"A stochastic force is left (rms, correlation time): {', '.join(parts)}."
+
+
 def tell(diagnosis: Diagnosis) -> list[str]:
     """Return the diagnosis as a few sentences."""
     by_name = {c["effect"]: c for c in diagnosis.candidates}
@@ -73,6 +82,14 @@ def tell(diagnosis: Diagnosis) -> list[str]:
         first, *others = (f"{MOTIONS[axis]} ({axis})" for axis in diagnosis.acts_in)
         also = f", and shows in {' and '.join(others)} too" if others else ""
         lines.append(f"It acts in {first}{also}.")
+    if diagnosis.left:
+        lines.append(stochastic(diagnosis.left))
+    if diagnosis.commands and diagnosis.commands["between_samples"] != "held":
+        lines.append(
+            "Commands change between the log's samples: the mean of an interval was taken as "
+            f"{1 - diagnosis.commands['share_of_next']:.0%} of its own sample's and "
+            f"{diagnosis.commands['share_of_next']:.0%} of the next one's."
+        )
     if diagnosis.depends_on:
         strong = []
         for axis, shares in diagnosis.depends_on.items():

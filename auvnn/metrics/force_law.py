@@ -60,7 +60,10 @@ class ForceLaw:
         if self.plain:
             return np.broadcast_to(np.eye(self.cells), (len(self.axes), self.cells, self.cells))
         return np.stack(
-            [self.rms[i] * np.linalg.cholesky(correlation(self.cells, self.cell, self.time[i])) for i in self.axes]
+            [
+                self.rms[i] * np.linalg.cholesky(correlation(self.cells, self.cell, self.time[i]))
+                for i in self.axes
+            ]
         )
 
     def cell_of(self, since: Array) -> NDArray[np.int64]:

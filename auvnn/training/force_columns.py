@@ -30,7 +30,8 @@ class UnitPush(Effect):
         """Make the wrench, at nought."""
         super().__init__(
             tuple(
-                Parameter(axis, "N" if i < 3 else "N m", 0.0, 1.0, -1e12, 1e12) for i, axis in enumerate("XYZKMN")
+                Parameter(axis, "N" if i < 3 else "N m", 0.0, 1.0, -1e12, 1e12)
+                for i, axis in enumerate("XYZKMN")
             )
         )
 
@@ -81,6 +82,9 @@ class Cells:
 
     def _by_cell(self, slope: Tensor, member: Tensor) -> Tensor:
         return torch.cat(
-            [slope[..., axis, None] * (member @ self.factors[k])[:, :, None, :] for k, axis in enumerate(self.axes)],
+            [
+                slope[..., axis, None] * (member @ self.factors[k])[:, :, None, :]
+                for k, axis in enumerate(self.axes)
+            ],
             dim=-1,
         )

@@ -131,7 +131,9 @@ def respond_by(
         seen = replace(seen, parts=[cells.part(at, slope, 12 + total) for at, slope in seen.parts])
     for begin in range(0, count, size):
         part = slice(begin, begin + size)
-        sensitivity = _propagate(along[0][part], along[1][part], points[1][part], points[2][part], steps[part])
+        sensitivity = _propagate(
+            along[0][part], along[1][part], points[1][part], points[2][part], steps[part]
+        )
         state, parameters = _outputs(seen, part, sensitivity)
         mask = windows.mask[part, :, : state.shape[-2]].unsqueeze(-1)
         state, parameters, force = state.mul_(mask), parameters.mul_(mask), None

@@ -213,7 +213,11 @@ def cost_of(responses: Iterable[Response], sigma: Array) -> float:
 
 def _cost(response: Response, weight: Tensor) -> float:
     """Return the weighted squared error, of which a stochastic force takes what it is likely to."""
-    return float(((response.error * weight) ** 2).sum()) if response.force is None else cost_beside_force(response, weight)
+    return (
+        float(((response.error * weight) ** 2).sum())
+        if response.force is None
+        else cost_beside_force(response, weight)
+    )
 
 
 def spread(statistics: Statistics, floor: Array, parameters: int) -> Array:

@@ -1,0 +1,133 @@
+"""What a diagnosis asks where its first search leaves a force: of commands between samples, and of a stochastic force.
+
+Where the first search leaves nothing, its answer stands as it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from auvnn.diagnosis.answer import Diagnosis
+from auvnn.diagnosis.any_force import any_force, white
+from auvnn.diagnosis.command_holding import Holding, between, holding
+from auvnn.diagnosis.foretold import foretold
+from auvnn.diagnosis.noise_law import ALPHA_BOUNDARY, left
+from auvnn.diagnosis.noise_law_search import BesideForce, ForceSearch
+from auvnn.diagnosis.null_tests import NullTests
+from auvnn.diagnosis.search import Search
+from auvnn.diagnosis.table import values
+from auvnn.logs import Log
+from auvnn.models import GreyBox
+
+# Share of a degree of freedom's force that measured inputs may foretell (lower 95 % limit) before it is no noise.
+FORETOLD = 0.1
+
+
+def beside_what_is_left(
+    found: Diagnosis, search: Search, model: GreyBox, log: Log, needs: dict[str, list[str]], most: int
+) -> tuple[Diagnosis, Search]:
+    """Return the answer and the search that led to it, once what is left has been asked for.
+
+    Args:
+        found: of the first search.
+        search: the first one.
+        model: as known.
+        log: measurements.
+        needs: effects wanted, and the channels that the log lacks for them.
+        most: look for at most so many effects.
+    """
+    if found.verdict == "adequate" or search.first is None:
+        return found, search
+    held = _held(search)
+    if held.share > 0.0:
+        search.say(f"commands change between samples ({held.name}): searching again")
+        windows = between(search.windows, held.share)
+        search = Search(search.layout, windows, search.usable, search.say, search.advice, search.whiteness)
+        found = search.run(model, log, needs, most)
+    found.commands = held.to_dict()
+    return _beside_force(found, search, most), search
+
+
+def _held(search: Search) -> Holding:
+    """Return how commands go between samples; held where an effect explains more than anything else would."""
+    assert search.first is not None
+    asked = holding(search.first, search.windows)
+    if asked.share == 0.0:
+        return asked
+    search.say("asking whether an effect explains more than commands between samples")
+    tested = NullTests(search.layout, search.windows, search.say)(
+        search.first, search.usable, search.base, []
+    )
+    most = max(((s.gain - s.degrees) / s.inflation for s in tested.scores.values() if s.degrees), default=0.0)
+    return asked if asked.gain > most else replace(asked, name="held", share=0.0, odds=0.0, gain=0.0)
+
+
+def _beside_force(found: Diagnosis, search: Search, most: int) -> Diagnosis:
+    """Return the answer with the stochastic force that is left, and the names that stand beside it."""
+    last = found.explanation
+    assert last is not None and search.first is not None
+    noise = white(last, search.floor)
+    if any_force(last, search.windows, noise).p_value >= ALPHA_BOUNDARY:
+        return found
+    beside = ForceSearch(search.layout, search.windows, search.usable, search.base, search.floor, search.say)
+    null = beside.begin(search.first, white(search.first, search.floor))
+    if null is None:
+        return found
+    result = beside.run(null, [c["effect"] for c in found.candidates], most)
+    search.say("asking how much of the force measured inputs foretell")
+    told = foretold(result.last, result.windows)
+    found.left = left(result.estimate.law)
+    if told is not None and told.least > FORETOLD:
+        found.left = {}
+        found.warnings.append(
+            f"{told.input} foretells {told.share:.0%} of the force in {told.axis} that is left "
+            f"(at least {told.least:.0%}): it is no chance, and has no name"
+        )
+        return found
+    return _answer(found, search, result)
+
+
+def _answer(found: Diagnosis, search: Search, result: BesideForce) -> Diagnosis:
+    """Put what was found beside the force in the place of what the first search found."""
+    gone = {e for s in result.steps if s["verdict"] == "withdrawn" for e in s["effects"]}
+    given = [e for e in result.names if e not in gone]
+    end: dict[str, Any] = {"verdict": "unknown", "effects": [], "p_value": found.global_p_value}
+    standing = [s for s in result.steps if s["verdict"] != "withdrawn" and not {*s["effects"]} <= gone]
+    steps = [*result.steps, end]
+    if standing:
+        # What is left beside the names is stochastic, and told as such.
+        steps = list(result.steps)
+    leading = standing[0] if standing else end
+    by_name = {c["effect"]: c for c in found.candidates}
+    for explanation in (*result.tried, result.last):
+        if not explanation.effects:
+            continue
+        for name, parameters in values(search.layout, explanation, explanation.effects).items():
+            if name in by_name:
+                by_name[name]["parameters"] = parameters
+    order = [c for n in given for c in [by_name[n]]] + [
+        c for c in found.candidates if c["effect"] not in given
+    ]
+    missing = leading["effects"] if leading["verdict"] == "ambiguous" else given
+    return replace(
+        found,
+        verdict=leading["verdict"],
+        missing=list(missing),
+        steps=steps,
+        candidates=order,
+        explanation=result.last,
+        nearest=[] if given else found.nearest,
+        unexplained=found.unexplained if not given else float(np.clip(_share_left(result), 0.0, 1.0)),
+    )
+
+
+def _share_left(result: BesideForce) -> float:
+    """Return the stochastic force's share of what was above noise before any name."""
+    before, law = result.first_law, result.estimate.law
+    if law is None or before is None:
+        return 0.0
+    known = before.rms > 0.0
+    return float(((law.rms[known] / before.rms[known]) ** 2).mean())
