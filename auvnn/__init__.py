@@ -30,12 +30,14 @@ __all__ = [
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from auvnn.diagnosis import add, compare, diagnose, diagnose_files, fleet
+    from auvnn.comparison import compare
+    from auvnn.diagnosis import diagnose, diagnose_files
+    from auvnn.improvement import add, fleet
     from auvnn.logs import Log
-    from auvnn.logs.quality import Quality
+    from auvnn.logs.quality.quality import Quality
     from auvnn.models import GreyBox, load, remove
     from auvnn.online import adapt
-    from auvnn.simulate import simulate
+    from auvnn.simulation import simulate
     from auvnn.training import train, train_files
     from auvnn.vehicle import Vehicle
 
@@ -52,7 +54,7 @@ _WHERE = {
     "fleet": "auvnn.diagnosis",
     "load": "auvnn.models",
     "remove": "auvnn.models",
-    "simulate": "auvnn.simulate",
+    "simulate": "auvnn.simulation",
     "train": "auvnn.training",
     "train_files": "auvnn.training",
 }

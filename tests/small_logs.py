@@ -10,7 +10,7 @@ import torch
 
 from auvnn.effects import Sensed
 from auvnn.logs import Log, Run
-from auvnn.logs.rotation import multiply
+from auvnn.logs.signals.rotation import multiply
 from auvnn.models import GreyBox, Inputs
 from auvnn.physics.attitude import quat_to_matrix
 from auvnn.testing import plain_vehicle
@@ -32,14 +32,18 @@ def small_vehicle(uncertainty: float | Mapping[str, float] = 0.1, **changes: Any
         "center_of_gravity": [0.0, 0.0, 0.04],
         "linear_damping": [25.0, 35.0, 40.0, 4.0, 5.0, 5.0],
         "quadratic_damping": [40.0, 60.0, 80.0, 4.0, 5.0, 6.0],
-        "thrusters": [{"position": p, "direction": d, "max_forward": 40.0, "max_reverse": 40.0}
-                      for p, d in [*horizontal, *vertical]],
+        "thrusters": [
+            {"position": p, "direction": d, "max_forward": 40.0, "max_reverse": 40.0}
+            for p, d in [*horizontal, *vertical]
+        ],
         "uncertainty": dict(each),
     }
     return plain_vehicle(**{**plain, **changes})
 
 
-def sines(t: np.ndarray, columns: int, seed: int, low: float = 0.04, high: float = 0.35, lines: int = 7) -> np.ndarray:
+def sines(
+    t: np.ndarray, columns: int, seed: int, low: float = 0.04, high: float = 0.35, lines: int = 7
+) -> np.ndarray:
     """Return random-phase sums of sines of unit standard deviation, (N, columns)."""
     random = np.random.default_rng(seed)
     edges = np.linspace(low, high, lines + 1)
@@ -96,11 +100,15 @@ def make_log(
         heading = random.uniform(-np.pi, np.pi)
         times.append(t)
         commands.append(held)
-        starts.append([0.0, 0.0, 5.0, np.cos(heading / 2), 0.0, 0.0, np.sin(heading / 2), *stir * random.normal(size=6)])
+        starts.append(
+            [0.0, 0.0, 5.0, np.cos(heading / 2), 0.0, 0.0, np.sin(heading / 2), *stir * random.normal(size=6)]
+        )
     t, held, start = (torch.tensor(np.stack(x)) for x in (times, commands, starts))
     with torch.no_grad():
         run = model.rollout(start[:, :7], start[:, 7:], held, t, max_step=max_step, engine="firm")
-        rate_of = model.nu_dot(run.eta[..., :3], quat_to_matrix(run.eta[..., 3:]), run.nu, run.thrust, Inputs(held), t)
+        rate_of = model.nu_dot(
+            run.eta[..., :3], quat_to_matrix(run.eta[..., 3:]), run.nu, run.thrust, Inputs(held), t
+        )
         seen = model.sense(Sensed(run.eta[..., :3], run.eta[..., 3:], run.nu, rate_of))
     assert not run.diverged and seen.nu_dot is not None
     made = []
@@ -108,12 +116,18 @@ def make_log(
         count = t.shape[1]
         turn = noise * NOISE["attitude"] / 2 * random.normal(size=(count, 3))
         small = np.concatenate([np.sqrt(1 - (turn**2).sum(1, keepdims=True)), turn], axis=1)
-        made.append(Run(
-            first + i, times[i], multiply(seen.quaternion[i].numpy(), small),
-            seen.nu[i].numpy() + noise * NOISE["nu"] * random.normal(size=(count, 6)),
-            nu_dot=seen.nu_dot[i].numpy() + noise * NOISE["nu_dot"] * random.normal(size=(count, 6))
-            if accelerations else None,
-            position=seen.position[i].numpy() + noise * NOISE["position"] * random.normal(size=(count, 3)),
-            **{model.actuation: commands[i]},
-        ))
+        made.append(
+            Run(
+                first + i,
+                times[i],
+                multiply(seen.quaternion[i].numpy(), small),
+                seen.nu[i].numpy() + noise * NOISE["nu"] * random.normal(size=(count, 6)),
+                nu_dot=seen.nu_dot[i].numpy() + noise * NOISE["nu_dot"] * random.normal(size=(count, 6))
+                if accelerations
+                else None,
+                position=seen.position[i].numpy()
+                + noise * NOISE["position"] * random.normal(size=(count, 3)),
+                **{model.actuation: commands[i]},
+            )
+        )
     return Log.from_runs(made, name=f"made-{seed}")

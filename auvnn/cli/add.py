@@ -6,8 +6,8 @@ from auvnn.cli.job import Answering, Job, Verb
 
 
 def _run(job: Job) -> Answering:
-    from auvnn.diagnosis import add
-    from auvnn.diagnosis.words import parameters
+    from auvnn.diagnosis.answers.words import parameters
+    from auvnn.improvement import add
 
     effects, log, test = job.names("effect"), job.log(), job.held_out()
     model, say = job.model(log), job.say

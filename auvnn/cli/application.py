@@ -64,7 +64,9 @@ def run_verb(name: str, verb: Verb, arguments: list[str]) -> int:
             ended = run_jobs(name, flags, overrides, out, words.jobs)
         elif words.multirun:
             # A launcher may run jobs in other processes, on other machines: how they ended comes back by files.
-            tally = Path(stack.enter_context(tempfile.TemporaryDirectory()) if config.dry_run else out).absolute()
+            tally = Path(
+                stack.enter_context(tempfile.TemporaryDirectory()) if config.dry_run else out
+            ).absolute()
             arguments = [*words.flags, *overrides, *places]
             with statuses(tally, len(jobs)) as ended:
                 _launched(name, arguments, partial(_counted, name, verb, composer, tally))

@@ -11,7 +11,7 @@ def _run(job: Job) -> Answering:
     log = job.log(repairs=False)  # they are findings too
     quality = log.quality()
     if job["model"] is not None:
-        from auvnn.diagnosis import check_actuators
+        from auvnn.checks import check_actuators
 
         checked = check_actuators(job.model(log), log)
         quality = quality.with_actuators(checked)

@@ -7,7 +7,7 @@ from auvnn.cli.results import horizons
 
 
 def _run(job: Job) -> Answering:
-    from auvnn.diagnosis import compare
+    from auvnn.comparison import compare
 
     log = job.log()
     comparison = compare(job.model(log), log, horizons=job["horizons"], derivative=job["derivative"])

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def _run(job: Job) -> Answering:
-    from auvnn.logs.portions import is_large
+    from auvnn.logs.reading.portions import is_large
 
     parted = job["stream"]
     if parted is None:
@@ -34,8 +34,8 @@ def _in_memory(job: Job) -> Diagnosis:
 
 
 def _in_parts(job: Job) -> Diagnosis:
-    from auvnn.diagnosis.many import diagnose_files
-    from auvnn.logs.portions import kind_of
+    from auvnn.diagnosis.full_data.large_logs import diagnose_files
+    from auvnn.logs.reading.portions import kind_of
 
     if job["max_duration"] is not None:
         raise ConfigError("max_duration= reads the beginning of each file: leave it out, or say stream=false")
@@ -56,7 +56,7 @@ def _options(job: Job) -> dict[str, Any]:
 
 
 def _shares(job: Job) -> dict[str, Any]:
-    from auvnn.diagnosis.many import LEADING, WINDOWS
+    from auvnn.diagnosis.full_data.large_logs import LEADING, WINDOWS
 
     usual = {"windows": WINDOWS, "leading": LEADING}
     amounts = {k: {None: most, "all": None}.get(job[k], job[k]) for k, most in usual.items()}

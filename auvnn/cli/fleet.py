@@ -6,8 +6,8 @@ from auvnn.cli.job import Answering, Job, Verb, files
 
 
 def _run(job: Job) -> Answering:
-    from auvnn.diagnosis import fleet
-    from auvnn.logs.portions import kind_of
+    from auvnn.improvement import fleet
+    from auvnn.logs.reading.portions import kind_of
 
     paths, mapping = files(job.options, "log"), job.mapping()
     job.say(f"log       {len(paths)} dives")

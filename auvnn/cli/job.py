@@ -150,7 +150,7 @@ def files(options: dict[str, Any], key: str) -> list[Path]:
         raise ConfigError(f"{key}={value}: a path is needed, or a list of paths")
     paths = [Path(str(v)).expanduser() for v in values]
     if key in ("log", "test") and any(p.is_dir() or set(str(p)) & set("*?[") for p in paths):
-        from auvnn.logs.portions import log_files
+        from auvnn.logs.reading.portions import log_files
 
         paths = log_files(paths)
     for path in paths:

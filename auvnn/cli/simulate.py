@@ -20,7 +20,7 @@ class _Truth:
 
 def _run(job: Job) -> Answering:
     from auvnn.logs.writing import write_commands
-    from auvnn.simulate import simulate
+    from auvnn.simulation import simulate
 
     model = job.model()
     hidden = _sized(job, model, _named(job))

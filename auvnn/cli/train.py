@@ -24,7 +24,10 @@ def _run(job: Job) -> Answering:
     job.warn([warning for warning in data["warnings"] if warning not in training.model.vehicle.warnings])
     job.say(f"trained   {data['metrics']['iterations']} iterations: {data['stopped']}")
     for when in ("before", "after"):
-        scores = {name: data["metrics"][f"held_out_r2_{name}_{when}"] for name in ["du", "dv", "dw", "dp", "dq", "dr"]}
+        scores = {
+            name: data["metrics"][f"held_out_r2_{name}_{when}"]
+            for name in ["du", "dv", "dw", "dp", "dq", "dr"]
+        }
         shown = ", ".join(f"{n} {'unknown' if v is None else format(v, '.3f')}" for n, v in scores.items())
         job.say(f"result    held-out one-step R2 {when}: {shown}")
     free = [data["metrics"].get(f"held_out_rollout_5_s_total_{when}") for when in ("one_step", "after")]
@@ -35,7 +38,7 @@ def _run(job: Job) -> Answering:
 
 def _parted(job: Job) -> bool:
     """Say whether the log is read in parts: as told, or where it is large and the fit can be spread."""
-    from auvnn.logs.portions import is_large
+    from auvnn.logs.reading.portions import is_large
     from auvnn.training.train_files import spreads
 
     if job["stream"] is not None or job["max_duration"] is not None:
@@ -51,7 +54,7 @@ def _in_memory(job: Job) -> Any:
 
 
 def _in_parts(job: Job) -> Any:
-    from auvnn.logs.portions import kind_of
+    from auvnn.logs.reading.portions import kind_of
     from auvnn.training import train_files
 
     if job["max_duration"] is not None:
@@ -68,7 +71,12 @@ def _options(job: Job) -> dict[str, Any]:
     if job["overwrite"] and not job["resume"]:
         shutil.rmtree(job.checkpoint, ignore_errors=True)
     same = {key: job[key] for key in ("scheme", "damping", "objective", "seed", "derivative", "force")}
-    return {**same, "checkpoint": job.checkpoint, "resume": job["resume"] or False, "progress": job.say.progress}
+    return {
+        **same,
+        "checkpoint": job.checkpoint,
+        "resume": job["resume"] or False,
+        "progress": job.say.progress,
+    }
 
 
 VERB = Verb(

@@ -68,7 +68,9 @@ class Words:
                 raise ConfigError(_unknown(word))
         multirun = "--multirun" in flags or "-m" in flags
         if jobs and not multirun:
-            raise ConfigError("-j runs many jobs at a time: it needs --multirun and a list, such as seed=0,1,2")
+            raise ConfigError(
+                "-j runs many jobs at a time: it needs --multirun and a list, such as seed=0,1,2"
+            )
         return cls(
             flags,
             overrides,

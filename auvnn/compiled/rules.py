@@ -39,7 +39,10 @@ def _move(r: Recorder, func: Any, args: tuple[Any, ...], kwargs: dict) -> Tensor
     """Let torch move the nodes' numbers as it moves the elements."""
     name = func._schema.name.removeprefix("aten::")
     if name == "constant_pad_nd":
-        given: list[Any] = [*args, kwargs.get("value", 0)]  # x, padding, and the value if it was given by place
+        given: list[Any] = [
+            *args,
+            kwargs.get("value", 0),
+        ]  # x, padding, and the value if it was given by place
         return aten.constant_pad_nd(r.nodes(given[0]), given[1], r.scalars.constant(float(given[2])))
     positions = {"index_select": (2,), "gather": (2,), "index": (1,)}.get(name, ())
 

@@ -48,7 +48,9 @@ class Region:
             low, high = _six(data["low"]), _six(data["high"])
             if low and high and all(a <= b for a, b in zip(low, high, strict=True)):
                 return cls(low, high)
-        raise ModelError(f"{where}: trained_region must hold low and high, six numbers each: save the model again")
+        raise ModelError(
+            f"{where}: trained_region must hold low and high, six numbers each: save the model again"
+        )
 
     def to_dict(self) -> dict[str, list[float]]:
         """Return plain data for `model.yaml`."""

@@ -1,13 +1,13 @@
 """Where a model fails, which effect is missing, and how much better it gets with it."""
 
-from auvnn.diagnosis.actuators import ActuatorCheck, check_actuators
-from auvnn.diagnosis.answer import Diagnosis
-from auvnn.diagnosis.compare import Comparison, compare
+from auvnn.checks.actuators import ActuatorCheck, check_actuators
+from auvnn.comparison.compare import Comparison, compare
+from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.diagnose import diagnose
-from auvnn.diagnosis.fleet import Fleet, fleet
-from auvnn.diagnosis.improve import Improvement, add
-from auvnn.diagnosis.many import diagnose_files
-from auvnn.diagnosis.rank_one_step import Ranked, rank_one_step
+from auvnn.diagnosis.full_data.large_logs import diagnose_files
+from auvnn.diagnosis.one_step.rank import Ranked, rank_one_step
+from auvnn.improvement.add import Improvement, add
+from auvnn.improvement.fleet import Fleet, fleet
 
 __all__ = [
     "ActuatorCheck",

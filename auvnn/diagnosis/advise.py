@@ -20,14 +20,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.explain import Explanation
-from auvnn.diagnosis.nuisance import Layout, priors
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.layout import Layout, priors
+from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
 from auvnn.logs import Log, Run
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox, Inputs
-from auvnn.simulate.manoeuvres import Manoeuvred, manoeuvres
-from auvnn.training.window_sums import Statistics, answers, reduce
+from auvnn.simulation.manoeuvres import Manoeuvred, manoeuvres
 
 Array = NDArray[np.float64]
 # One run of this length and rate stands for each manoeuvre, s and Hz.
@@ -95,7 +95,7 @@ WORDS = {
 def advise(
     model: GreyBox,
     layout: Layout,
-    rivals: Sequence[Explanation],
+    rivals: Sequence[FittedHypothesis],
     cut: tuple[float, float],
     progress: Callable[[str], None] | None = None,
     seed: int = 0,
@@ -133,7 +133,7 @@ def advise(
     return Advice(names, tuple(ranking))
 
 
-def _pruned(explanation: Explanation) -> GreyBox:
+def _pruned(explanation: FittedHypothesis) -> GreyBox:
     """Return the explanation's model without the effects that it does not use."""
     model = explanation.fitted.model
     return model.rebuilt([e for e in model.copied_effects() if e.name in explanation.names])
@@ -183,7 +183,7 @@ def _logged(truth: GreyBox, plans: Sequence[Manoeuvred]) -> tuple[Log | None, li
 
 def _against(
     layout: Layout,
-    rival: Explanation,
+    rival: FittedHypothesis,
     model: GreyBox,
     log: Log,
     names: Sequence[str],
@@ -194,9 +194,9 @@ def _against(
     states = initial_states(model, windows)
     free = tuple(rival.names)
     # The initial states first, so that what is left is linear in the parameters.
-    _, change, _ = reduce(windows, answers(model, windows, states, ()), rival.fitted.sigma)
+    _, change, _ = normal_equations(windows, linearise(model, windows, states, ()), rival.fitted.sigma)
     states = moved(states, torch.as_tensor(change))
-    sums, _, _ = reduce(windows, answers(model, windows, states, free), rival.fitted.sigma)
+    sums, _, _ = normal_equations(windows, linearise(model, windows, states, free), rival.fitted.sigma)
     precision = priors(layout, free, free=rival.effects).precision
     return {
         name: _left(sums, windows.run == number, precision)

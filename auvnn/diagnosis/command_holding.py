@@ -20,11 +20,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from auvnn.diagnosis.explain import Explanation
-from auvnn.diagnosis.rivals import ODDS
-from auvnn.diagnosis.score import inflation
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.score_tests.score import variance_inflation
+from auvnn.diagnosis.selection.model_comparison import ODDS
+from auvnn.estimation.normal_equations import linearise, normal_equations
 from auvnn.metrics.windows import Windows
-from auvnn.training.window_sums import answers, reduce
 
 LINEAR = 0.5
 # Where the straight line does as well as a share of its own up to these odds, it is the plainer answer.
@@ -65,7 +65,7 @@ def between(windows: Windows, share: float) -> Windows:
     return replace(windows, inputs=replace(given, command=mixed(given.command), fins=fins))
 
 
-def holding(first: Explanation, windows: Windows) -> Holding:
+def holding(first: FittedHypothesis, windows: Windows) -> Holding:
     """Ask how commands go from sample to sample.
 
     The squared error is taken as a parabola of the share, through nought, one half and one.
@@ -79,7 +79,7 @@ def holding(first: Explanation, windows: Windows) -> Holding:
     if windows.nu_dot is not None:
         return held
     sums = first.fitted.statistics
-    factor = inflation(sums.slope, sums.total, sums.run)
+    factor = variance_inflation(sums.slope, sums.total, sums.run)
     costs = [_cost(first, between(windows, share)) / factor for share in (0.0, LINEAR, 1.0)]
     gain = costs[0] - costs[1]
     bend = 2.0 * (costs[0] - 2.0 * costs[1] + costs[2])
@@ -95,10 +95,12 @@ def holding(first: Explanation, windows: Windows) -> Holding:
     return found if found.odds > ODDS else held
 
 
-def _cost(first: Explanation, windows: Windows) -> float:
+def _cost(first: FittedHypothesis, windows: Windows) -> float:
     """Return the squared error with everything that is uncertain following, to first order."""
     fitted = first.fitted
-    sums, _, _ = reduce(windows, answers(fitted.model, windows, fitted.initial, first.names), fitted.sigma)
+    sums, _, _ = normal_equations(
+        windows, linearise(fitted.model, windows, fitted.initial, first.names), fitted.sigma
+    )
     inside = fitted.priors.inside(fitted.theta)
     precision = fitted.priors.precision[inside]
     pull = sums.slope.sum(0)[inside] - precision * (fitted.theta - fitted.priors.mean)[inside]

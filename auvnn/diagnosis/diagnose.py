@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from auvnn.diagnosis.answer import Diagnosis
-from auvnn.diagnosis.cut import candidates_for, windows_for
-from auvnn.diagnosis.doubts import doubts
-from auvnn.diagnosis.learned_drag import reduced
+from auvnn.checks.doubts import doubts
+from auvnn.diagnosis.answers.answer import Diagnosis
+from auvnn.diagnosis.hypotheses.candidates import candidates_for, windows_for
+from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
 from auvnn.diagnosis.noise_law_answer import beside_what_is_left
-from auvnn.diagnosis.nuisance import lay_out
 from auvnn.diagnosis.search import Search
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log
 from auvnn.models import GreyBox
-from auvnn.training.absorbed import absorption
+from auvnn.training.confounding.confounded_effects import confounded_effects
 
 LEARNED = (
     "of the learned damping only what drag can be was kept for the tests, and that was left uncertain; "
@@ -91,14 +91,14 @@ def searched(
         cure = "record a longer log" if window is None else "choose a shorter window, or record a longer log"
         raise InputError(f"{log.name} gives only {len(windows)} windows of free running: {cure}")
     # What subnetworks have swallowed leaves no residual: only what drag can be is kept of them.
-    known, spread = reduced(model, log)
+    known, spread = with_drag_only(model, log)
     layout = lay_out(known, usable, spread)
     search = Search(layout, windows, usable, say, advice, whiteness)
     found = search.run(model, log, needs, max_effects)
     found, search = beside_what_is_left(found, search, model, log, needs, max_effects)
     if spread is not None:
         found.warnings.append(LEARNED)
-    found.absorbed = absorption(model, log)
+    found.absorbed = confounded_effects(model, log)
     if found.absorbed is not None:
         found.warnings += found.absorbed.words()
     found.warnings += doubts(model, log)

@@ -13,12 +13,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.explain import Explanation, folds, left_out
-from auvnn.diagnosis.input_forces import ANGLES, AXES, InputForces, _euler, _raw
-from auvnn.diagnosis.input_test import _by_part
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out
+from auvnn.diagnosis.residuals.additive_force import _by_part
+from auvnn.diagnosis.residuals.input_forces import ANGLES, AXES, InputForces, _euler, _raw
+from auvnn.estimation.normal_equations import Statistics
+from auvnn.estimation.priors import Priors
 from auvnn.metrics.windows import Windows
-from auvnn.training.free_parameters import Priors
-from auvnn.training.window_sums import Statistics
 
 Array = NDArray[np.float64]
 # Standard errors of a gain on runs left out, below which it may be chance; many inputs are asked.
@@ -44,7 +44,7 @@ class Foretold:
     least: float
 
 
-def foretold(explanation: Explanation, windows: Windows) -> Foretold | None:
+def foretold(explanation: FittedHypothesis, windows: Windows) -> Foretold | None:
     """Return the largest share that is foretold, None where there is no stochastic force.
 
     Args:
@@ -90,7 +90,12 @@ def foretold(explanation: Explanation, windows: Windows) -> Foretold | None:
 
 
 def _share(
-    sums: Statistics, columns: list[int], explanation: Explanation, size: Array, features: Array, rms: float
+    sums: Statistics,
+    columns: list[int],
+    explanation: FittedHypothesis,
+    size: Array,
+    features: Array,
+    rms: float,
 ) -> tuple[float, float]:
     """Return the share of the mean square that a force of some features has, and its lower limit."""
     fitted, known = explanation.fitted, len(explanation.fitted.theta)
@@ -114,7 +119,7 @@ def _share(
 
 
 def _left(
-    sums: Statistics, columns: list[int], explanation: Explanation, size: Array, fold: NDArray[np.int64]
+    sums: Statistics, columns: list[int], explanation: FittedHypothesis, size: Array, fold: NDArray[np.int64]
 ) -> Array:
     fitted = explanation.fitted
     held = Priors(

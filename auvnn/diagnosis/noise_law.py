@@ -24,12 +24,12 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import chi2
 
-from auvnn.diagnosis.explain import Explanation
-from auvnn.diagnosis.input_forces import AXES
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.residuals.input_forces import AXES
+from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
+from auvnn.estimation.sensitivity import Response
 from auvnn.metrics.force_law import ForceLaw, correlation
 from auvnn.metrics.windows import Windows
-from auvnn.training.sensitivity import Response
-from auvnn.training.window_sums import Statistics, answers, reduce
 
 Array = NDArray[np.float64]
 # A degree of freedom has a stochastic force where its likelihood ratio rejects a variance of zero at this level.
@@ -94,7 +94,9 @@ class Estimate:
     forces: Array
 
 
-def force_sums(explanation: Explanation, windows: Windows, sigma: Array, cell: float = CELL) -> ForceSums:
+def force_sums(
+    explanation: FittedHypothesis, windows: Windows, sigma: Array, cell: float = CELL
+) -> ForceSums:
     """Linearise the windows towards the parameters of a fit and a force in cells.
 
     Args:
@@ -110,11 +112,11 @@ def force_sums(explanation: Explanation, windows: Windows, sigma: Array, cell: f
     asked = replace(windows, law=plain)
 
     def joined() -> Iterator[Response]:
-        for answer in answers(fitted.model, asked, fitted.initial, explanation.names):
+        for answer in linearise(fitted.model, asked, fitted.initial, explanation.names):
             assert answer.force is not None
             yield Response(answer.error, answer.state, torch.cat([answer.parameters, answer.force], dim=-1))
 
-    statistics, _, _ = reduce(windows, joined(), sigma)
+    statistics, _, _ = normal_equations(windows, joined(), sigma)
     force = 0.02 * float(vehicle.mass) * float(vehicle.gravity)
     steps = (times[:, 1:] - times[:, :-1]).numpy()
     runs = [

@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from auvnn.diagnosis.answer import Diagnosis
-from auvnn.diagnosis.any_force import any_force, white
+from auvnn.diagnosis.answers.answer import Diagnosis
+from auvnn.diagnosis.answers.table import values
 from auvnn.diagnosis.command_holding import Holding, between, holding
 from auvnn.diagnosis.foretold import foretold
 from auvnn.diagnosis.noise_law import ALPHA_BOUNDARY, left
 from auvnn.diagnosis.noise_law_search import BesideForce, ForceSearch
-from auvnn.diagnosis.null_tests import NullTests
+from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
+from auvnn.diagnosis.score_tests.null_tests import NullTests
 from auvnn.diagnosis.search import Search
-from auvnn.diagnosis.table import values
 from auvnn.logs import Log
 from auvnn.models import GreyBox
 
@@ -70,7 +70,7 @@ def _beside_force(found: Diagnosis, search: Search, most: int) -> Diagnosis:
     last = found.explanation
     assert last is not None and search.first is not None
     noise = white(last, search.floor)
-    if any_force(last, search.windows, noise).p_value >= ALPHA_BOUNDARY:
+    if variance_component_test(last, search.windows, noise).p_value >= ALPHA_BOUNDARY:
         return found
     beside = ForceSearch(search.layout, search.windows, search.usable, search.base, search.floor, search.say)
     null = beside.begin(search.first, white(search.first, search.floor))

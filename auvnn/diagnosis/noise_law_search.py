@@ -19,18 +19,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from auvnn.diagnosis.explain import Explanation, explain
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
+from auvnn.diagnosis.hypotheses.layout import Layout, initial_guess, scales, shapes
 from auvnn.diagnosis.noise_law import Estimate, estimate, force_sums
-from auvnn.diagnosis.nuisance import Layout, begun, scales, shapes
-from auvnn.diagnosis.null_tests import NullTests, Tested
-from auvnn.diagnosis.pays import pays
-from auvnn.diagnosis.rivals import ALPHA_REFUTED, ODDS
-from auvnn.diagnosis.score import Score
+from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
+from auvnn.diagnosis.score_tests.score import Score
+from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS
+from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
 from auvnn.effects import effect_class
+from auvnn.estimation.normal_equations import linearise, normal_equations, residual_std
+from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.metrics.force_law import ForceLaw, cell_for
 from auvnn.metrics.windows import Windows
-from auvnn.training.free_parameters import parameters_of, set_parameters
-from auvnn.training.window_sums import answers, reduce, spread
 
 Array = NDArray[np.float64]
 # A name is given where chance would seldom do as well among all effects that were asked for.
@@ -54,7 +54,7 @@ class Hypothesis:
         evidence: logarithm of the marginal likelihood, up to what all hypotheses of a log share.
     """
 
-    explanation: Explanation
+    explanation: FittedHypothesis
     estimate: Estimate
     misfit: float
     evidence: float
@@ -83,12 +83,12 @@ class BesideForce:
 
     steps: list[dict[str, Any]]
     groups: list[list[str]]
-    last: Explanation
+    last: FittedHypothesis
     windows: Windows
     estimate: Estimate
-    tried: list[Explanation]
+    tried: list[FittedHypothesis]
     p_value: float
-    first: Explanation
+    first: FittedHypothesis
     first_law: ForceLaw | None
 
     @property
@@ -124,7 +124,7 @@ class ForceSearch:
         self.sigma = np.full(18, np.inf)
         self.cell = 0.5
 
-    def begin(self, first: Explanation, sigma: Array) -> Hypothesis | None:
+    def begin(self, first: FittedHypothesis, sigma: Array) -> Hypothesis | None:
         """Return the explanation without any name under the law of the force; None where no variance is above zero.
 
         Args:
@@ -138,23 +138,28 @@ class ForceSearch:
         self.cell = cell_for(found.law.time[found.law.axes])
         first = self._again(first, found.law, sigma)
         under = replace(self.windows, law=found.law)
-        sums, _, _ = reduce(
-            under, answers(first.fitted.model, under, first.fitted.initial, first.names), sigma, leverage=True
+        sums, _, _ = normal_equations(
+            under,
+            linearise(first.fitted.model, under, first.fitted.initial, first.names),
+            sigma,
+            leverage=True,
         )
-        self.sigma = np.where(np.isfinite(sigma), spread(sums, self.floor, len(first.fitted.theta)), np.inf)
+        self.sigma = np.where(
+            np.isfinite(sigma), residual_std(sums, self.floor, len(first.fitted.theta)), np.inf
+        )
         found = estimate(force_sums(first, self.windows, self.sigma, self.cell))
         if found.law is None:
             return None
         return self.judged(self._again(first, found.law, self.sigma), found.law)
 
-    def _again(self, found: Explanation, law: ForceLaw, sigma: Array) -> Explanation:
+    def _again(self, found: FittedHypothesis, law: ForceLaw, sigma: Array) -> FittedHypothesis:
         """Return an explanation fitted under a law."""
-        return explain(
+        return fit_hypothesis(
             self.layout, replace(self.windows, law=replace(law, cell=self.cell)), self.base, found.effects,
             start=found.fitted, guess=replace(self.layout, model=found.fitted.model), sigma=sigma, iterations=STEPS,
         )  # fmt: skip
 
-    def judged(self, explanation: Explanation, law: ForceLaw) -> Hypothesis:
+    def judged(self, explanation: FittedHypothesis, law: ForceLaw) -> Hypothesis:
         """Return an explanation with the law that is most likely with it, and what they are worth."""
         sums = force_sums(explanation, self.windows, self.sigma, law.cell)
         found = estimate(sums, law, law.axes)
@@ -185,7 +190,7 @@ class ForceSearch:
         current, chosen = null, []
         steps: list[dict[str, Any]] = []
         groups: list[list[str]] = []
-        tried: list[Explanation] = []
+        tried: list[FittedHypothesis] = []
         whole = 1.0
         while True:
             law = current.estimate.law
@@ -211,7 +216,7 @@ class ForceSearch:
                 for h in found
                 if h.evidence > current.evidence + ODDS
                 and sure[h.name] < ALPHA_NAME
-                and pays(h.explanation, self._without(h, current, under))
+                and improves_predictive_density(h.explanation, self._without(h, current, under))
             ]
             if not good:
                 break
@@ -257,7 +262,7 @@ class ForceSearch:
         base: list[str],
         chosen: list[str],
         leading: Sequence[str],
-    ) -> list[Explanation]:
+    ) -> list[FittedHypothesis]:
         """Return the leading effects fitted in full beside what was chosen, the smallest misfit first."""
         scores = {n: s for n, s in tested.scores.items() if s.degrees}
         order = sorted(scores, key=lambda n: -scores[n].evidence)[:LEADERS]
@@ -276,15 +281,15 @@ class ForceSearch:
         current: Hypothesis,
         base: list[str],
         chosen: list[str],
-    ) -> Explanation:
+    ) -> FittedHypothesis:
         """Return an effect fitted from what its test estimates, or from nearer its null where that goes astray."""
         self.say(f"fitting {name} beside the force")
-        known, start = parameters_of(at.model, [name]), begun(self.layout, name, score.estimate)
+        known, start = parameters_of(at.model, [name]), initial_guess(self.layout, name, score.estimate)
         shape, best = shapes(self.layout, name), None
         for share in (1.0, 0.3, 0.05):
             guess = at.model.rebuilt(at.model.copied_effects())
             set_parameters(guess, [name], np.where(shape, start, known + share * (start - known)))
-            found = explain(
+            found = fit_hypothesis(
                 self.layout, under, base, [*chosen, name], start=current.explanation.fitted,
                 guess=replace(at, model=guess), sigma=self.sigma, iterations=STEPS,
             )  # fmt: skip
@@ -295,12 +300,12 @@ class ForceSearch:
         assert best is not None
         return best
 
-    def _without(self, after: Hypothesis, current: Hypothesis, under: Windows) -> Explanation:
+    def _without(self, after: Hypothesis, current: Hypothesis, under: Windows) -> FittedHypothesis:
         """Return the fit without the effect that came last; a coefficient that is uncertain anyway stays as stated."""
         if after.name not in self.base:
             return current.explanation
         fitted = current.explanation.fitted
-        return explain(
+        return fit_hypothesis(
             self.layout, under, [n for n in self.base if n != after.name], after.explanation.effects[:-1],
             start=fitted, sigma=self.sigma, iterations=STEPS,
         )  # fmt: skip
@@ -337,7 +342,7 @@ class ForceSearch:
             model = fitted.model.rebuilt(fitted.model.copied_effects())
             set_parameters(model, [name], self.layout.means[name])
             left = tuple(e for e in current.explanation.effects if e != name)
-            without = explain(
+            without = fit_hypothesis(
                 self.layout, replace(self.windows, law=law), self.base, left, start=fitted,
                 guess=replace(self.layout, model=model), sigma=self.sigma, iterations=STEPS,
             )  # fmt: skip

@@ -10,23 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.advise import advise
-from auvnn.diagnosis.answer import Diagnosis
-from auvnn.diagnosis.any_force import Unnamed, any_force, white
-from auvnn.diagnosis.choose import ALPHA, Chooser
-from auvnn.diagnosis.cut import HORIZON, WARMUP
-from auvnn.diagnosis.explain import Explanation, explain
-from auvnn.diagnosis.finer import finer
-from auvnn.diagnosis.input_test import input_force
-from auvnn.diagnosis.left_over import slow
-from auvnn.diagnosis.nuisance import Layout, stated
-from auvnn.diagnosis.null_tests import NullTests
-from auvnn.diagnosis.residual_tests import residual_tests
-from auvnn.diagnosis.table import fill, tabulate
-from auvnn.diagnosis.unknown import depends_on
+from auvnn.diagnosis.answers.answer import Diagnosis
+from auvnn.diagnosis.answers.table import candidate_table, fill_candidate
+from auvnn.diagnosis.hypotheses.candidates import HORIZON, WARMUP
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
+from auvnn.diagnosis.hypotheses.layout import Layout, has_stated_uncertainty
+from auvnn.diagnosis.hypotheses.refine_step import refine_step
+from auvnn.diagnosis.residuals.additive_force import additive_force_test
+from auvnn.diagnosis.residuals.attribution import attribute_residual
+from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
+from auvnn.diagnosis.residuals.variance_component import Unnamed, variance_component_test, white
+from auvnn.diagnosis.residuals.whiteness import residual_tests
+from auvnn.diagnosis.score_tests.null_tests import NullTests
+from auvnn.diagnosis.selection.choose import ALPHA, Chooser
+from auvnn.estimation.normal_equations import TRUST, motion
 from auvnn.logs import Log
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.training.window_sums import TRUST, motion
 
 Array = NDArray[np.float64]
 # Once something is in the model the question is asked again, and each time chance gets another turn.
@@ -56,7 +56,7 @@ class Search:
         self.advice, self.whiteness = advice, whiteness
         self.chooser = Chooser(layout, windows, say)
         # Explanations between which the log cannot decide; the first of each group stands for it in what follows.
-        self.groups: list[list[Explanation]] = []
+        self.groups: list[list[FittedHypothesis]] = []
         self.base = [n for n in layout.names if n not in usable or n in layout.nuisance]
         self.floor = TRUST * motion(windows) + 1e-9
         self.silent: list[str] = []
@@ -67,14 +67,14 @@ class Search:
         self.nearest: list[str] = []
         self.unexplained = 1.0
         # The fit of what is uncertain alone, once it has been made.
-        self.first: Explanation | None = None
+        self.first: FittedHypothesis | None = None
         # How much the effects that were asked for first look like one another.
         self.similar: tuple[list[str], Array] = ([], np.eye(0))
 
     def run(self, model: GreyBox, log: Log, needs: dict[str, list[str]], most: int) -> Diagnosis:
         """Search for one effect after the other."""
         self.say("fitting the uncertain coefficients")
-        self.first = first = current = self._finer(explain(self.layout, self.windows, self.base, ()))
+        self.first = first = current = self._finer(fit_hypothesis(self.layout, self.windows, self.base, ()))
         chosen, steps = [], []
         # What turned out to have stood in for something else is not asked for again.
         withdrawn: list[str] = []
@@ -89,7 +89,7 @@ class Search:
             if not table:
                 global_p = p_value
                 self.similar = (remaining, tested.alike)
-                table = tabulate(self.layout, tested.scores, current, self.similar, needs)
+                table = candidate_table(self.layout, tested.scores, current, self.similar, needs)
                 self.silent = [n for n in remaining if not tested.scores[n].degrees]
             if p_value >= (ALPHA_NEXT if chosen else ALPHA) or not remaining or len(chosen) >= most:
                 steps.append({"verdict": self._rest(current), "effects": [], "p_value": p_value})
@@ -97,7 +97,7 @@ class Search:
             choice = self.chooser.choose(tested.scores, tested.at, base, chosen, current)
             for explanation in choice.tried:
                 if not chosen:
-                    fill(self.layout, table, explanation, first)
+                    fill_candidate(self.layout, table, explanation, first)
             if choice.best is None:
                 verdict = "unknown" if p_value < ALPHA_UNKNOWN else self._rest(current)
                 steps.append({"verdict": verdict, "effects": [], "p_value": p_value})
@@ -122,12 +122,12 @@ class Search:
             global_p = min(global_p, self.left.p_value)
         # What was tried alone at first has other values beside what was found since.
         for explanation in (*(e for group in self.groups for e in group), current):
-            fill(self.layout, table, explanation, first)
+            fill_candidate(self.layout, table, explanation, first)
         return self._answer(model, log, first, current, steps, table, global_p)
 
-    def _finer(self, found: Explanation) -> Explanation:
+    def _finer(self, found: FittedHypothesis) -> FittedHypothesis:
         """Return a fit with steps so short that what the integrator gets wrong has no say in what follows."""
-        windows = finer(found.fitted.model, self.windows, found.fitted.initial, found.fitted.sigma)
+        windows = refine_step(found.fitted.model, self.windows, found.fitted.initial, found.fitted.sigma)
         if windows is self.windows:
             return found
         self.say("fitting again with shorter steps")
@@ -135,7 +135,7 @@ class Search:
         self.chooser = replace(self.chooser, windows=windows)
         self.tests = NullTests(self.layout, windows, self.say)
         guess = replace(self.layout, model=found.fitted.model)
-        return explain(self.layout, windows, self.base, found.effects, start=found.fitted, guess=guess)
+        return fit_hypothesis(self.layout, windows, self.base, found.effects, start=found.fitted, guess=guess)
 
     def _in_groups(self) -> list[str]:
         """Return the members of all groups between which the log cannot decide."""
@@ -149,7 +149,7 @@ class Search:
             out += [e.effects[-1] for e in group[1:]]
         return out
 
-    def _regrouped(self, steps: list[dict[str, Any]], last: Explanation) -> Explanation:
+    def _regrouped(self, steps: list[dict[str, Any]], last: FittedHypothesis) -> FittedHypothesis:
         """Look at each group again beside what was found after it; return the fit with what is taken then.
 
         The errors of what had not been found yet may have hidden the difference.
@@ -172,8 +172,8 @@ class Search:
         return last
 
     def _settled(
-        self, steps: list[dict[str, Any]], first: Explanation, last: Explanation
-    ) -> tuple[list[dict[str, Any]], Explanation]:
+        self, steps: list[dict[str, Any]], first: FittedHypothesis, last: FittedHypothesis
+    ) -> tuple[list[dict[str, Any]], FittedHypothesis]:
         """Return the steps as they stand once what nobody has named has been asked for, and the fit that they leave.
 
         Nothing is adequate, and no name the whole cause, while a force is left that is beyond doubt. Where the names
@@ -188,22 +188,28 @@ class Search:
         """
         self.say("asking whether a force without a name is left")
         noise = white(last, self.floor)
-        left = any_force(last, self.windows, noise)
+        left = variance_component_test(last, self.windows, noise)
         # What was withdrawn is none of the names that stand.
         standing = {*last.effects, *self._in_groups()}
-        given = [e for s in steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"] if e in standing]
+        given = [
+            e for s in steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"] if e in standing
+        ]
         if not given:
             return (steps, last) if left.p_value >= ALPHA_UNKNOWN else (self._left(steps, left), last)
         own = [e for e in given if e in last.effects]
-        self.unexplained = left.left_of(any_force(first, self.windows, noise))
+        self.unexplained = left.left_of(variance_component_test(first, self.windows, noise))
         self.say("asking whether a force of what is measured is left")
-        traced = input_force(last, self.layout, self.windows, noise, own, ALPHA_NEXT)
+        traced = additive_force_test(last, self.layout, self.windows, noise, own, ALPHA_NEXT)
         sure = traced.p_value < ALPHA_LEFT
         needless = list(traced.needless) if sure else []
         much = self.unexplained > PARTIAL and min(left.p_value, traced.p_value) < ALPHA_LEFT
         if much or (own and len(needless) == len(own)):
             noise = white(first, self.floor)
-            self.left, self.nearest, self.groups = any_force(first, self.windows, noise), given, []
+            self.left, self.nearest, self.groups = (
+                variance_component_test(first, self.windows, noise),
+                given,
+                [],
+            )
             return [{"verdict": "unknown", "effects": [], "p_value": steps[0]["p_value"]}], first
         p_value = min(left.p_value, traced.p_value)
         if needless:
@@ -219,18 +225,21 @@ class Search:
     ) -> list[dict[str, Any]]:
         """Return the steps with a last one that says that a force is left."""
         self.left, p_value = left, left.p_value if p_value is None else p_value
-        return [*steps[:-1], {**steps[-1], "verdict": "unknown", "p_value": min(steps[-1]["p_value"], p_value)}]
+        return [
+            *steps[:-1],
+            {**steps[-1], "verdict": "unknown", "p_value": min(steps[-1]["p_value"], p_value)},
+        ]
 
-    def _rest(self, current: Explanation) -> str:
+    def _rest(self, current: FittedHypothesis) -> str:
         """Return the verdict where no effect is asked for any more."""
-        return "unknown" if slow(current, self.floor) else "adequate"
+        return "unknown" if is_autocorrelated(current, self.floor) else "adequate"
 
     def _answer(
         self,
         model: GreyBox,
         log: Log,
-        first: Explanation,
-        last: Explanation,
+        first: FittedHypothesis,
+        last: FittedHypothesis,
         steps: list[dict[str, Any]],
         table: dict[str, dict[str, Any]],
         global_p: float,
@@ -249,7 +258,7 @@ class Search:
         depends = {}
         if verdict == "unknown" or steps[-1]["verdict"] == "unknown":
             self.say("tracing what is left to the measured inputs")
-            depends = depends_on(last, self.windows)
+            depends = attribute_residual(last, self.windows)
         return Diagnosis(
             model.vehicle.name,
             log.name,
@@ -273,7 +282,7 @@ class Search:
             nearest=list(self.nearest),
         )
 
-    def _tests(self, first: Explanation, last: Explanation) -> dict[str, Any]:
+    def _tests(self, first: FittedHypothesis, last: FittedHypothesis) -> dict[str, Any]:
         """Return the residual tests without what was found and with it."""
         if not self.whiteness:
             return {}
@@ -300,6 +309,6 @@ class Search:
             found.append(
                 f"{log.name} says nothing about {', '.join(self.silent)}: nothing in it depends on {them}"
             )
-        if not stated(model):
+        if not has_stated_uncertainty(model):
             found.append("no coefficient of the model is uncertain: any error of theirs will be given a name")
         return found

@@ -63,7 +63,8 @@ class Payload(Effect):
         half = {p.name: 0.5 * p.scale for p in parameters if p.name in PLACES}
         corners = itertools.product((-1.0, 1.0), repeat=3)
         return [
-            {**start, **{n: sign * half[n] for n, sign in zip(PLACES, signs, strict=True)}} for signs in corners
+            {**start, **{n: sign * half[n] for n, sign in zip(PLACES, signs, strict=True)}}
+            for signs in corners
         ]
 
     @classmethod

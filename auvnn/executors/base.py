@@ -85,9 +85,7 @@ class Executor(ABC):
         """
 
 
-def handed_ahead(
-    hand: Callable[[Any], Any], tasks: Sequence[Any], most: int
-) -> Iterator[tuple[int, Any]]:
+def handed_ahead(hand: Callable[[Any], Any], tasks: Sequence[Any], most: int) -> Iterator[tuple[int, Any]]:
     """Hand tasks to a cluster, at most so many at a time, and yield number and reference of each in their order."""
     handed: deque[tuple[int, Any]] = deque()
     for number, task in enumerate(tasks):

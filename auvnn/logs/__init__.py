@@ -1,14 +1,20 @@
 """Logs: reading, writing, judging and differentiating what was measured."""
 
-from auvnn.logs.derivatives import LocalPolynomial, bandwidth_hz, local_polynomial, noise_gain, response
-from auvnn.logs.findings import Finding
+from auvnn.logs.leakage import leakage
 from auvnn.logs.log import Log
-from auvnn.logs.noise import noise_std
-from auvnn.logs.overlap import leakage
-from auvnn.logs.quality import Quality, check
+from auvnn.logs.quality.findings import Finding
+from auvnn.logs.quality.quality import Quality, check
 from auvnn.logs.readers import READERS
-from auvnn.logs.repair import Repair
+from auvnn.logs.reading.repair import Repair
 from auvnn.logs.run import Run
+from auvnn.logs.signals.derivatives import (
+    LocalPolynomial,
+    bandwidth_hz,
+    local_polynomial,
+    noise_gain,
+    response,
+)
+from auvnn.logs.signals.noise import noise_std
 
 __all__ = [
     "READERS",

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from auvnn.errors import ConfigError, InputError
-from auvnn.logs.repair import Repair
+from auvnn.logs.reading.repair import Repair
 from auvnn.logs.run import MIN_SAMPLES, Run
 
 if TYPE_CHECKING:
-    from auvnn.logs.quality import Quality
+    from auvnn.logs.quality.quality import Quality
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ class Log:
             InputError: a file cannot be read or its content must not be trusted.
             ConfigError: the mapping is wrong.
         """
-        from auvnn.logs.reading import read
+        from auvnn.logs.reading.reading import read
 
         return cls(**vars(read(path, mapping, max_duration)))
 
@@ -125,7 +125,7 @@ class Log:
 
     @cached_property
     def _quality(self) -> Quality:
-        from auvnn.logs.quality import assess
+        from auvnn.logs.quality.quality import assess
 
         return assess(self)
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from auvnn.errors import InputError
 from auvnn.logs.channels import ACCELERATION, POSITION, QUATERNION, RESET, VELOCITY, WRENCH
-from auvnn.logs.rotation import to_euler
-from auvnn.logs.segments import stretches
+from auvnn.logs.signals.rotation import to_euler
+from auvnn.logs.signals.segments import stretches
 
 Array = NDArray[np.float64]
 
@@ -77,7 +77,17 @@ class Run:
             raise InputError(f"run {self.number}: t must be finite and strictly increasing")
         object.__setattr__(self, "number", int(self.number))
         object.__setattr__(self, "t", t)
-        for name in ("quaternion", "nu", "nu_dot", "position", "wrench", "thrusters", "fins", *_SCALAR, RESET):
+        for name in (
+            "quaternion",
+            "nu",
+            "nu_dot",
+            "position",
+            "wrench",
+            "thrusters",
+            "fins",
+            *_SCALAR,
+            RESET,
+        ):
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, self._checked(name, value))
@@ -165,7 +175,7 @@ class Run:
     @cached_property
     def outliers(self) -> dict[str, NDArray[np.bool_]]:
         """Masks (N,) of single-sample spikes, by channel; those of commands and attitude are not looked for."""
-        from auvnn.logs.outliers import spikes
+        from auvnn.logs.signals.outliers import spikes
 
         wanted = (*VELOCITY, *ACCELERATION, *POSITION, *_SCALAR)
         return {name: spikes(self.channels[name]) for name in wanted if name in self.channels}
@@ -191,7 +201,7 @@ class Run:
     @cached_property
     def restarts(self) -> NDArray[np.intp]:
         """First samples after the pose has started afresh: an estimator's reset, a moved origin, another core."""
-        from auvnn.logs.resets import restarts
+        from auvnn.logs.reading.resets import restarts
 
         return restarts(self)
 

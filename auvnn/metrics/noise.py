@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.logs import Run
-from auvnn.logs.noise import noise_std
-from auvnn.logs.rotation import conjugate, multiply
+from auvnn.logs.signals.noise import noise_std
+from auvnn.logs.signals.rotation import conjugate, multiply
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ def attitude_noise(run: Run) -> Array:
     return white(run, np.where(np.isfinite(run.quaternion).all(1, keepdims=True), angle, np.nan))
 
 
-def noisier(run: Run, repeat: int = 0) -> Run:
+def with_more_noise(run: Run, repeat: int = 0) -> Run:
     """Return the run with white noise added to attitude, velocity and acceleration, as large as its own.
 
     The noise is the same whenever it is asked for, and another one for another run or `repeat`.

@@ -14,8 +14,8 @@ from auvnn.catalogue import unknown_name
 from auvnn.effects import Moment, Sensed
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run
-from auvnn.logs.derivatives import LocalPolynomial, bandwidth_hz
-from auvnn.metrics.noise import noisier
+from auvnn.logs.signals.derivatives import LocalPolynomial, bandwidth_hz
+from auvnn.metrics.noise import with_more_noise
 from auvnn.models import GreyBox, Inputs
 from auvnn.physics.attitude import quat_to_matrix
 
@@ -125,7 +125,7 @@ def model_acceleration(model: GreyBox, run: Run) -> Array:
     Raises:
         InputError: the run lacks the commands that drive the model.
     """
-    return Replay(model, run).acceleration()
+    return OneStepReplay(model, run).acceleration()
 
 
 def model_velocity(model: GreyBox, run: Run) -> Array:
@@ -138,7 +138,7 @@ def model_velocity(model: GreyBox, run: Run) -> Array:
     Raises:
         InputError: the run lacks the commands that drive the model.
     """
-    return Replay(model, run).velocity()
+    return OneStepReplay(model, run).velocity()
 
 
 def integrated(t: Array, begin: Array, end: Array | None = None) -> Array:
@@ -155,7 +155,7 @@ def integrated(t: Array, begin: Array, end: Array | None = None) -> Array:
     return np.where(np.isfinite(begin), total, np.nan)
 
 
-class Replay:
+class OneStepReplay:
     """A run's measured states and inputs, for a model to say what acceleration it expects there.
 
     Args:
@@ -218,9 +218,7 @@ class Replay:
     def _drive(self) -> None:
         model = self.model
         with torch.no_grad():
-            drive = model.actuators.drive(
-                self.inputs.command, self.times, model.before_thrust
-            )
+            drive = model.actuators.drive(self.inputs.command, self.times, model.before_thrust)
         self.start = torch.stack(drive.start)
         self.mean = torch.stack([part[0] for part in drive.mean])
 
@@ -250,7 +248,7 @@ def one_step(model: GreyBox, log: Log, derivative: Derivative) -> list[OneStep]:
         measured, predicted = accelerations(model, run, derivative)
         gap, to_wrench = measured - predicted, inertia_of(model, run).T
         # The same again with as much noise once more: what changes is what noise does, to data and model alike.
-        louder = [accelerations(model, noisier(run, k), derivative) for k in range(REPEATS)]
+        louder = [accelerations(model, with_more_noise(run, k), derivative) for k in range(REPEATS)]
         floor = np.concatenate([a - b - gap for a, b in louder])
         found.append(
             OneStep(

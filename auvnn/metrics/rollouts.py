@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from auvnn.effects import Sensed
 from auvnn.errors import InputError
 from auvnn.logs import Log
-from auvnn.logs.noise import noise_std
+from auvnn.logs.signals.noise import noise_std
 from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.windows import MAX_STEP, VELOCITY, Windows, cut_windows
 from auvnn.models import GreyBox
@@ -116,7 +116,7 @@ def roll(model: GreyBox, log: Log, horizon: str, scale: Scale) -> Rolled | None:
     )
 
 
-def table(
+def rollout_table(
     model: GreyBox, log: Log, scale: Scale, horizons: tuple[str, ...] = HORIZONS
 ) -> tuple[dict[str, dict], dict[str, Rolled]]:
     """Return `rollout` of the comparison, and the runs behind it."""

@@ -175,7 +175,11 @@ def rollout(
     result = _checked(model, result, inputs)
     notes = extrapolated(model, result.times, result.eta, result.nu, inputs)
     step = min(max_step, _longest(times))
-    if result.diverged and solver in TABLEAUS and (rate := _rate(model, result, inputs, batch)) * step > UNSTABLE:
+    if (
+        result.diverged
+        and solver in TABLEAUS
+        and (rate := _rate(model, result, inputs, batch)) * step > UNSTABLE
+    ):
         finer = followed(step, rate)
         if step / finer <= MOST_CUT:
             # Too long a step makes a stiff model explode that is sound by itself: only a finer one can tell.

@@ -81,11 +81,17 @@ def _structured(model: GreyBox, described: Any, files: Mapping[str, bytes], path
     from auvnn.models.structures.base import Structure
 
     if not isinstance(described, dict) or not isinstance(described.get("name"), str) or WEIGHTS not in files:
-        raise ModelError(f"{path}: its '{STRUCTURE}' has no name, or there is no {WEIGHTS}: save the model again")
+        raise ModelError(
+            f"{path}: its '{STRUCTURE}' has no name, or there is no {WEIGHTS}: save the model again"
+        )
     options = {str(k): v for k, v in described.items() if k != "name"}
     try:
         made = build_structure(
-            described["name"], model.vehicle, effects=model.copied_effects(), actuation=model.actuation, **options
+            described["name"],
+            model.vehicle,
+            effects=model.copied_effects(),
+            actuation=model.actuation,
+            **options,
         )
     except (ConfigError, TypeError) as problem:
         raise ModelError(f"{path}: its '{STRUCTURE}' cannot be built: {problem}") from None

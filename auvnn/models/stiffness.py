@@ -42,7 +42,9 @@ def fastest_rate(model: GreyBox, eta: Tensor, nu: Tensor, command: Tensor) -> fl
         if len(nu) == 0:
             return 0.0
         small = 1e-4 if nu.dtype == torch.float64 else 1e-2
-        change = small * torch.cat([torch.zeros_like(nu[:1, :6]), torch.eye(6, dtype=nu.dtype, device=nu.device)])
+        change = small * torch.cat(
+            [torch.zeros_like(nu[:1, :6]), torch.eye(6, dtype=nu.dtype, device=nu.device)]
+        )
         moved = nu.unsqueeze(1) + change
         wide = (*moved.shape[:-1],)
         position = eta[:, None, :3].expand(*wide, 3)
@@ -74,7 +76,11 @@ def slow_log(model: GreyBox, dt: float) -> list[str]:
     found = []
     for effect in model.members:
         for parameter, value in zip(effect.parameters_of, effect.theta.detach().tolist(), strict=True):
-            if parameter.unit == "s" and parameter.name in ("time_constant", "delay") and 0.0 < value < 0.05 * dt:
+            if (
+                parameter.unit == "s"
+                and parameter.name in ("time_constant", "delay")
+                and 0.0 < value < 0.05 * dt
+            ):
                 found.append(
                     f"{effect.name}: {parameter.name} {value:.3g} s is far below the log's step of {dt:.3g} s: it is "
                     "followed exactly, but this log cannot tell it from none"

@@ -121,7 +121,9 @@ class _Rollout(torch.nn.Module):
 
     def forward(self, eta0: Tensor, nu0: Tensor, given: list[Tensor | None], times: Tensor) -> Tensor:
         inputs = Inputs(given[0], *given[1:])  # type: ignore[arg-type]
-        return self.model.rollout(eta0, nu0, inputs, times, max_step=self.max_step, check=False, engine="torch").nu
+        return self.model.rollout(
+            eta0, nu0, inputs, times, max_step=self.max_step, check=False, engine="torch"
+        ).nu
 
 
 def _free(

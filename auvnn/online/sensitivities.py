@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.func import functional_call, jacrev, vmap
 
-import auvnn.training.point_slopes  # noqa: F401  registers Inputs with torch's function transforms
+import auvnn.estimation.point_slopes  # noqa: F401  registers Inputs with torch's function transforms
 from auvnn.effects import EFFECTS, Parameter
 from auvnn.models import GreyBox, Inputs
 from auvnn.physics.attitude import quat_to_matrix

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import torch
 
-from auvnn.physics.products import LEVI_CIVITA, Bilinear, Table, cross
+from auvnn.physics.products import LEVI_CIVITA, Bilinear, ProductTable, cross
 from auvnn.shapes import EulerAngles, Matrix3, Quaternion, Rotation, Vector3
 
 # S(a)_kj = sum_i eps_ijk a_i, flattened row by row.
-_SKEW = Table(
+_SKEW = ProductTable(
     [
         [sum(s for i, j, k, s in LEVI_CIVITA if (i, k, j) == (n, m // 3, m % 3)) for m in range(9)]
         for n in range(3)
@@ -43,7 +43,7 @@ _MATRIX = Bilinear(
 )
 
 # 4 q q' = I + (linear in R): the inverse of the table above for unit q.
-_OUTER_FROM_MATRIX = Table(
+_OUTER_FROM_MATRIX = ProductTable(
     [
         [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1],  # R00
         [0, 0, 0, -1, 0, 0, 1, 0, 0, 1, 0, 0, -1, 0, 0, 0],  # R01
@@ -90,7 +90,7 @@ def quat_multiply(a: Quaternion, b: Quaternion) -> Quaternion:
     return _PRODUCT(a, b)
 
 
-_CONJUGATE = Table([[1.0, -1.0, -1.0, -1.0]])
+_CONJUGATE = ProductTable([[1.0, -1.0, -1.0, -1.0]])
 
 
 def quat_conjugate(q: Quaternion) -> Quaternion:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from auvnn.physics.products import LEVI_CIVITA, Bilinear, Table, matvec
+from auvnn.physics.products import LEVI_CIVITA, Bilinear, ProductTable, matvec
 from auvnn.shapes import Matrix6, Velocity, Wrench
 
 # omega x p1 -> force, omega x p2 -> moment, v x p1 -> moment
@@ -20,14 +20,14 @@ _FORCE = Bilinear(
 )
 
 
-def _blocks() -> Table:
+def _blocks() -> ProductTable:
     """Lay out C = [0, -S(p1) ; -S(p1), -S(p2)] as a table from the six momenta to the 36 elements."""
     rows = [[0.0] * 36 for _ in range(6)]
     for i, j, k, s in LEVI_CIVITA:  # S(p)_kj = s p_i
         rows[i][6 * k + j + 3] -= s
         rows[i][6 * (k + 3) + j] -= s
         rows[i + 3][6 * (k + 3) + j + 3] -= s
-    return Table(rows)
+    return ProductTable(rows)
 
 
 _MATRIX = _blocks()

@@ -6,10 +6,10 @@ import math
 
 import torch
 
-from auvnn.physics.products import Table, cross, matvec, per_vector
+from auvnn.physics.products import ProductTable, cross, matvec, per_vector
 from auvnn.shapes import FinFrame, Number, PerPart, Scalar, Vectors3, Velocity, Wrench
 
-_FORWARD = Table([[1.0, 0.0, 0.0]])
+_FORWARD = ProductTable([[1.0, 0.0, 0.0]])
 
 SHARPNESS = 12.0
 """Stall angle over the width of the transition from attached to separated flow (50 per rad at 14 degrees)."""

@@ -11,16 +11,20 @@ import math
 import torch
 from torch import Tensor
 
-from auvnn.physics.products import Table
+from auvnn.physics.products import ProductTable
 from auvnn.shapes import Matrix3, Matrix6, Quaternion, Vector3, Velocity
 
-_FLIP = Table([[1.0, -1.0, -1.0, 1.0, -1.0, -1.0]])
-_SWAP = Table([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+_FLIP = ProductTable([[1.0, -1.0, -1.0, 1.0, -1.0, -1.0]])
+_SWAP = ProductTable([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 _H = math.sqrt(0.5)
 # As rows: where each component of (w, x, y, z) goes.
-_BODY_FLIP = Table([[0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, -1.0], [0.0, 0.0, 1.0, 0.0]])
-_WORLD_SWAP = Table([[0.0, _H, _H, 0.0], [-_H, 0.0, 0.0, -_H], [-_H, 0.0, 0.0, _H], [0.0, _H, -_H, 0.0]])
-_BOTH = Table([[_H, 0.0, 0.0, _H], [0.0, _H, _H, 0.0], [0.0, _H, -_H, 0.0], [_H, 0.0, 0.0, -_H]])
+_BODY_FLIP = ProductTable(
+    [[0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, -1.0], [0.0, 0.0, 1.0, 0.0]]
+)
+_WORLD_SWAP = ProductTable(
+    [[0.0, _H, _H, 0.0], [-_H, 0.0, 0.0, -_H], [-_H, 0.0, 0.0, _H], [0.0, _H, -_H, 0.0]]
+)
+_BOTH = ProductTable([[_H, 0.0, 0.0, _H], [0.0, _H, _H, 0.0], [0.0, _H, -_H, 0.0], [_H, 0.0, 0.0, -_H]])
 
 
 def flu_frd_vector(v: Vector3) -> Vector3:

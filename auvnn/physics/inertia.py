@@ -5,11 +5,11 @@ from __future__ import annotations
 import torch
 
 from auvnn.physics.attitude import skew
-from auvnn.physics.products import LEVI_CIVITA, Table
+from auvnn.physics.products import LEVI_CIVITA, ProductTable
 from auvnn.shapes import Flag, Matrix3, Matrix6, Number, Vector3
 
 # Upper right block S(r)' of the 6x6 matrix: S(r)'_jk = sum_i eps_ijk r_i.
-_SCREW = Table(
+_SCREW = ProductTable(
     [
         [sum(s for i, j, k, s in LEVI_CIVITA if (i, j, k + 3) == (n, m // 6, m % 6)) for m in range(36)]
         for n in range(3)

@@ -36,7 +36,7 @@ def per_vector(number: float | Tensor) -> float | Tensor:
     return number.unsqueeze(-1) if isinstance(number, Tensor) and number.dim() > 0 else number
 
 
-class Table:
+class ProductTable:
     """A constant matrix that follows the dtype and device of the tensors it meets.
 
     Both floating types are made once on the CPU, at import and outside inference mode, so that neither
@@ -74,7 +74,7 @@ class Bilinear:
         rows = [[0.0] * n_out for _ in range(n_a * n_b)]
         for i, j, k, coefficient in terms:
             rows[i * n_b + j][k] += coefficient
-        self.table = Table(rows)
+        self.table = ProductTable(rows)
 
     def __call__(self, a: Tensor, b: Tensor) -> Tensor:
         """Return the form of a (..., n_a) and b (..., n_b), shape (..., n_out)."""

@@ -1,7 +1,7 @@
 """The catalogue of plants: what makes the motion of a simulated log. A new one is one file and one line here."""
 
 from auvnn.catalogue import Catalogue
-from auvnn.plants.base import Motion, Plant, Task
+from auvnn.plants.base import Motion, Plant, PlantTask
 
 PLANTS = Catalogue(
     "plant",
@@ -13,4 +13,4 @@ PLANTS = Catalogue(
     "auvnn.plants",
 )
 
-__all__ = ["PLANTS", "Motion", "Plant", "Task"]
+__all__ = ["PLANTS", "Motion", "Plant", "PlantTask"]

@@ -26,7 +26,7 @@ Controller = Callable[[int, Array, Array, Array], tuple[Array, "Array | None"]]
 
 
 @dataclass(frozen=True)
-class Task:
+class PlantTask:
     """What R runs of T rows begin with, what is hidden in them, and what they are told to do.
 
     Attributes:
@@ -105,7 +105,7 @@ class Plant(ABC):
         """Return why the plant cannot have an effect hidden in it, or nothing."""
 
     @abstractmethod
-    def move(self, task: Task, look: Look) -> Motion:
+    def move(self, task: PlantTask, look: Look) -> Motion:
         """Return the motion of all runs.
 
         Args:
@@ -135,7 +135,7 @@ class Stretch(Protocol):
         ...
 
 
-def drive(stretch: Stretch, task: Task, look: Look) -> Motion:
+def drive(stretch: Stretch, task: PlantTask, look: Look) -> Motion:
     """Move through all rows of a task, under its commands or its controller."""
     for k in range(len(task.t)):
         if task.controller is not None:
@@ -160,7 +160,7 @@ def refuse(plant: Plant, effects: Iterable[str]) -> None:
             raise ConfigError(f"plant {plant.name} cannot hold the effect {effect}: {why}")
 
 
-def refuse_laws(plant: Plant, task: Task) -> None:
+def refuse_laws(plant: Plant, task: PlantTask) -> None:
     """Refuse a world with other laws, for plants that have none but the usual ones.
 
     Raises:
@@ -172,7 +172,7 @@ def refuse_laws(plant: Plant, task: Task) -> None:
         )
 
 
-def refuse_learned(plant: Plant, task: Task) -> None:
+def refuse_learned(plant: Plant, task: PlantTask) -> None:
     """Refuse a model with learned damping, for plants that have equations of their own.
 
     Raises:

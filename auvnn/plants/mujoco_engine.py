@@ -33,7 +33,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import ConfigError, MissingExtra, one_line
-from auvnn.plants.base import LIMIT, Look, Motion, Plant, Task, drive, refuse, refuse_laws, refuse_learned
+from auvnn.plants.base import (
+    LIMIT,
+    Look,
+    Motion,
+    Plant,
+    PlantTask,
+    drive,
+    refuse,
+    refuse_laws,
+    refuse_learned,
+)
 from auvnn.plants.independent.equations import Held
 from auvnn.plants.independent.plant import SUPPORTED
 from auvnn.plants.independent.stretch import Beyond, Stretch
@@ -67,7 +77,7 @@ class MujocoPlant(Plant):
             return ""
         return "it has no equations of its own for it; use plant=own"
 
-    def move(self, task: Task, look: Look) -> Motion:
+    def move(self, task: PlantTask, look: Look) -> Motion:
         """Run the engine."""
         refuse(self, (*task.effects, *task.strangers))
         refuse_learned(self, task)
@@ -90,7 +100,7 @@ def engine() -> Any:
 class _Scene(Stretch):
     """All runs as free bodies of one scene; reporting, actuators and forces are those of the plant `numpy`."""
 
-    def __init__(self, task: Task, mujoco: Any) -> None:
+    def __init__(self, task: PlantTask, mujoco: Any) -> None:
         super().__init__(task)
         self.mujoco = mujoco
         count = len(self.place)

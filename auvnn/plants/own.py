@@ -15,7 +15,7 @@ from auvnn.models import GreyBox, Inputs, Trajectory
 from auvnn.models.rollout import LIMIT, steps_per_interval
 from auvnn.models.thrust_signal import ThrustSignal
 from auvnn.physics.attitude import quat_derivative, quat_to_matrix
-from auvnn.plants.base import Controller, Look, Motion, Plant, Task, diverged, refuse, refuse_laws
+from auvnn.plants.base import Controller, Look, Motion, Plant, PlantTask, diverged, refuse, refuse_laws
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ class OwnPlant(Plant):
             "it holds the catalogue's effects only; use plant=numpy" if effect.startswith("stranger_") else ""
         )
 
-    def move(self, task: Task, look: Look) -> Motion:
+    def move(self, task: PlantTask, look: Look) -> Motion:
         """Run the model."""
         refuse(self, task.strangers)
         refuse_laws(self, task)

@@ -38,7 +38,7 @@ _LONG_NUMBER = re.compile(r"(-?\d+\.\d\d)\d+")
 
 
 @dataclass(frozen=True)
-class Table:
+class HtmlTable:
     """A table of a page: plain cells, the first column is the row's name, the others are set to the right.
 
     Args:
@@ -85,7 +85,7 @@ class Part:
     brief: list[str]
     warnings: list[str] = field(default_factory=list)
     pictures: list[Picture] = field(default_factory=list)
-    tables: list[Table] = field(default_factory=list)
+    tables: list[HtmlTable] = field(default_factory=list)
     assumed: list[tuple[str, str]] = field(default_factory=list)
     story: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from auvnn.answers import write_text
 from auvnn.report import style
-from auvnn.report.html import Part, Picture, Table, figure_markup, render
+from auvnn.report.html import HtmlTable, Part, Picture, figure_markup, render
 from auvnn.report.panels import NoData
 from auvnn.report.view import View
 
@@ -88,7 +88,7 @@ class Page:
         """Return the figures, the most telling first."""
         return []
 
-    def tables(self, view: View) -> list[Table]:
+    def tables(self, view: View) -> list[HtmlTable]:
         """Return the tables."""
         return []
 

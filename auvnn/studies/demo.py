@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from auvnn.answers import DRAWERS, Answer, plain, write_text
-from auvnn.diagnosis import Comparison, Diagnosis, Improvement, add, compare, diagnose
-from auvnn.diagnosis.words import number
-from auvnn.metrics.rollouts import scale_of, table
+from auvnn.comparison import Comparison, compare
+from auvnn.diagnosis import Diagnosis, diagnose
+from auvnn.diagnosis.answers.words import number
+from auvnn.improvement import Improvement, add
+from auvnn.metrics.rollouts import rollout_table, scale_of
 from auvnn.models import load
-from auvnn.simulate import simulate
+from auvnn.simulation import simulate
 
 VEHICLE = "rov95"
 HIDDEN = {"ocean_current": {"v_north": 0.15, "v_east": -0.10, "v_down": 0.0}}
@@ -114,7 +116,7 @@ def run_demo(out: Path, seed: int = 0, say: Callable[[str], None] = print) -> De
     improvement.write(out / "add")
     improvement.model.save(out / "add" / "model")
     scale = scale_of(test)
-    true_error = table(made.plant, test, scale, ("5",))[0]["5"]["total"]
+    true_error = rollout_table(made.plant, test, scale, ("5",))[0]["5"]["total"]
     falls = {step["step"]: step["error"] for step in improvement.waterfall}
     refitted, after = falls["coefficients refitted"], improvement.waterfall[-2]["error"]
     tell(

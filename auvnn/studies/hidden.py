@@ -10,18 +10,18 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.catalogue import unknown_name
-from auvnn.diagnosis.cut import windows_for
-from auvnn.diagnosis.nuisance import lay_out, stated
-from auvnn.diagnosis.probes import extent_of
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.layout import has_stated_uncertainty, lay_out
+from auvnn.diagnosis.score_tests.probes import extent_of
 from auvnn.effects import Effect, Parameter
 from auvnn.errors import ConfigError
+from auvnn.estimation.normal_equations import linearise, normal_equations
+from auvnn.estimation.priors import set_parameters
 from auvnn.logs import Log
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
-from auvnn.simulate import bottom_below, simulate
-from auvnn.training.free_parameters import set_parameters
-from auvnn.training.window_sums import answers, reduce
+from auvnn.simulation import bottom_below, simulate
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def oracle_information(
     windows = windows_for(model, log)
     states = initial_states(layout.model, windows)
     for _ in range(2):
-        sums, change, _ = reduce(windows, answers(layout.model, windows, states, [name]), sigma)
+        sums, change, _ = normal_equations(windows, linearise(layout.model, windows, states, [name]), sigma)
         states = moved(states, torch.as_tensor(change))
     return sums.total
 
@@ -133,7 +133,7 @@ def sized(
     generator = np.random.default_rng(np.random.SeedSequence(int(seed), spawn_key=(101,)))
     direction = generator.normal(size=len(described))
     direction = np.where([p.low == p.null for p in described], np.abs(direction), direction)
-    uncertain = stated(model)
+    uncertain = has_stated_uncertainty(model)
     if effect in uncertain:
         direction = np.clip(direction / np.sqrt(np.mean(direction**2)), -1.5, 1.5)
         factors = np.exp(BEYOND[size] * uncertain[effect] * direction)

@@ -22,15 +22,15 @@ from numpy.typing import NDArray
 
 from auvnn.answers import Answer, plain
 from auvnn.damping.bank import DampingBank
-from auvnn.diagnosis.cut import windows_for
-from auvnn.diagnosis.nuisance import Layout, lay_out
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.layout import Layout, lay_out
 from auvnn.effects import effect_class
 from auvnn.errors import ConfigError
 from auvnn.logs import Log
 from auvnn.metrics.one_step import choose_derivative
 from auvnn.models import GreyBox, load
-from auvnn.simulate import simulate
-from auvnn.training.absorbed import traces
+from auvnn.simulation import simulate
+from auvnn.training.confounding.confounded_effects import traces
 from auvnn.training.fit_damping import fit_damping
 from auvnn.training.objectives.windows import Shots
 from auvnn.training.problem import DampingProblem

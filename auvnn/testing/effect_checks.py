@@ -83,7 +83,9 @@ def _looks_around(kind: Kind, described: tuple[Any, ...]) -> None:
         shape, level = {p.name: p.null for p in described if p.shape} | start, 0
         while around := kind.closest(described, extent, shape, level):
             for values in around:
-                out = [n for n, v in values.items() if n not in bounds or not bounds[n][0] <= v <= bounds[n][1]]
+                out = [
+                    n for n, v in values.items() if n not in bounds or not bounds[n][0] <= v <= bounds[n][1]
+                ]
                 require(not out, f"{kind.name}: closest looks where {out} is no shape within its bounds")
             shape, level = around[0], level + 1
             require(level < MOST_LEVELS, f"{kind.name}: closest does not end")

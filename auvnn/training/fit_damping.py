@@ -17,11 +17,11 @@ from auvnn.training.checkpoint import Checkpoints
 from auvnn.training.history import Callback, History, Record
 from auvnn.training.problem import DampingProblem
 from auvnn.training.schemes import SCHEMES
-from auvnn.training.schemes.base import Scheme, Task
+from auvnn.training.schemes.base import Scheme, SchemeTask
 from auvnn.training.scrutiny import energy_warnings
 
 if TYPE_CHECKING:
-    from auvnn.training.parted import PartedProblem
+    from auvnn.training.distributed.distributed_problem import DistributedProblem
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def build_scheme(description: str | Mapping[str, Any] | Scheme) -> Scheme:
 
 def fit_damping(
     bank: DampingBank,
-    problem: DampingProblem | PartedProblem,
+    problem: DampingProblem | DistributedProblem,
     *,
     scheme: str | Mapping[str, Any] | Scheme = "levenberg_marquardt",
     held_out: Collection[int] | None = None,
@@ -123,7 +123,7 @@ def fit_damping(
         working.scale_to(*train.mean_squares())
     spread = train.spread() / working.output_scale.cpu().double()
     spread = torch.where(spread > 0, spread, 1.0)
-    task = Task(working, train.scaled(working), held and held.scaled(working), spread, seed, warm_start)
+    task = SchemeTask(working, train.scaled(working), held and held.scaled(working), spread, seed, warm_start)
     described = {"scheme": chosen.name, **chosen.options()}
     store = None
     if checkpoint_folder is not None:

@@ -24,10 +24,10 @@ from auvnn.models.structures.separate import Separate
 from auvnn.physics.attitude import quat_to_matrix
 from auvnn.physics.products import matvec
 from auvnn.training.fit_damping import fit_damping
-from auvnn.training.joint_least_squares import fit_jointly
-from auvnn.training.least_squares import REASONS, LeastSquares, Rules
+from auvnn.training.least_squares.batched import REASONS, LeastSquares, Rules
+from auvnn.training.least_squares.joint import fit_jointly
+from auvnn.training.least_squares.shared_network import SharedProblems
 from auvnn.training.problem import DampingProblem
-from auvnn.training.shared_network import SharedProblems
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from auvnn.training.sensitivity import Response
+from auvnn.estimation.sensitivity import Response
 
 Array = NDArray[np.float64]
 # A weak pull on each initial state towards the measured one keeps channels that were not measured in place:

@@ -10,9 +10,9 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.executors import Executor
-from auvnn.logs.mapping import Mapping
+from auvnn.log_chunks.samples import Piece, inside, run_of
+from auvnn.logs.reading.mapping import Mapping
 from auvnn.metrics.one_step import Derivative, accelerations
-from auvnn.metrics.pieces import Piece, inside, run_of
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]

@@ -14,7 +14,7 @@ from auvnn.damping.bank import DampingBank
 from auvnn.damping.base import AXES
 from auvnn.damping.region import Region
 from auvnn.errors import ConfigError, InputError
-from auvnn.training.groups import column_sums
+from auvnn.training.distributed.grouped_sums import column_sums
 from auvnn.training.samples import Samples
 
 

@@ -15,15 +15,15 @@ from torch import Tensor
 from auvnn.damping.bank import DampingBank
 from auvnn.damping.base import DampingForm
 from auvnn.damping.polynomial import Polynomial
-from auvnn.training.groups import added_all, problems_of, slices
-from auvnn.training.linear import merged, triangles
-from auvnn.training.networks import Problems
+from auvnn.training.distributed.grouped_sums import add_all_in_order, problems_of, slices
+from auvnn.training.least_squares.linear import merged, triangles
+from auvnn.training.least_squares.networks import Problems
 
 if TYPE_CHECKING:
     from auvnn.training.problem import DampingProblem
 
 
-class Sums(Protocol):
+class SampleSums(Protocol):
     """What a fit may ask of its samples, in memory or not."""
 
     def problems(self, form: DampingForm) -> Problems:
@@ -73,7 +73,7 @@ class Samples:
 
     def error_sums(self, bank: DampingBank) -> tuple[Tensor, Tensor]:
         """Return the sums of the weighted squared error of a bank, and of the weights, (6,) each."""
-        return added_all(error_sums(bank, group) for group in self.groups())
+        return add_all_in_order(error_sums(bank, group) for group in self.groups())
 
 
 def error_sums(bank: DampingBank, samples: Samples) -> tuple[Tensor, Tensor]:

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from auvnn.damping.bank import DampingBank
 from auvnn.logs import Log, Run
-from auvnn.logs.derivatives import LocalPolynomial
+from auvnn.logs.signals.derivatives import LocalPolynomial
 from auvnn.metrics.one_step import Derivative, accelerations, inertia_of, integrated
 from auvnn.models import GreyBox
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from auvnn.answers import Answer, plain
 from auvnn.damping.bank import DampingBank
 from auvnn.logs import Log
-from auvnn.logs.overlap import leakage
+from auvnn.logs.leakage import leakage
 from auvnn.metrics.one_step import (
     Derivative,
     OneStep,
@@ -25,7 +25,7 @@ from auvnn.metrics.one_step import (
 )
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
-from auvnn.training.absorbed import Absorption, absorption
+from auvnn.training.confounding.confounded_effects import Confounding, confounded_effects
 from auvnn.training.fit_damping import Fit, fit_damping
 from auvnn.training.history import Record
 from auvnn.training.objectives.base import build_objective
@@ -57,7 +57,7 @@ class Training(Answer):
     warnings: list[str] = field(default_factory=list)
     surfaces: list[dict[str, Any]] = field(default_factory=list)
     objective: dict[str, Any] = field(default_factory=lambda: {"objective": "one_step"})
-    absorbed: Absorption | None = None
+    absorbed: Confounding | None = None
     parts: dict[str, Any] | None = None
 
     def to_dict(self) -> dict[str, Any]:
@@ -178,7 +178,7 @@ def train(
     worse = [n for n in after if after[n]["rmse"] > before[n]["rmse"] * (1 + 1e-9)]
     if worse:
         warnings.append(f"held out, one step ahead, {', '.join(worse)} got worse by the training")
-    absorbed = absorption(trained, fitted, how)
+    absorbed = confounded_effects(trained, fitted, how)
     warnings += [] if absorbed is None else absorbed.words()
     metrics = metrics_of(fit, before, after, len(nu), held_samples)
     history, stopped = history_of(fit), fit.stopped_because

@@ -26,19 +26,27 @@ from typing import Any, Literal
 from auvnn.damping.bank import DampingBank
 from auvnn.errors import ConfigError
 from auvnn.executors import Executor, executor_for
+from auvnn.log_chunks.samples import Pieces, Reading, evenly_spread_runs
 from auvnn.logs import Log
-from auvnn.logs.mapping import Mapping
-from auvnn.metrics.pieces import Pieces, Reading, spread
+from auvnn.logs.reading.mapping import Mapping
 from auvnn.models import GreyBox
-from auvnn.training.absorbed import absorption
+from auvnn.training.confounding.confounded_effects import confounded_effects
+from auvnn.training.distributed.data_split import (
+    DataSplit,
+    Say,
+    named,
+    paths_of,
+    plan_files,
+    refuse_leakage,
+    split_data,
+)
+from auvnn.training.distributed.distributed_problem import DistributedProblem
+from auvnn.training.distributed.grouped_sums import GROUP
+from auvnn.training.distributed.target_cache import Source
 from auvnn.training.fit_damping import build_scheme, fit_damping
-from auvnn.training.groups import GROUP
 from auvnn.training.held_out import score
 from auvnn.training.history import Record
 from auvnn.training.objectives.base import build_objective
-from auvnn.training.parted import PartedProblem
-from auvnn.training.scratch import Source
-from auvnn.training.shares import Say, Shares, named, paths_of, planned, refuse_leakage, shared_out
 from auvnn.training.train import Training, history_of, metrics_of
 
 # Samples that are looked at in one place.
@@ -126,9 +134,9 @@ def train_files(
         executor_for(executor, workers, address) as pool,
         tempfile.TemporaryDirectory(prefix="auvnn-", dir=_made(scratch)) as folder,
     ):
-        whole = planned(pool, paths, reading, say)
-        tested = None if test is None else planned(pool, paths_of(test), reading, say)
-        shares, how = shared_out(whole, tested, derivative, plan, name, test_name)
+        whole = plan_files(pool, paths, reading, say)
+        tested = None if test is None else plan_files(pool, paths_of(test), reading, say)
+        shares, how = split_data(whole, tested, derivative, plan, name, test_name)
         if tested is not None:
             say("comparing the test log with the log that is fitted")
             refuse_leakage(pool, whole, tested, plan)
@@ -161,7 +169,7 @@ def train_files(
         warnings.append(f"and {len(whole.notes) - 5} more stretches of rows left out")
     if worse:
         warnings.append(f"held out, one step ahead, {', '.join(worse)} got worse by the training")
-    absorbed = absorption(trained, looked, how)
+    absorbed = confounded_effects(trained, looked, how)
     warnings += [] if absorbed is None else absorbed.words()
     return Training(
         model.vehicle.name,
@@ -198,15 +206,15 @@ def _made(scratch: str | Path | None) -> Path | None:
 
 
 def _sample(pieces: Pieces, mapping: Mapping, name: str) -> Log:
-    return Log.from_runs(spread(pieces, LOOKED_AT, mapping), name)
+    return Log.from_runs(evenly_spread_runs(pieces, LOOKED_AT, mapping), name)
 
 
 def _problem(
-    pool: Executor, source: Source, shares: Shares, size: int, say: Say
-) -> tuple[PartedProblem, int]:
+    pool: Executor, source: Source, shares: DataSplit, size: int, say: Say
+) -> tuple[DistributedProblem, int]:
     """Return the one-step problem, and the run number of what decides when to stop."""
     held = max(shares.fitted.runs) + 1
     stopping = [replace(p, run=held) for p in shares.stopping.pieces]
     pieces = [*shares.fitted.pieces, *stopping]
     say(f"what the subnetworks should give: {len(pieces)} pieces")
-    return PartedProblem.of(pool, source, pieces, size), held
+    return DistributedProblem.of(pool, source, pieces, size), held

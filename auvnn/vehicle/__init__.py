@@ -1,14 +1,14 @@
 """One vehicle's numbers: read, converted to FRD, checked for physics, and explained when refused."""
 
 from auvnn.vehicle.library import builtin_vehicles, load_vehicle, vehicle_path
-from auvnn.vehicle.parts import DampingElement, Fin, Table, Thruster
+from auvnn.vehicle.parts import DampingElement, Fin, Thruster, ThrustTable
 from auvnn.vehicle.vehicle import DEFAULT_UNCERTAINTY, Vehicle
 
 __all__ = [
     "DEFAULT_UNCERTAINTY",
     "DampingElement",
     "Fin",
-    "Table",
+    "ThrustTable",
     "Thruster",
     "Vehicle",
     "builtin_vehicles",

@@ -53,7 +53,7 @@ class DampingElement:
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class ThrustTable:
     """Thrust in N against the command, linear between the points and held beyond the ends."""
 
     command: Array
@@ -85,7 +85,7 @@ class Thruster:
     direction: Array
     max_forward: float
     max_reverse: float
-    curve: Literal["quadratic"] | Table = "quadratic"
+    curve: Literal["quadratic"] | ThrustTable = "quadratic"
     handedness: int = 1
 
     def __post_init__(self) -> None:
@@ -99,7 +99,7 @@ class Thruster:
             "direction": self.direction.tolist(),
             "max_forward": self.max_forward,
             "max_reverse": self.max_reverse,
-            "curve": self.curve.to_dict() if isinstance(self.curve, Table) else self.curve,
+            "curve": self.curve.to_dict() if isinstance(self.curve, ThrustTable) else self.curve,
             "handedness": self.handedness,
         }
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from auvnn.vehicle.fields import Fields
-from auvnn.vehicle.parts import Array, DampingElement, Fin, Table, Thruster
+from auvnn.vehicle.parts import Array, DampingElement, Fin, Thruster, ThrustTable
 
 
 def turned(turn: Array, vector: Array) -> Array:
@@ -57,7 +57,7 @@ def read_thruster(data: Any, where: str, turn: Array) -> Thruster:
     return Thruster(turned(turn, position), turned(turn, direction), *limits, curve, int(handedness))
 
 
-def _table(data: Any, where: str) -> Table:
+def _table(data: Any, where: str) -> ThrustTable:
     fields = Fields(data, where, "thrust curve", ("command", "thrust"))
     command = fields.array("command", (0,))
     thrust = fields.array("thrust", (0,))
@@ -77,7 +77,7 @@ def _table(data: Any, where: str) -> Table:
             "does not push along direction for positive commands",
             "turn the signs of the table, or the direction",
         )
-    return Table(command, thrust)
+    return ThrustTable(command, thrust)
 
 
 def read_fin(data: Any, where: str, turn: Array) -> Fin:

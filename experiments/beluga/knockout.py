@@ -8,7 +8,7 @@ catalogue, and nothing of what was removed. The effect has come back when it is 
 that is declared as one that these data cannot tell apart. `random-2` takes no part.
 
 With `--one-step` the catalogue is ranked instead by what each effect gains one step ahead on fifths of the whole fitted
-runs left out (`auvnn.diagnosis.rank_one_step`), which is what the model's effects were chosen and fitted by. Beside it
+runs left out (`auvnn.diagnosis.one_step.rank`), which is what the model's effects were chosen and fitted by. Beside it
 stands which effect's gain is most above what it gains on the whole model: that is told and does not count.
 """
 
@@ -72,7 +72,8 @@ def case(model: GreyBox, log: Log, removed: str | None) -> dict:
     head = found.steps[0]["effects"]
     entry = next((c for c in found.candidates if c["effect"] == removed), None)
     by_p = sorted(
-        (c for c in found.candidates if c["p_value"] is not None), key=lambda c: (c["p_value"], -(c["explained"] or 0))
+        (c for c in found.candidates if c["p_value"] is not None),
+        key=lambda c: (c["p_value"], -(c["explained"] or 0)),
     )
     return {
         "removed": removed,
@@ -83,7 +84,9 @@ def case(model: GreyBox, log: Log, removed: str | None) -> dict:
         "nearest": list(found.nearest),
         "named_later": any(removed in s["effects"] for s in found.steps[1:]),
         "rank_by_evidence": [c["effect"] for c in found.candidates].index(removed) + 1 if removed else None,
-        "rank_by_p_value": [c["effect"] for c in by_p].index(removed) + 1 if entry and entry in by_p else None,
+        "rank_by_p_value": [c["effect"] for c in by_p].index(removed) + 1
+        if entry and entry in by_p
+        else None,
         "p_value": entry and entry["p_value"],
         "confusable_with": entry and entry["confusable_with"][:3],
         "parameters": entry and entry["parameters"],
@@ -113,7 +116,9 @@ def main() -> None:
         if one_step:
             told = ", ".join(f"{r['effect']} {r['gain']:.3f} +- {r['std']:.3f}" for r in found["ranking"][:3])
         else:
-            told = " then ".join(f"{s['verdict']} {' or '.join(s['effects'])}".strip() for s in found["steps"])
+            told = " then ".join(
+                f"{s['verdict']} {' or '.join(s['effects'])}".strip() for s in found["steps"]
+            )
             told += f"; nearest {', '.join(found['nearest'])}" if found["nearest"] else ""
         print(f"without {name}: {told} ({found['seconds']} s)", flush=True)
         back = sum(bool(c["named_first"] or c.get("in_first_group")) for c in cases)

@@ -18,7 +18,9 @@ import torch
 from glitches import without_glitches
 
 from auvnn.answers import plain
-from auvnn.diagnosis import add, compare, diagnose
+from auvnn.comparison import compare
+from auvnn.diagnosis import diagnose
+from auvnn.improvement import add
 from auvnn.logs import Log, Run
 from auvnn.models import GreyBox, load
 

@@ -30,7 +30,7 @@ HIDDEN: dict[str, dict[str, dict[str, float]]] = {
 def logged(hidden: str, minutes: float, rate: float) -> tuple[Any, Any]:
     """Return model and log."""
     from auvnn.models import load
-    from auvnn.simulate import simulate
+    from auvnn.simulation import simulate
 
     model = load("rov95")
     made = simulate(
@@ -103,7 +103,12 @@ def main(*words: str) -> None:
                 child = [sys.executable, __file__, "--child", what, hidden, str(minutes), str(rate)]
                 done = subprocess.run(child, env=environment, check=True, capture_output=True, text=True)
                 found.append(json.loads(done.stdout.splitlines()[-1]))
-            row: dict[str, Any] = {"hidden": hidden, "what": what, "answer": found[0]["answer"], "repeats": found}
+            row: dict[str, Any] = {
+                "hidden": hidden,
+                "what": what,
+                "answer": found[0]["answer"],
+                "repeats": found,
+            }
             for key in ("wall_s", "processor_s", "memory_mb"):
                 row[key] = statistics.median(f[key] for f in found) if key in found[0] else None
             rows.append(row)

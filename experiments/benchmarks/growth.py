@@ -84,12 +84,12 @@ def measure(what: str, path: Path, workers: int) -> dict[str, float]:
 
     torch.set_num_threads(1)
     import auvnn
-    from auvnn.diagnosis.nuisance import lay_out
-    from auvnn.diagnosis.passes import Passes, Point
+    from auvnn.diagnosis.full_data.map_reduce import LinearisationPoint, MapReduce
+    from auvnn.diagnosis.hypotheses.layout import lay_out
     from auvnn.effects import Extent
     from auvnn.executors import executor_for
-    from auvnn.logs.mapping import Mapping
-    from auvnn.metrics.parts import Cut, plan_files
+    from auvnn.log_chunks.windows import WindowCut, plan_files
+    from auvnn.logs.reading.mapping import Mapping
 
     model = auvnn.load("rov90", actuation="wrench")
     begin, cpu = time.perf_counter(), _cpu()
@@ -107,16 +107,18 @@ def measure(what: str, path: Path, workers: int) -> dict[str, float]:
         assert found.whole_log is not None
         windows = found.whole_log["looked_at"]
     else:
-        cut = Cut(5.0, 3.0, "wrench", Mapping.read(None))
+        cut = WindowCut(5.0, 3.0, "wrench", Mapping.read(None))
         plan = plan_files([path], cut)
         windows = plan.windows
         if what == "sums":
             layout = lay_out(model, [])
             sigma = np.full(18, np.inf)
             sigma[:12] = [0.05] * 3 + [0.005] * 3 + [0.005] * 6
-            point = Point(layout, (), Extent(0.0, 1.0, 1.0, (0.0, 0.0)), tuple(layout.names), sigma, cut, 1)
+            point = LinearisationPoint(
+                layout, (), Extent(0.0, 1.0, 1.0, (0.0, 0.0)), tuple(layout.names), sigma, cut, 1
+            )
             with executor_for(workers=workers) as pool:
-                Passes(pool, plan.parts).sums(point, "sums")
+                MapReduce(pool, plan.parts).sums(point, "sums")
     memory = max(
         resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     )

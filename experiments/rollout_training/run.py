@@ -22,7 +22,7 @@ from auvnn.answers import plain, write_text
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox, load
-from auvnn.simulate import simulate
+from auvnn.simulation import simulate
 from auvnn.training import train
 
 VEHICLE, EXCITATION, RATE, RUNS, DURATION = "rov95", "multisine", 10.0, 4, 20.0
@@ -33,7 +33,9 @@ WAYS: dict[str, dict[str, Any]] = {
     "one_step_estimated": {"derivative": {"method": "local_polynomial"}},
     "rollout": {"objective": {"objective": "rollout", "window": 4.0, "iterations": 6}},
     "rollout_torchdiffeq": {"objective": {"objective": "rollout_torchdiffeq", "window": 4.0, "epochs": 15}},
-    "rollout_given": {"objective": {"objective": "rollout", "window": 4.0, "iterations": 6, "start": "given"}},
+    "rollout_given": {
+        "objective": {"objective": "rollout", "window": 4.0, "iterations": 6, "start": "given"}
+    },
 }
 # What is done, in this order, so that a study that is cut short has told the most. Where no acceleration is
 # measured, the one-step fit is on estimated ones anyway.
@@ -120,7 +122,9 @@ def main() -> None:
     parser.add_argument("out", nargs="?", default="outputs/rollout_training")
     parser.add_argument("--seeds", default=",".join(map(str, range(10))))
     parser.add_argument("--noises", default="paper,realistic,none")
-    parser.add_argument("--small", action="store_true", help="little data and few steps: seconds, not minutes")
+    parser.add_argument(
+        "--small", action="store_true", help="little data and few steps: seconds, not minutes"
+    )
     given = parser.parse_args()
     torch.set_num_threads(1)
     kept = Path(given.out) / "rows.json"

@@ -37,7 +37,9 @@ def main() -> None:
     for name, one in found.manoeuvres.items():
         for effect, share in one["swallowed"].items():
             if share["elsewhere"] is not None:
-                print(f"{name}: networks trained on {effect} give {share['elsewhere']:.2g} of it on the multisine")
+                print(
+                    f"{name}: networks trained on {effect} give {share['elsewhere']:.2g} of it on the multisine"
+                )
     print(f"report: {Path(given.out) / 'report.html'}")
 
 

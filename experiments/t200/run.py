@@ -46,7 +46,12 @@ START = {
     "thrust_overshoot": [0.1, -0.3],
     "thruster_gain": [1.0],
 }
-LOW = {"thruster_lag": [2e-4], "actuation_delay": [0.0], "thruster_deadband": [0.0], "thrust_overshoot": [0.05, -1.0]}
+LOW = {
+    "thruster_lag": [2e-4],
+    "actuation_delay": [0.0],
+    "thruster_deadband": [0.0],
+    "thrust_overshoot": [0.05, -1.0],
+}
 ITERATIONS = 8
 
 
@@ -167,7 +172,9 @@ class Bench:
                 free = ~((theta <= self.low) & (right < 0))
                 step = np.zeros(len(theta))
                 lhs = square[np.ix_(free, free)]
-                step[free] = np.linalg.solve(lhs + damping * np.diag(np.diag(lhs) + 1e-12 * lhs.max()), right[free])
+                step[free] = np.linalg.solve(
+                    lhs + damping * np.diag(np.diag(lhs) + 1e-12 * lhs.max()), right[free]
+                )
                 trial = np.maximum(theta + step, self.low)
                 trial_gap = batch.force - self.predict(trial, batch)
                 trial_cost = float((trial_gap**2).sum())
@@ -220,7 +227,8 @@ def studied(data: Path, effects: tuple[str, ...], sines: list[Batch], squares: l
         left.append({"record": SINES[k], **score(others, sines[k]), "parameters": parameters})
     half = student.ppf(0.975, len(together.force) - 1) * std
     parameters = {
-        n: {"value": v, "low": v - h, "high": v + h} for n, v, h in zip(whole.names, whole.theta, half, strict=True)
+        n: {"value": v, "low": v - h, "high": v + h}
+        for n, v, h in zip(whole.names, whole.theta, half, strict=True)
     }
     return {
         "parameters": parameters,
@@ -302,8 +310,17 @@ def main() -> None:
         }
     result["lag by convention"] = conventions(data)
     result["ringing_Hz"] = ringing(lag, squares)
-    print("time constant by convention, ms:", {n: round(1e3 * v, 1) for n, v in result["lag by convention"].items()})
-    print("squares' own fit:", {n: round(v["r2"], 3) for n, v in own.items()}, "ringing", result["ringing_Hz"], "Hz")
+    print(
+        "time constant by convention, ms:",
+        {n: round(1e3 * v, 1) for n, v in result["lag by convention"].items()},
+    )
+    print(
+        "squares' own fit:",
+        {n: round(v["r2"], 3) for n, v in own.items()},
+        "ringing",
+        result["ringing_Hz"],
+        "Hz",
+    )
     (out / "result.json").write_text(json.dumps(plain(result), indent=1), encoding="utf-8")
     from figure import draw
 

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from command_line import auvnn, refused
-from stand_ins import write_two
 
 from auvnn.cli import check
 from auvnn.cli.job import Job, Verb
+from tests.cli.stand_ins import write_two
+from tests.command_line import auvnn, refused
 
 __all__ = ["auvnn", "refused", "stand_in"]
 

@@ -39,7 +39,11 @@ def test_lists_and_single_names_are_taken(auvnn):
     found = [(c.hidden, c.size, c.noise, c.seed) for c in cases(yaml.safe_load(out))]
     away = apart("ocean_current")
     assert found == [
-        *(("ocean_current", size, "none", away + seed) for size in ("small", "large") for seed in (1000, 1001)),
+        *(
+            ("ocean_current", size, "none", away + seed)
+            for size in ("small", "large")
+            for seed in (1000, 1001)
+        ),
         *(("nothing", "none", "none", seed) for seed in (1000, 1001)),
     ]
 
@@ -47,7 +51,10 @@ def test_lists_and_single_names_are_taken(auvnn):
 def test_a_dry_run_says_what_it_would_write(auvnn):
     status, out, err = auvnn("benchmark", *TINY, "out=out", "dry_run=true")
     assert (status, err) == (0, "")
-    assert "would write  benchmark.json, rows.jsonl, report.html, figures/ in out" in out and not Path("out").exists()
+    assert (
+        "would write  benchmark.json, rows.jsonl, report.html, figures/ in out" in out
+        and not Path("out").exists()
+    )
 
 
 def test_misspelt_words_are_refused(refused):
@@ -62,7 +69,9 @@ def test_misspelt_words_are_refused(refused):
 def test_one_log_from_the_command_line_to_the_report(auvnn):
     status, out, err = auvnn("benchmark", *TINY, "out=out")
     assert status == 0 and "Traceback" not in err
-    assert {p.name + "/" * p.is_dir() for p in Path("out").iterdir()} - {".hydra/"} == set(VERBS.get("benchmark").writes)
+    assert {p.name + "/" * p.is_dir() for p in Path("out").iterdir()} - {".hydra/"} == set(
+        VERBS.get("benchmark").writes
+    )
     answer = json.loads(Path("out/benchmark.json").read_text())
     assert answer["schema"] == "auvnn/benchmark/1"
     assert answer["metrics"]["logs"] == 1 and answer["metrics"]["faults"] == 0

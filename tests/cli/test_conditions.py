@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from auvnn.config import config_dir, read_yaml
-from auvnn.simulate import EXCITATIONS, make_excitation, make_noise
+from auvnn.simulation import EXCITATIONS, make_excitation, make_noise
 from auvnn.studies.hidden import SIZES
 
 

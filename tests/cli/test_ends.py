@@ -9,7 +9,8 @@ import time
 from pathlib import Path
 
 import pytest
-from stand_ins import ENVIRONMENT
+
+from tests.cli.stand_ins import ENVIRONMENT
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 

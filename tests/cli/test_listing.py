@@ -7,10 +7,10 @@ import sys
 
 import pytest
 import yaml
-from stand_ins import ENVIRONMENT
 
 from auvnn.cli.main import VERBS
 from auvnn.config import config_dir
+from tests.cli.stand_ins import ENVIRONMENT
 
 HEAVY = ("torch", "matplotlib", "scipy", "polars", "hydra", "rich")
 

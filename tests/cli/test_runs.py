@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 import yaml
-from stand_ins import Plain, write_two
 
 from auvnn.cli.sweep import note, statuses
 from auvnn.errors import InputError
+from tests.cli.stand_ins import Plain, write_two
 
 pytestmark = pytest.mark.usefixtures("stand_in")
 
@@ -166,7 +166,9 @@ def test_jobs_run_in_processes_of_their_own_and_one_may_fail(auvnn):
     assert out.count("written") == 1
 
 
-@pytest.mark.parametrize("words", [["-j", "2"], ["-m", "-j", "none"], ["-m", "-j", "2", "hydra/launcher=basic"]])
+@pytest.mark.parametrize(
+    "words", [["-j", "2"], ["-m", "-j", "none"], ["-m", "-j", "2", "hydra/launcher=basic"]]
+)
 def test_jobs_are_asked_for_in_one_way(refused, words):
     assert "-j" in refused("check", "log=dive.csv", "mapping=a,b", "out=many", *words)
 

@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from stand_ins import ENVIRONMENT
 
 from auvnn.cli.speech import one_line
+from tests.cli.stand_ins import ENVIRONMENT
 
 pty = pytest.importorskip("pty", reason="a terminal is needed")
 

@@ -11,7 +11,7 @@ import pytest
 
 from auvnn.cli.main import VERBS, main
 from auvnn.cli.speech import Speaker
-from auvnn.diagnosis import compare
+from auvnn.comparison import compare
 from auvnn.errors import InputError
 from auvnn.logs import Log
 from auvnn.models import load
@@ -23,7 +23,13 @@ Run = Callable[..., tuple[int, str, str]]
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A log with a hidden current, 3 runs of 15 s."""
     out = tmp_path_factory.mktemp("made") / "simulate"
-    words = ["hidden={ocean_current: {v_north: 0.3, v_east: -0.2}}", "runs=3", "duration=15", "rate=10", "noise=none"]
+    words = [
+        "hidden={ocean_current: {v_north: 0.3, v_east: -0.2}}",
+        "runs=3",
+        "duration=15",
+        "rate=10",
+        "noise=none",
+    ]
     assert main(["simulate", "model=rov95", *words, f"out={out}"]) == 0
     return out
 
@@ -130,7 +136,7 @@ def test_adding_hands_the_length_of_windows_on(refused_after, made, monkeypatch)
     def tell(*_args, window, **_options):
         raise InputError(f"asked for {window} s")
 
-    monkeypatch.setattr("auvnn.diagnosis.add", tell)
+    monkeypatch.setattr("auvnn.improvement.add", tell)
     words = ["model=rov95", f"log={made / 'log.parquet'}", "effect=ocean_current"]
     assert "asked for 2.5 s" in refused_after("add", *words, "window=2.5")
     assert "asked for None s" in refused_after("add", *words)
@@ -196,7 +202,7 @@ def test_an_interrupted_training_goes_on_to_the_same_end(auvnn, made, monkeypatc
 
 
 def test_a_folder_is_diagnosed_in_parts_where_that_is_asked_for(auvnn, made, monkeypatch, tmp_path):
-    from auvnn.diagnosis import many
+    from auvnn.diagnosis.full_data import large_logs as many
 
     asked = {}
 
@@ -205,9 +211,19 @@ def test_a_folder_is_diagnosed_in_parts_where_that_is_asked_for(auvnn, made, mon
         raise InputError("asked")
 
     monkeypatch.setattr(many, "diagnose_files", record)
-    words = ["diagnose", "model=rov95", f"log={made}", "stream=true", "windows=all", "workers=2", f"out={tmp_path / 'o'}"]
+    words = [
+        "diagnose",
+        "model=rov95",
+        f"log={made}",
+        "stream=true",
+        "windows=all",
+        "workers=2",
+        f"out={tmp_path / 'o'}",
+    ]
     assert auvnn(*words)[0] == 2
-    assert asked["paths"] == [made / "log.parquet"] and asked["actuation"] == Log.read(made / "log.parquet").kind
+    assert (
+        asked["paths"] == [made / "log.parquet"] and asked["actuation"] == Log.read(made / "log.parquet").kind
+    )
     assert asked["windows"] is None and asked["leading"] == many.LEADING and asked["search"] == many.SEARCH
     assert asked["workers"] == 2 and asked["executor"] is None and asked["effects"] is None
     status, _, err = auvnn(*words, "max_duration=10")
@@ -302,7 +318,15 @@ def refused_after(
 
 
 def test_a_manoeuvre_is_written_as_a_command_file(auvnn, tmp_path):
-    words = ["model=rov95", "excitation=pulses", "noise=none", "runs=2", "duration=4", "rate=5", "commands=true"]
+    words = [
+        "model=rov95",
+        "excitation=pulses",
+        "noise=none",
+        "runs=2",
+        "duration=4",
+        "rate=5",
+        "commands=true",
+    ]
     status, _, err = auvnn("simulate", *words, f"out={tmp_path / 'made'}")
     assert status == 0, err
     told = np.genfromtxt(tmp_path / "made" / "commands.csv", delimiter=",", names=True)

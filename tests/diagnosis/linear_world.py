@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from small_logs import small_vehicle
 
-from auvnn.diagnosis.nuisance import Layout, lay_out, priors, scales, stated
+from auvnn.diagnosis.hypotheses.layout import Layout, has_stated_uncertainty, lay_out, priors, scales
+from auvnn.estimation.normal_equations import Statistics
+from auvnn.estimation.priors import set_parameters
 from auvnn.models import GreyBox
-from auvnn.training.free_parameters import set_parameters
-from auvnn.training.window_sums import Statistics
+from tests.small_logs import small_vehicle
 
 STATED = 0.15
 CANDIDATES = ["ocean_current", "net_buoyancy", "thruster_lag", "added_mass", "cg_offset"]
@@ -49,7 +49,9 @@ class World:
         own = random.normal(size=(windows, samples, len(size)))
         common = random.normal(size=(windows, samples, 3)) @ random.normal(size=(3, len(size))) / np.sqrt(3)
         trace = np.sqrt(1 - mixing**2) * own + mixing * common
-        return cls(at, trace * strength / np.sqrt(windows * samples) / size, np.arange(windows) * runs // windows)
+        return cls(
+            at, trace * strength / np.sqrt(windows * samples) / size, np.arange(windows) * runs // windows
+        )
 
     @property
     def means(self) -> np.ndarray:
@@ -59,14 +61,16 @@ class World:
     def drawn(self, random: np.random.Generator, **changed: float | np.ndarray) -> np.ndarray:
         """Return true parameters: uncertain ones drawn by their stated amounts, the rest at the null plus a change."""
         truth = self.means.copy()
-        for name, share in stated(self.layout.model).items():
+        for name, share in has_stated_uncertainty(self.layout.model).items():
             columns = self.layout.columns[name]
             truth[columns] *= 1 + share * random.normal(size=len(columns))
         for name, change in changed.items():
             truth[self.layout.columns[name]] = self.layout.means[name] + change
         return truth
 
-    def errors(self, truth: np.ndarray, random: np.random.Generator, noise: Callable | None = None) -> np.ndarray:
+    def errors(
+        self, truth: np.ndarray, random: np.random.Generator, noise: Callable | None = None
+    ) -> np.ndarray:
         """Return measured minus predicted at the stated values, (B, n); the noise is white unless given."""
         draw = noise or (lambda random, shape: random.normal(size=shape))
         return self.jacobian @ (truth - self.means) + draw(random, self.jacobian.shape[:2])
@@ -83,8 +87,17 @@ class World:
         zeros = np.zeros((windows, 18))
         count = zeros.copy()
         count[:, 6] = samples
-        return Statistics(self.hessian, np.einsum("bni,bn->bi", self.jacobian, e), np.sum(e**2, 1), zeros, count,
-                          zeros, zeros, self.run, np.arange(windows))
+        return Statistics(
+            self.hessian,
+            np.einsum("bni,bn->bi", self.jacobian, e),
+            np.sum(e**2, 1),
+            zeros,
+            count,
+            zeros,
+            zeros,
+            self.run,
+            np.arange(windows),
+        )
 
     def fitted_null(self, errors: np.ndarray, base: list[str], free: tuple[str, ...] = ()) -> np.ndarray:
         """Return all parameters with the base fitted by dense least squares, its prior as more rows, (P,)."""

@@ -38,7 +38,9 @@ def test_a_long_uneven_record_against_the_differential_equation(tau):
     state, expected = command[0, 0], []
     for k in range(399):
         h, c = t[k + 1] - t[k], command[k, 0]
-        run = solve_ivp(lambda _, y, c=c: [(c - y[0]) / tau, y[0]], (0, h), [state, 0.0], rtol=1e-10, atol=1e-12)
+        run = solve_ivp(
+            lambda _, y, c=c: [(c - y[0]) / tau, y[0]], (0, h), [state, 0.0], rtol=1e-10, atol=1e-12
+        )
         expected.append(c + 2.0 * (c - run.y[1, -1] / h))
         state = run.y[0, -1]
     command = np.pad(command, ((0, 0), (0, 5)))

@@ -28,7 +28,9 @@ def test_roll_and_pitch_are_wrong_by_the_tilt_and_change_with_the_heading(plain)
     headings = Rotation.from_euler("z", [[0.0], [np.pi / 2]])
     zero = torch.zeros(2, 6).double()
     seen = model.sense(Sensed(zero[:, :3], torch.tensor(np.roll(headings.as_quat(), 1, axis=1)), zero))
-    yaw, pitch, roll = Rotation.from_quat(np.roll(seen.quaternion.detach().numpy(), -1, axis=1)).as_euler("ZYX").T
+    yaw, pitch, roll = (
+        Rotation.from_quat(np.roll(seen.quaternion.detach().numpy(), -1, axis=1)).as_euler("ZYX").T
+    )
     np.testing.assert_allclose(roll, [0.05, 0.0], atol=1e-12)
     np.testing.assert_allclose(pitch, [0.0, -0.05], atol=1e-12)
     np.testing.assert_allclose(yaw, [0.0, np.pi / 2], atol=1e-12)

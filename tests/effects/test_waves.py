@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from auvnn.diagnosis.told import told
+from auvnn.diagnosis.answers.describe_parameters import describe_parameters
 from auvnn.effects import Moment
 from auvnn.effects.waves import Waves
 from auvnn.testing import plain_vehicle
@@ -76,7 +76,12 @@ def test_a_fixed_body_feels_displaced_and_added_mass(plain, vector, still):
 
 def test_a_wave_is_told_with_a_height_above_zero_and_angles_within_half_a_turn():
     """The same water moves, whatever of the many values that mean one wave a fit has ended at."""
-    found = {**VALUES, "amplitude": -0.4, "phase": 0.7 - math.pi + 4 * math.pi, "direction": 2.0 - 2 * math.pi}
+    found = {
+        **VALUES,
+        "amplitude": -0.4,
+        "phase": 0.7 - math.pi + 4 * math.pi,
+        "direction": 2.0 - 2 * math.pi,
+    }
     stated = Waves.told(found)
     assert stated == pytest.approx(VALUES) and Waves.told(stated) == stated
     at, time = torch.tensor([3.0, -2.0, 1.0], dtype=torch.float64), torch.tensor(1.3, dtype=torch.float64)
@@ -86,6 +91,6 @@ def test_a_wave_is_told_with_a_height_above_zero_and_angles_within_half_a_turn()
 
 def test_answers_tell_the_wave_so_with_the_standard_errors_of_the_fit(plain):
     effect = plain({"waves": {**VALUES, "amplitude": -0.4}}).effect("waves")
-    found = told(effect, effect.theta.detach().numpy(), np.array([0.1, 0.2, 0.3, 0.4]))
+    found = describe_parameters(effect, effect.theta.detach().numpy(), np.array([0.1, 0.2, 0.3, 0.4]))
     assert found["amplitude"] == {"value": pytest.approx(0.4), "std": 0.1, "unit": "m"}
     assert found["phase"]["value"] == pytest.approx(0.7 - math.pi) and found["direction"]["std"] == 0.4

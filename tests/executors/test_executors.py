@@ -8,10 +8,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from chores import always_deadly, noisy, once_deadly, power, refusing
 
 from auvnn.errors import ConfigError, InputError, MissingExtra
 from auvnn.executors import EXECUTORS, Lost, executor_for
+from tests.executors.chores import always_deadly, noisy, once_deadly, power, refusing
 
 
 def test_one_worker_is_this_process():

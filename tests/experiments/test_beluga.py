@@ -29,7 +29,9 @@ def test_the_model_file_has_the_published_rows():
     np.testing.assert_allclose(np.abs(rows[3][[1, 2, 5, 6]]), 0.22, atol=1e-4)
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason="Beluga's logs are not here: set AUVNN_DATA to the folder above beluga/")
+@pytest.mark.skipif(
+    not DATA.is_dir(), reason="Beluga's logs are not here: set AUVNN_DATA to the folder above beluga/"
+)
 def test_the_reversed_rates_are_found_before_any_fitting():
     log = Log.read(DATA / "random-1.csv", HERE / "mapping-raw.yaml")
     scales = {n: k.scale for n, k in log.quality().kinematics.items()}
@@ -65,7 +67,9 @@ def test_the_readme_says_of_parts_left_out_what_was_measured(step):
         left = EXPECTED[step]["left_out"][part]
         value, std = (float(x) for x in after.split(" +- "))
         assert float(before) == pytest.approx(left["before"], abs=0.000501)
-        assert value == pytest.approx(left["after"], abs=0.000501) and std == pytest.approx(left["std"], abs=0.000501)
+        assert value == pytest.approx(left["after"], abs=0.000501) and std == pytest.approx(
+            left["std"], abs=0.000501
+        )
         assert verdict.startswith("pays") is (left["gain"] > left["std"])
 
 
@@ -73,7 +77,12 @@ def test_the_knock_outs_that_missed_are_told_as_missed():
     """The README's rate is that of the file: three of four by the earlier ranking, the tilt not by the present one."""
     earlier = EXPECTED["knock-out"]["one step, everything else held (earlier version and fit)"]
     back = {c["removed"]: c["named_first"] or c["in_first_group"] for c in earlier["cases"] if c["removed"]}
-    assert back == {"cg_offset": True, "turning_forces": True, "thrust_overshoot": True, "tilted_vertical": False}
+    assert back == {
+        "cg_offset": True,
+        "turning_forces": True,
+        "thrust_overshoot": True,
+        "tilted_vertical": False,
+    }
     present = {c["removed"]: c["rank"] for c in EXPECTED["knock-out"]["one step"]["cases"]}
     assert present == {"tilted_vertical": 3, "turning_forces": 1, "cg_offset": 1, "thrust_overshoot": 1}
     text = (HERE / "README.md").read_text()

@@ -58,9 +58,9 @@ def test_a_model_takes_it_by_name_and_keeps_it(installed, tmp_path):
 
 
 def test_diagnosis_has_it_among_its_candidates(installed):
-    from auvnn.diagnosis.cut import candidates_for
+    from auvnn.diagnosis.hypotheses.candidates import candidates_for
     from auvnn.models import load
-    from auvnn.simulate import simulate
+    from auvnn.simulation import simulate
 
     model = load("rov95")
     log = simulate(model, "paper", runs=1, duration=2.0, rate=10.0, max_step=0.1).log

@@ -32,7 +32,9 @@ def answer() -> dict[str, Any]:
             "fault": None, "fall": {"share": 0.93 if missing else 0.0},
         }  # fmt: skip
 
-    rows = [row(s, "named", ["cg_offset"]) for s in ("medium", "large", "large")] + [row("small", "adequate", [])]
+    rows = [row(s, "named", ["cg_offset"]) for s in ("medium", "large", "large")] + [
+        row("small", "adequate", [])
+    ]
     part = {"targets": [{"rate": "named_first", "least": 0.9, "sizes": ["medium", "large"]}]}
     plan = {"parts": {"one": part}, "targets": [{"rate": "median_fall", "least": 0.95}]}
     return json.loads(json.dumps(summarise(rows, {"plan": plan}).to_dict()))
@@ -51,7 +53,9 @@ def test_the_tables_say_what_the_answer_says(script, answer):
 def test_the_readme_is_filled_between_its_marks_and_can_be_filled_again(script, answer, tmp_path):
     readme = tmp_path / "README.md"
     text = (HERE / "README.md").read_text(encoding="utf-8")
-    assert text.count(script.BEGIN) == text.count(script.END) == 1 and text.index(script.BEGIN) < text.index(script.END)
+    assert text.count(script.BEGIN) == text.count(script.END) == 1 and text.index(script.BEGIN) < text.index(
+        script.END
+    )
     readme.write_text(text, encoding="utf-8")
     (tmp_path / "out" / "figures").mkdir(parents=True)
     (tmp_path / "out" / "figures" / "confusion.png").write_bytes(b"png")

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from command_line import auvnn, refused
-from log_samples import frame, make_run
-from vehicles import put
 
 from auvnn.errors import AuvnnError
 from auvnn.logs import Log
+from tests.command_line import auvnn, refused
+from tests.faults.vehicles import put
+from tests.log_samples import frame, make_run
 
 __all__ = ["auvnn", "good", "home", "noted", "refused", "rows"]
 

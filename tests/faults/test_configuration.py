@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 import yaml
-from vehicles import four, put
 
 from auvnn.errors import AuvnnError
 from auvnn.logs import Log
 from auvnn.models import load
+from tests.faults.vehicles import four, put
 
 
 @pytest.mark.parametrize(

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
-from log_samples import frame, make_run, same
 
 from auvnn.errors import InputError
 from auvnn.logs import Log
 from auvnn.logs.readers.csv import CsvReader
+from tests.log_samples import frame, make_run, same
 
 RUN = make_run(400, noise=0.01)
 
@@ -26,7 +26,9 @@ def joined(rows: list[list[str]], separator: str = ",") -> str:
 
 def uncompressed(path: Path) -> bytes:
     """A Parquet file of another program, without compression, statistics or checksums."""
-    parquet.write_table(frame(RUN).to_arrow(), path, compression="NONE", use_dictionary=False, write_statistics=False)
+    parquet.write_table(
+        frame(RUN).to_arrow(), path, compression="NONE", use_dictionary=False, write_statistics=False
+    )
     return path.read_bytes()
 
 
@@ -83,7 +85,9 @@ def test_row_05_a_file_that_ends_in_the_middle(refused, noted, good):
     lines = good.split("\n")
     Path("cut.csv").write_text("\n".join(lines[:300])[:-20])
     found = noted("cut.csv")
-    assert re.search(r"warning: cut\.csv: rows with the wrong number .*0\.33 % .*the last row is cut short", found)
+    assert re.search(
+        r"warning: cut\.csv: rows with the wrong number .*0\.33 % .*the last row is cut short", found
+    )
     same(Log.read("cut.csv").runs[0], make_run(400, noise=0.01).cut(slice(0, 298)))
     Path("cut.csv").write_text("\n".join(lines[:300])[:-1])
     assert "the last row has no line end: complete, unless the copy was cut" in noted("cut.csv")
@@ -113,7 +117,9 @@ def test_row_07_one_flipped_bit_in_a_parquet_file(refused, noted):
     data[at + 7] ^= 0x40  # the highest bit of the exponent
     foreign.write_bytes(data)
     found = noted(foreign, level="warning")
-    assert "foreign.parquet: values of 'nu' beyond 1e+03, which no vehicle reaches, read as missing (1)" in found
+    assert (
+        "foreign.parquet: values of 'nu' beyond 1e+03, which no vehicle reaches, read as missing (1)" in found
+    )
     assert np.flatnonzero(np.isnan(Log.read(foreign).runs[0].nu[:, 0])).tolist() == [100]
     whole = frame(RUN).to_arrow()
     parquet.write_table(whole, foreign, compression="NONE", write_page_checksum=True, use_dictionary=False)
@@ -184,9 +190,13 @@ def test_row_21_column_names(refused, noted, good, rows):
     Path("log.csv").write_text(good.replace("voltage", "u", 1))
     assert "the columns 'u' occur twice; rename one of each" in refused("check", "log=log.csv")
     table = frame(RUN).to_arrow()
-    parquet.write_table(table.rename_columns([n.replace("voltage", "u") for n in table.column_names]), "log.parquet")
+    parquet.write_table(
+        table.rename_columns([n.replace("voltage", "u") for n in table.column_names]), "log.parquet"
+    )
     assert "the columns 'u' occur twice; rename one of each" in refused("check", "log=log.parquet")
-    parquet.write_table(table.rename_columns([n.replace("voltage", "") for n in table.column_names]), "log.parquet")
+    parquet.write_table(
+        table.rename_columns([n.replace("voltage", "") for n in table.column_names]), "log.parquet"
+    )
     assert "warning: log.parquet: column without a name left out" in noted("log.parquet")
     Path("log.csv").write_text(joined([["" if c == "v" else c for c in rows[0]], *rows[1:]]))
     assert "has no name; name it in the header line" in refused("check", "log=log.csv")
@@ -200,7 +210,7 @@ def test_row_21_column_names(refused, noted, good, rows):
 
 def test_row_22_a_log_larger_than_the_memory(refused, noted, monkeypatch, good):
     """It is refused before it is read; its beginning can be read in as much memory as that takes."""
-    monkeypatch.setattr("auvnn.logs.head._FIRST", 4000)
+    monkeypatch.setattr("auvnn.logs.reading.head._FIRST", 4000)
     with Path("long.csv").open("w") as stream:
         header, *lines = good.strip().split("\n")
         stream.write(header + "\n")
@@ -225,7 +235,7 @@ def test_row_22_the_beginning_is_that_of_the_whole(name, monkeypatch):
     t = RUN.t + np.where(np.arange(400) >= 100, 60.0, 0.0)  # a minute's pause does not count
     table = frame(make_run(400, noise=0.01, t=t))
     (table.write_csv if name.endswith("csv") else table.write_parquet)(name)
-    monkeypatch.setattr("auvnn.logs.head._FIRST", 3000)
+    monkeypatch.setattr("auvnn.logs.reading.head._FIRST", 3000)
     same(Log.read(name, max_duration=10.0).runs[0], Log.read(name).runs[0].cut(slice(0, 202)))
     same(Log.read(name, max_duration=1e4).runs[0], Log.read(name).runs[0])
 
@@ -282,7 +292,10 @@ def test_row_24_names_that_are_no_words(auvnn, good, rows):
     assert set(os.listdir()) == {*before, "out"}
     assert {p.name for p in Path("out").iterdir()} == {".hydra", "figures", "quality.json", "report.html"}
     assert all(re.fullmatch(r"[\w.-]+", p.name) for p in Path("out/figures").iterdir())
-    assert json.loads(Path("out/quality.json").read_text())["read"]["unknown_columns"] == [*hostile[:3], "bell?"]
+    assert json.loads(Path("out/quality.json").read_text())["read"]["unknown_columns"] == [
+        *hostile[:3],
+        "bell?",
+    ]
     page = Path("out/report.html").read_text()
     assert "<script" not in page and "&lt;script&gt;" in page and "\x07" not in page + out
     Path("latin.csv").write_bytes(joined(table).encode().replace(b"a b/c$HOME", b"Temp\xe9ratur"))

@@ -9,14 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from log_samples import frame
-from small_logs import make_log, small_vehicle
-from vehicles import put
 
+from auvnn.checks import check_actuators
+from auvnn.checks.doubts import doubts, stiff
+from auvnn.comparison import compare
 from auvnn.damping.bank import DampingBank
 from auvnn.damping.region import Region
-from auvnn.diagnosis import check_actuators, compare
-from auvnn.diagnosis.doubts import doubts, stiff
 from auvnn.errors import ConfigError, InputError, ModelError
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import roll, scale_of
@@ -24,9 +22,12 @@ from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox, load
 from auvnn.models.saving import from_vehicle, save
 from auvnn.physics.products import matvec
-from auvnn.simulate import simulate
+from auvnn.simulation import simulate
 from auvnn.testing import plain_vehicle
 from auvnn.vehicle import load_vehicle
+from tests.faults.vehicles import put
+from tests.log_samples import frame
+from tests.small_logs import make_log, small_vehicle
 
 # What a rollout in single precision may differ from one in double, relative to the largest value of the channel, over
 # 5 s; and what the number of threads may change in double precision. The README states both.
@@ -79,7 +80,9 @@ def test_row_56_reversed_and_exchanged_thrusters_are_named(driven, place, signs,
 
 
 def test_row_56_what_is_not_driven_alone_is_not_judged(driven):
-    same = Log.from_runs([replace(r, thrusters=np.repeat(r.thrusters[:, :1], 8, axis=1)) for r in driven.runs])
+    same = Log.from_runs(
+        [replace(r, thrusters=np.repeat(r.thrusters[:, :1], 8, axis=1)) for r in driven.runs]
+    )
     found = check_actuators(MODEL, same)
     assert found.words == [] and len(found.untold) == 8
     assert "nothing can be said" in found.story[0]
@@ -91,7 +94,9 @@ def test_row_56_check_and_compare_say_so(driven, auvnn):
     status, out, _ = auvnn("check", "log=log.parquet", "model=small.yaml", "out=checked")
     assert status == 0 and "thruster_3 is reversed" in out
     data = json.loads(Path("checked/quality.json").read_text())
-    assert data["actuators"]["findings"] == ["thruster_3 is reversed"] and data["actuators"]["confidence"] > 0.95
+    assert (
+        data["actuators"]["findings"] == ["thruster_3 is reversed"] and data["actuators"]["confidence"] > 0.95
+    )
     assert any(f["where"] == "actuators" and f["level"] == "warning" for f in data["findings"])
     assert any("thruster_3 is reversed" in w for w in doubts(MODEL, Log.read("log.parquet")))
 
@@ -105,7 +110,9 @@ def test_row_60_a_current_that_only_the_model_can_show():
     north, east = (float(part.split(" +-")[0].split()[-1]) for part in parts)
     assert abs(north - 0.25) < 0.08 and abs(east + 0.15) < 0.08
     assert not any("current" in w for w in doubts(truth, log)), "a model that has the current has no doubt"
-    assert not any("current" in w for w in doubts(MODEL, make_log(MODEL, duration=60.0, noise=0.5, max_step=0.05)))
+    assert not any(
+        "current" in w for w in doubts(MODEL, make_log(MODEL, duration=60.0, noise=0.5, max_step=0.05))
+    )
 
 
 def test_row_60_a_model_that_leaves_nothing_at_all_raises_no_doubt():
@@ -143,7 +150,11 @@ def test_row_84_stiff_damping_is_followed_in_shorter_steps():
     assert not run.diverged
     settled = 7000.0 / (70.0 * 500.0)
     np.testing.assert_allclose(run.nu[0, 1:, 0].numpy(), settled, rtol=1e-6)
-    assert len(run.notes) == 1 and "velocities settle within 2 ms" in run.notes[0] and "steps of 100 ms" in run.notes[0]
+    assert (
+        len(run.notes) == 1
+        and "velocities settle within 2 ms" in run.notes[0]
+        and "steps of 100 ms" in run.notes[0]
+    )
     assert stiff_model(5.0).rollout(eta, nu, command.expand(1, 11, 6), t, max_step=0.05).notes == ()
     assert model.rollout(eta, nu, command.expand(1, 11, 6), t, max_step=0.1, check=False).nu.abs().max() > 1e3
 
@@ -161,7 +172,10 @@ def test_row_84_a_lag_far_below_the_step_is_exact_and_told():
     np.testing.assert_allclose(u, 1 - (np.exp(-s) - 0.001 * np.exp(-s / 0.001)) / 0.999, atol=2e-6)
     log = make_log(from_vehicle(small_vehicle()), runs=1, duration=10.0)
     slow = from_vehicle(small_vehicle()).with_effects({"thruster_lag": {"time_constant": 0.001}})
-    assert any("thruster_lag: time_constant 0.001 s is far below the log's step of 0.1 s" in w for w in stiff(slow, log))
+    assert any(
+        "thruster_lag: time_constant 0.001 s is far below the log's step of 0.1 s" in w
+        for w in stiff(slow, log)
+    )
     assert stiff(MODEL, log) == []
 
 
@@ -179,10 +193,14 @@ def test_row_86_a_budget_of_steps(monkeypatch):
     eta, nu = torch.tensor([0.0, 0, 0, 1, 0, 0, 0]).double(), torch.full((6,), 0.1).double()
     command, t = torch.zeros(3, 6).double(), torch.tensor([0.0, 0.5, 1.0]).double()
     model = stiff_model(1.0)
-    with pytest.raises(ConfigError, match=r"max_step=1e-09 s makes .* steps, more than the budget of 5000000"):
+    with pytest.raises(
+        ConfigError, match=r"max_step=1e-09 s makes .* steps, more than the budget of 5000000"
+    ):
         model.rollout(eta, nu, command, t, max_step=1e-9)
     monkeypatch.setattr(solver, "MAX_EVALUATIONS", 40)
-    with pytest.raises(ConfigError, match=r"dopri5 gave up at t = 0 s after 40 evaluations: loosen rtol and atol"):
+    with pytest.raises(
+        ConfigError, match=r"dopri5 gave up at t = 0 s after 40 evaluations: loosen rtol and atol"
+    ):
         model.rollout(eta, nu, command, t, solver="torchdiffeq:dopri5", rtol=1e-13, atol=1e-15)
 
 
@@ -201,7 +219,11 @@ def test_row_87_leaving_the_trained_region_is_flagged(tmp_path):
     assert model.rollout(eta, nu, command, t).notes == ()
     command[:, 0] = 80.0
     (note,) = model.rollout(eta, nu, command, t).notes
-    assert note.startswith("beyond what the damping was trained on") and "against -0.5 to 0.5" in note and "u " in note
+    assert (
+        note.startswith("beyond what the damping was trained on")
+        and "against -0.5 to 0.5" in note
+        and "u " in note
+    )
     save(model, tmp_path / "model")
     assert load(tmp_path / "model").damping.region == model.damping.region
     assert model.rebuilt(()).damping.region == model.damping.region
@@ -238,7 +260,10 @@ def test_row_87_training_keeps_its_region_and_compare_warns():
 
 def run_of(model: GreyBox, log: Log, dtype: torch.dtype) -> torch.Tensor:
     run = log.runs[0]
-    part = {k: torch.tensor(v[:51], dtype=dtype) for k, v in (("c", run.thrusters), ("eta", run.eta), ("nu", run.nu))}
+    part = {
+        k: torch.tensor(v[:51], dtype=dtype)
+        for k, v in (("c", run.thrusters), ("eta", run.eta), ("nu", run.nu))
+    }
     t = torch.tensor(run.t[:51], dtype=torch.float64)
     with torch.no_grad():
         return model.to(dtype).rollout(part["eta"][0], part["nu"][0], part["c"], t).nu
@@ -287,7 +312,10 @@ def test_row_95_a_horizon_of_no_length_is_refused(horizon):
 
 
 def test_row_95_runs_of_different_lengths_do_not_disturb_one_another():
-    long, short = make_log(MODEL, runs=1, duration=12.0), make_log(MODEL, runs=1, duration=5.0, seed=1, first=2)
+    long, short = (
+        make_log(MODEL, runs=1, duration=12.0),
+        make_log(MODEL, runs=1, duration=5.0, seed=1, first=2),
+    )
     both = Log.from_runs([long.runs[0], replace(short.runs[0], number=2)])
     scale = scale_of(both)
     together, alone = roll(MODEL, both, "full", scale), roll(MODEL, short, "full", scale)

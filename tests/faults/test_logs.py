@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from log_samples import frame, make_run, same
 
 from auvnn.logs import Log, Run
+from tests.log_samples import frame, make_run, same
 
 RUN = make_run(800, noise=0.005)
 
@@ -115,7 +115,9 @@ def test_row_42_thrusters_at_neutral_throughout(noted):
     found = noted(put(table), level="error")
     assert "excitation: the thrusters are neutral throughout: nothing about thrust, mass or damping" in found
     one = frame(RUN).with_columns(pl.lit(0.0).alias("thruster_3"))
-    assert "neutral throughout: thruster_3; nothing can be said of their thrust" in noted(put(one), level="warning")
+    assert "neutral throughout: thruster_3; nothing can be said of their thrust" in noted(
+        put(one), level="warning"
+    )
 
 
 def test_row_43_a_thruster_at_its_limit(noted):
@@ -178,7 +180,9 @@ def test_row_46_another_frame_than_declared(noted, refused):
         assert f"error: {name}: {name} has the opposite sign of the derivative of the" in found
     for verb, more in (("diagnose", []), ("add", ["effect=ocean_current"]), ("train", [])):
         line = refused(verb, "model=four.yaml", "log=log.csv", *more)
-        assert "opposite sign" in line and "mend with scale: -1 in the mapping" in line and "force=true" in line
+        assert (
+            "opposite sign" in line and "mend with scale: -1 in the mapping" in line and "force=true" in line
+        )
     assert noted("log.csv", {"columns": {n: {"from": n, "scale": -1} for n in FLU}}, level="error") == ""
     up = frame(RUN).with_columns(-pl.col("z").alias("z")).drop("x", "y")
     assert "above the surface if z points down; frame: {world: ENU}" in noted(put(up), level="warning")
@@ -213,7 +217,10 @@ def test_row_59_spikes_are_left_out_and_counted(noted):
     u = np.array(RUN.nu[:, 0])
     u[[100, 300, 500, 700]] += 3.0
     found = noted(put(frame(RUN).with_columns(pl.Series("u", u))), level="warning")
-    assert "spikes: single samples that leave their neighbours: u 4 (0.5 %); fits and scores leave them out" in found
+    assert (
+        "spikes: single samples that leave their neighbours: u 4 (0.5 %); fits and scores leave them out"
+        in found
+    )
     run = Log.read("log.csv").runs[0]
     windows = cut_windows(Log.from_runs([run]), 39.0)
     assert np.flatnonzero(windows.mask[0, :780, 6] == 0).tolist() == [100, 300, 500, 700]

@@ -15,11 +15,11 @@ import pytest
 import torch
 from safetensors.torch import load as read_tensors
 from safetensors.torch import save as tensor_bytes
-from vehicles import put
 
 import auvnn as package
 from auvnn.damping.bank import DampingBank
 from auvnn.models import GreyBox, load
+from tests.faults.vehicles import put
 
 DIAGONAL = [20.0, 30.0, 40.0, 1.0, 1.5, 2.0]
 

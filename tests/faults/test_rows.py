@@ -8,7 +8,8 @@ import re
 from pathlib import Path
 
 import pytest
-from rows import ELSEWHERE, ROWS
+
+from tests.faults.rows import ELSEWHERE, ROWS
 
 ROOT = Path(__file__).parents[2]
 NUMBERED = re.compile(r"test_row_(\d+)_\w+")

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
-from log_samples import frame, make_run
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run
 from auvnn.metrics.windows import cut_windows
+from tests.log_samples import frame, make_run
 
 DT = 0.05
 
@@ -47,7 +47,9 @@ def read(table: pl.DataFrame | Run, mapping: Any = None) -> Log:
 
 def found(log: Log, level: str | None = None) -> str:
     return "\n".join(
-        f"{f.level}: {f.where}: {f.what}; {f.cure}" for f in log.quality().findings if level in (None, f.level)
+        f"{f.level}: {f.where}: {f.what}; {f.cure}"
+        for f in log.quality().findings
+        if level in (None, f.level)
     )
 
 
@@ -55,7 +57,9 @@ def late(run: Run, rows: int, columns: slice = slice(0, 3)) -> Run:
     """The run with some velocities stamped `rows` samples late; the first rows then have no value."""
     nu = np.array(run.nu)
     nu[:, columns] = np.nan
-    at, to = (slice(0, len(nu) - rows), slice(rows, None)) if rows > 0 else (slice(-rows, None), slice(0, rows))
+    at, to = (
+        (slice(0, len(nu) - rows), slice(rows, None)) if rows > 0 else (slice(-rows, None), slice(0, rows))
+    )
     nu[to, columns] = run.nu[at, columns]
     return Run(1, run.t, run.quaternion, nu, position=run.position, thrusters=run.thrusters)
 
@@ -65,7 +69,17 @@ CLEAN = wandering()
 
 def test_a_clean_log_gives_none_of_these_findings():
     words = found(Log.from_runs([CLEAN]))
-    for subject in ("clock", "delay", "afresh", "lever arm", "situation", "current:", "full scale", "z:", "error"):
+    for subject in (
+        "clock",
+        "delay",
+        "afresh",
+        "lever arm",
+        "situation",
+        "current:",
+        "full scale",
+        "z:",
+        "error",
+    ):
         assert subject not in words, words
 
 
@@ -73,7 +87,9 @@ def test_a_clean_log_gives_none_of_these_findings():
 def test_row_33_a_sensor_with_another_clock(offset):
     log = Log.from_runs([late(wandering(2400), round(offset / DT))])
     (finding,) = [f for f in log.quality().warnings if f.where == "clock"]
-    assert finding.what.startswith(f"u, v, w are stamped by another clock than attitude and position: {offset:+.2f} s")
+    assert finding.what.startswith(
+        f"u, v, w are stamped by another clock than attitude and position: {offset:+.2f} s"
+    )
     assert float(finding.what.split("correlation ")[1].split()[0]) > 0.95 and "delay" in finding.cure
     low, high = (float(x) for x in finding.what.split("(")[1].split(")")[0].split(" to "))
     assert low <= offset <= high and high - low < 0.1
@@ -103,7 +119,7 @@ def test_row_34_a_latency_comes_with_an_interval():
 
 def test_row_34_the_interval_covers_the_truth():
     """Of independent noisy records at least 17 of 20 intervals hold the true lag (95 % would be 19)."""
-    from auvnn.logs.lags import estimate
+    from auvnn.logs.signals.lags import estimate
 
     hits = 0
     for seed in range(20):
@@ -247,10 +263,15 @@ def test_row_53_negative_depths_and_heights_that_mean_none():
     run = Run(1, CLEAN.t, CLEAN.quaternion, CLEAN.nu, thrusters=CLEAN.thrusters, altitude=altitude,
               position=np.column_stack([CLEAN.position[:, :2], z]))  # fmt: skip
     log = read(run)
-    assert (np.isnan(log.runs[0].position[:, 2]) == gone).all() and (np.isnan(log.runs[0].altitude) == gone).all()
+    assert (np.isnan(log.runs[0].position[:, 2]) == gone).all() and (
+        np.isnan(log.runs[0].altitude) == gone
+    ).all()
     words = found(log, "repair")
     assert f"depths of -1 m, which mean none was measured, read as missing ({gone.sum()})" in words
-    assert f"negative heights above the bottom, which mean none was measured, read as missing ({gone.sum()})" in words
+    assert (
+        f"negative heights above the bottom, which mean none was measured, read as missing ({gone.sum()})"
+        in words
+    )
     above = read(frame(CLEAN).with_columns(pl.col("z") - 20.0))
     assert np.isfinite(above.runs[0].position).all(), "a true depth below zero stays"
 
@@ -284,7 +305,10 @@ def test_row_55_pulse_widths_that_mean_no_signal(refused):
     pwm[100:110, 0], pwm[200:205, 1] = 0.0, 65535.0
     table = frame(CLEAN).with_columns(pl.Series(f"thruster_{i + 1}", pwm[:, i]) for i in range(4))
     curve = {"neutral": 1500, "span": 400}
-    log = read(table, {"columns": {f"thruster_{i + 1}": {"from": f"thruster_{i + 1}", "curve": curve} for i in range(4)}})
+    log = read(
+        table,
+        {"columns": {f"thruster_{i + 1}": {"from": f"thruster_{i + 1}", "curve": curve} for i in range(4)}},
+    )
     thrusters = log.runs[0].thrusters
     assert np.isnan(thrusters[100:110, 0]).all() and np.isnan(thrusters[200:205, 1]).all()
     assert np.isnan(thrusters).sum() == 15 and np.nanmax(np.abs(thrusters)) <= 1.0
@@ -297,7 +321,10 @@ def test_row_57_a_battery_that_runs_down():
     falling = Run(1, CLEAN.t, CLEAN.quaternion, CLEAN.nu, thrusters=CLEAN.thrusters,
                   voltage=np.linspace(16.0, 12.8, 1600))  # fmt: skip
     words = found(Log.from_runs([falling]), "warning")
-    assert "voltage: the battery falls from 16 to 12.8 V" in words and "consider the effect voltage_droop" in words
+    assert (
+        "voltage: the battery falls from 16 to 12.8 V" in words
+        and "consider the effect voltage_droop" in words
+    )
     assert "voltage" not in found(Log.from_runs([CLEAN]))
 
 
@@ -333,7 +360,10 @@ def coasting(current: tuple[float, float], decay: float = 1.5, seed: int = 0) ->
 
 def test_row_60_drift_without_any_command_is_a_current():
     words = found(Log.from_runs([coasting((0.2, -0.1))]), "warning")
-    assert "over ground without any command: a current?" in words and "consider the effect ocean_current" in words
+    assert (
+        "over ground without any command: a current?" in words
+        and "consider the effect ocean_current" in words
+    )
     assert "about 0.22 m/s" in words
     assert "current" not in found(Log.from_runs([coasting((0.0, 0.0))]), "warning")
 
@@ -343,15 +373,15 @@ def test_row_61_a_velocity_sensor_away_from_the_origin():
     nu = np.array(CLEAN.nu)
     nu[:, :3] += np.cross(nu[:, 3:], arm)
     run = Run(1, CLEAN.t, CLEAN.quaternion, nu, position=CLEAN.position, thrusters=CLEAN.thrusters)
-    from auvnn.logs.lever import check
+    from auvnn.logs.quality.lever import check_lever_arms
 
-    (place,) = check(Log.from_runs([run]))
+    (place,) = check_lever_arms(Log.from_runs([run]))
     assert place.clear and (np.abs(place.place - arm) < np.maximum(2 * place.half, 0.02)).all()
     assert (place.half < 0.05).all()
     words = found(Log.from_runs([run]), "warning")
     assert "lever arm: the velocity sensor seems to sit away from the body origin: x +0.4" in words
     assert "velocity_lever_arm" in words
-    (place,) = check(Log.from_runs([CLEAN]))
+    (place,) = check_lever_arms(Log.from_runs([CLEAN]))
     assert not place.clear
 
 
@@ -363,11 +393,13 @@ def test_row_61_an_accelerometer_away_from_the_origin():
     slope = np.gradient(smooth, DT, axis=0)
     slope[:, :3] += np.cross(faster, arm) + np.cross(rates, np.cross(rates, arm))
     run = Run(1, CLEAN.t, CLEAN.quaternion, smooth, slope, thrusters=CLEAN.thrusters)
-    from auvnn.logs.lever import check
+    from auvnn.logs.quality.lever import check_lever_arms
 
-    (place,) = check(Log.from_runs([run]))
+    (place,) = check_lever_arms(Log.from_runs([run]))
     assert place.sensor == "acceleration" and place.clear and np.abs(place.place - arm).max() < 0.06
-    assert "info: lever arm: the vehicle turns, and without a position nobody can tell" in found(Log.from_runs([run]))
+    assert "info: lever arm: the vehicle turns, and without a position nobody can tell" in found(
+        Log.from_runs([run])
+    )
 
 
 def stretch(kind: str) -> Run:
@@ -401,7 +433,7 @@ def stretch(kind: str) -> Run:
     ],
 )
 def test_row_62_stretches_that_are_no_free_motion(kind, words):
-    from auvnn.logs.situations import find
+    from auvnn.logs.quality.situations import find
 
     log = Log.from_runs([stretch(kind)])
     (finding,) = [f for f in log.quality().warnings if f.where == "situation"]

@@ -16,9 +16,14 @@ SURGE, ROLL = 0, 3
 
 def model(linear=LINEAR, quadratic=QUADRATIC, **changes) -> GreyBox:
     """Return the model of 50 + 20 kg and 2 + 1 kg m2 under a commanded wrench; nothing couples u and p."""
-    return GreyBox(plain_vehicle(
-        linear_damping=[linear[0], 30, 30, linear[1], 4, 4],
-        quadratic_damping=[quadratic[0], 45, 45, quadratic[1], 6, 6], **changes), actuation="wrench")
+    return GreyBox(
+        plain_vehicle(
+            linear_damping=[linear[0], 30, 30, linear[1], 4, 4],
+            quadratic_damping=[quadratic[0], 45, 45, quadratic[1], 6, 6],
+            **changes,
+        ),
+        actuation="wrench",
+    )
 
 
 def rate(k: int, speed, force, linear=LINEAR, quadratic=QUADRATIC):
@@ -30,14 +35,25 @@ def run_free(t, start, force, linear=LINEAR, quadratic=QUADRATIC) -> np.ndarray:
     """Return u and p at times t, (N, 2), each force row held until the next time."""
     out = [np.asarray(start, dtype=float)]
     for k in range(len(t) - 1):
+
         def both(_, y, f=force[k]):
             return [rate(j, y[j], f[j], linear, quadratic) for j in (0, 1)]
+
         out.append(solve_ivp(both, (t[k], t[k + 1]), out[-1], rtol=1e-9, atol=1e-11).y[:, -1])
     return np.array(out)
 
 
-def log(t, force, linear=LINEAR, quadratic=QUADRATIC, noise=0.0, seed=0, start=(0.3, -0.2), number=0,
-        accelerations=False) -> Log:
+def log(
+    t,
+    force,
+    linear=LINEAR,
+    quadratic=QUADRATIC,
+    noise=0.0,
+    seed=0,
+    start=(0.3, -0.2),
+    number=0,
+    accelerations=False,
+) -> Log:
     """Return a log of one run; roll is not turned into attitude, which nothing here depends on."""
     clean = run_free(t, start, force, linear, quadratic)
     random = np.random.default_rng(seed)
@@ -47,7 +63,9 @@ def log(t, force, linear=LINEAR, quadratic=QUADRATIC, noise=0.0, seed=0, start=(
         wrench[:, column] = force[:, j]
         nu_dot[:, column] = rate(j, clean[:, j], force[:, j], linear, quadratic)
     quaternion = np.tile([1.0, 0, 0, 0], (len(t), 1))
-    return Log.from_runs([Run(number, t, quaternion, nu, wrench=wrench, nu_dot=nu_dot if accelerations else None)])
+    return Log.from_runs(
+        [Run(number, t, quaternion, nu, wrench=wrench, nu_dot=nu_dot if accelerations else None)]
+    )
 
 
 def steps(t, seed=1) -> np.ndarray:

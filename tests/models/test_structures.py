@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from small_logs import make_log, small_vehicle
 
 from auvnn.errors import ConfigError, ModelError
 from auvnn.logs import Log
@@ -15,6 +14,7 @@ from auvnn.models import GreyBox, load
 from auvnn.models.structures import STRUCTURES, build_structure
 from auvnn.models.structures.base import Structure, learned_parameters, parameter_count, without_damping
 from auvnn.training.fit_structure import OneStepData, fit_structure
+from tests.small_logs import make_log, small_vehicle
 
 ALL = [
     ("known", {}), ("classical", {}), ("parallel", {}), ("separate", {}), ("damping", {}),

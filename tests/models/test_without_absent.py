@@ -7,14 +7,16 @@ import weakref
 
 import pytest
 import torch
-from small_logs import small_vehicle
 
 from auvnn.models import GreyBox
+from tests.small_logs import small_vehicle
 
 
 @pytest.fixture
 def model():
-    return GreyBox(small_vehicle()).with_effects({"net_buoyancy": None, "ocean_current": {"v_north": 0.2, "v_east": 0.0}})
+    return GreyBox(small_vehicle()).with_effects(
+        {"net_buoyancy": None, "ocean_current": {"v_north": 0.2, "v_east": 0.0}}
+    )
 
 
 def set_force(model, value):

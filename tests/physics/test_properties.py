@@ -27,7 +27,7 @@ from auvnn.physics import (
     restoring,
     thrusters,
 )
-from auvnn.physics.products import Bilinear, Table, cross, matvec
+from auvnn.physics.products import Bilinear, ProductTable, cross, matvec
 
 
 def vector(*shape):
@@ -294,4 +294,4 @@ def test_tables_made_in_inference_mode_serve_gradients_later():
 
 
 def test_tables_follow_other_types():
-    assert Table([[1, 2]]).like(torch.ones(1, dtype=torch.float16)).dtype == torch.float16
+    assert ProductTable([[1, 2]]).like(torch.ones(1, dtype=torch.float16)).dtype == torch.float16

@@ -6,13 +6,13 @@ import numpy as np
 
 from auvnn.effects import EFFECTS
 from auvnn.models import GreyBox
-from auvnn.plants import PLANTS, Motion, Task
-from auvnn.simulate.plant import typical_values
+from auvnn.plants import PLANTS, Motion, PlantTask
+from auvnn.simulation.plant import typical_values
 from auvnn.vehicle import load_vehicle
 
 
 def task(vehicle="rov95", effects=None, strangers=None, actuation=None, seed=0, rows=11, rate=20.0, runs=2,
-         every=2, **changes) -> Task:  # fmt: skip
+         every=2, **changes) -> PlantTask:  # fmt: skip
     """Return a task; commands change every `every` rows, and the vehicle starts close to surface and bottom."""
     known = vehicle if not isinstance(vehicle, str) else load_vehicle(vehicle)
     model = GreyBox(known, actuation=actuation).with_effects(effects or {})
@@ -37,14 +37,14 @@ def task(vehicle="rov95", effects=None, strangers=None, actuation=None, seed=0, 
     if known.reference_voltage:
         voltage = known.reference_voltage * rng.uniform(0.8, 1.05, (runs, rows))
     model.bottom = 2.0
-    return Task(
+    return PlantTask(
         known, model.actuation, {str(e.name): e.values() for e in model.members}, strangers or {}, model,
         np.concatenate([place, quaternion], 1), nu0, np.arange(rows) / rate, command, fins,
         voltage=voltage, bottom=2.0, **{"max_step": 0.005, **changes},
     )  # fmt: skip
 
 
-def move(plant: str, what: Task) -> Motion:
+def move(plant: str, what: PlantTask) -> Motion:
     """Run a task in open loop."""
     return PLANTS.get(plant)().move(what, lambda *_: ())
 

@@ -4,12 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
-from plant_tasks import apart, move, task
 
 from auvnn.errors import ConfigError
 from auvnn.physics.coriolis import coriolis_force
 from auvnn.plants.laws import Laws, Wander
 from auvnn.vehicle import load_vehicle
+from tests.plants.plant_tasks import apart, move, task
 
 
 def bare(**more):
@@ -116,9 +116,13 @@ def test_a_wandering_force_moves_by_its_impulse():
     force = np.zeros((1, 41, 6))
     force[..., 0] = rng.normal(size=41)
     wander = Wander(0.025, force)
-    what = still(task(known, actuation="wrench", rows=21, rate=20.0, runs=1, max_step=0.025, laws=Laws(wander=wander)))
+    what = still(
+        task(known, actuation="wrench", rows=21, rate=20.0, runs=1, max_step=0.025, laws=Laws(wander=wander))
+    )
     impulse = 0.025 * (0.5 * (force[0, 1:, 0] + force[0, :-1, 0])).cumsum()[1::2]
-    assert (known.mass + 20.0) * move("numpy", what).nu[0, 1:, 0] == pytest.approx(impulse, rel=1e-5, abs=1e-7)
+    assert (known.mass + 20.0) * move("numpy", what).nu[0, 1:, 0] == pytest.approx(
+        impulse, rel=1e-5, abs=1e-7
+    )
     assert wander.at(0.0125)[0, 0] == pytest.approx(0.5 * (force[0, 0, 0] + force[0, 1, 0]))
     assert wander.knots(0.05, 0.1) == pytest.approx([0.075])
 
@@ -127,4 +131,7 @@ def test_the_quick_step_is_as_good_as_the_adaptive_method():
     calm = Wander(0.0125, np.zeros((2, 100, 6)))
     for vehicle in ("bluerov2_heavy", "remus100"):
         slow = task(vehicle, rows=21, max_step=0.025)
-        assert apart(move("numpy", dataclasses.replace(slow, laws=Laws(wander=calm))), move("numpy", slow)) < 1e-4
+        assert (
+            apart(move("numpy", dataclasses.replace(slow, laws=Laws(wander=calm))), move("numpy", slow))
+            < 1e-4
+        )

@@ -4,13 +4,13 @@ import sys
 
 import numpy as np
 import pytest
-from plant_tasks import apart, move, plausible, task
 
 from auvnn.errors import ConfigError, MissingExtra
 from auvnn.models import GreyBox
 from auvnn.plants.mujoco_engine import REFUSED
-from auvnn.simulate import simulate
+from auvnn.simulation import simulate
 from auvnn.vehicle import load_vehicle
+from tests.plants.plant_tasks import apart, move, plausible, task
 
 WATER = 1025.0
 

@@ -5,7 +5,6 @@ import functools
 
 import numpy as np
 import pytest
-from plant_tasks import apart, move, plausible, task
 from scipy.spatial.transform import Rotation
 
 from auvnn.damping.bank import DampingBank
@@ -14,8 +13,9 @@ from auvnn.effects import cross_flow_drag as cross_flow_module
 from auvnn.errors import AuvnnError, ConfigError
 from auvnn.models import GreyBox
 from auvnn.plants.independent.plant import SUPPORTED
-from auvnn.simulate import simulate
+from auvnn.simulation import simulate
 from auvnn.vehicle import DampingElement, load_vehicle
+from tests.plants.plant_tasks import apart, move, plausible, task
 
 # As a share of the largest motion. Left over by the model's own RK4 at 5 ms; at 2.5 ms it is a tenth of it.
 CLOSE = 2e-6

@@ -10,7 +10,7 @@ from auvnn.models import GreyBox
 from auvnn.plants import strangers
 from auvnn.plants.strangers import STRANGERS
 from auvnn.plants.strangers.base import AXES, Seen
-from auvnn.simulate import simulate
+from auvnn.simulation import simulate
 from auvnn.vehicle import load_vehicle
 
 SHORT = {"runs": 1, "duration": 2.0, "rate": 10.0}

@@ -5,9 +5,9 @@ import json
 import pytest
 from filelock import FileLock
 from markupsafe import Markup
-from report_fakes import KINDS, drawer, make
 
 from auvnn.report import style
+from tests.report.report_fakes import KINDS, drawer, make
 
 # As it is for users; while tests of pages run, figures are not laid out (tests/conftest.py).
 LAID_OUT = style.settle

@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from html_reading import PageText, broken_references, dangers
 from matplotlib.colors import to_rgb
 from matplotlib.container import ErrorbarContainer
 from matplotlib.patches import Rectangle
-from report_fakes import HOSTILE
 from scipy import stats
 
 from auvnn.answers import DRAWERS
@@ -24,6 +22,8 @@ from auvnn.report.plots.confusion import OUTCOMES, confusion
 from auvnn.report.plots.coverage import coverage
 from auvnn.report.plots.recovery import ALL, recovery, sizes_of, wilson
 from auvnn.report.view import View
+from tests.report.html_reading import PageText, broken_references, dangers
+from tests.report.report_fakes import HOSTILE
 
 EFFECTS = ["ocean_current", "cg_offset", "thruster_lag"]
 # The page without its figures, where its words are read: drawing takes most of the time.
@@ -71,7 +71,12 @@ def fake(some: list[dict[str, Any]] | None = None, **more: Any) -> SimpleNamespa
          "logs": 4, "named_first": 0, "in_group": 0, "answers": {"adequate": 3, "unknown": 1},
          "worst_relative_error": None},
     ]  # fmt: skip
-    plain = {"rows": rows() if some is None else some, "options": {"repeats": 10}, "metrics": METRICS, "table": table}
+    plain = {
+        "rows": rows() if some is None else some,
+        "options": {"repeats": 10},
+        "metrics": METRICS,
+        "table": table,
+    }
     return SimpleNamespace(**{**plain, **more})
 
 
@@ -110,9 +115,14 @@ def test_it_begins_with_three_to_six_sentences(html):
 def test_it_says_what_was_counted():
     low, high = stats.binomtest(24, 30).proportion_ci(method="wilson")
     said = text(fake())
-    assert f"In 24 of 30 logs the hidden effect is named first (80 %; 95 % interval {100 * low:.0f} to " in said
+    assert (
+        f"In 24 of 30 logs the hidden effect is named first (80 %; 95 % interval {100 * low:.0f} to " in said
+    )
     assert f"to {100 * high:.0f} %); in 1 more it is in a group that the log cannot tell apart." in said
-    assert "Most often missed is thruster_lag, 4 of 10: the answer was ocean_current (2) and adequate (1)." in said
+    assert (
+        "Most often missed is thruster_lag, 4 of 10: the answer was ocean_current (2) and adequate (1)."
+        in said
+    )
     assert "With nothing hidden, 3 of 4 logs are found adequate (75 %" in said
     # 24 right ones and two wrong.
     assert "Wrong names: 8 % of the 26 that were given." in said
@@ -151,7 +161,7 @@ def test_every_log_that_was_not_answered_right_is_listed():
 
 def test_a_name_too_many_is_not_right():
     page = WORDS.page(fake([row("cg_offset", "named", "cg_offset", "thruster_lag")]))
-    assert "cg_offset and thruster_lag" in page[page.index("Logs that were not answered right"):]
+    assert "cg_offset and thruster_lag" in page[page.index("Logs that were not answered right") :]
 
 
 def test_the_tables_hold_the_counts():
@@ -178,7 +188,11 @@ def test_the_page_counts_as_the_study_does():
     from auvnn.studies.benchmark import in_group, named_first, summarise
 
     more = {"errors": {"x": {"relative": 0.5, "z": 3.0}}}
-    some = [*rows(), row("cg_offset", "named"), row("cg_offset", "named", "cg_offset", "thruster_lag", **more)]
+    some = [
+        *rows(),
+        row("cg_offset", "named"),
+        row("cg_offset", "named", "cg_offset", "thruster_lag", **more),
+    ]
     some.append(row("cg_offset", "ambiguous", "thruster_lag", "ocean_current"))
     hidden = outcomes.with_effect(some)
     assert [outcomes.right(r) for r in hidden] == [named_first(r) for r in hidden]
@@ -238,7 +252,13 @@ def test_nothing_at_all_is_still_a_page():
 @pytest.mark.filterwarnings("error")
 def test_odd_values_are_survived(junk):
     odd = {k: junk for k in ("p_value", "seed", "missing", "ranking", "fault", "errors", "runs")}
-    odd_table = {"hidden": "a", "answers": junk, "logs": junk, "named_first": junk, "worst_relative_error": junk}
+    odd_table = {
+        "hidden": "a",
+        "answers": junk,
+        "logs": junk,
+        "named_first": junk,
+        "worst_relative_error": junk,
+    }
     answer = fake([*rows(), row("cg_offset", "named") | odd], table=[odd_table, junk])
     assert list(PAGE.figures(answer)) == ["confusion", "recovery", "coverage"]
     found = text(answer)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from html_reading import PageText, broken_references, dangers
 from scipy import stats
 
 from auvnn.report.pages import outcomes
@@ -18,6 +17,7 @@ from auvnn.report.plots.recovery import ALL
 from auvnn.report.plots.uniformity import uniformity
 from auvnn.report.view import View
 from auvnn.studies.benchmark import summarise
+from tests.report.html_reading import PageText, broken_references, dangers
 
 WORDS = BenchmarkPage(without=("confusion", "recovery", "coverage", "uniformity", "falls"))
 
@@ -45,7 +45,11 @@ ROWS = [
     row("stranger_a", "unknown", kind="stranger", axis="X", axes_true=["X"]),
     row("stranger_a", "named", "tether", kind="stranger"), *nulls(20),
 ]  # fmt: skip
-PLAN = {"parts": {"one": {"targets": [{"rate": "named_first", "least": 0.9}, {"rate": "all_named", "least": 0.4}]}}}
+PLAN = {
+    "parts": {
+        "one": {"targets": [{"rate": "named_first", "least": 0.9}, {"rate": "all_named", "least": 0.4}]}
+    }
+}
 
 
 @pytest.fixture(scope="module")

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from html_reading import PageText, dangers
 
 from auvnn.report.pages.uncertainties import PAGE
 from auvnn.report.panels import NoData
 from auvnn.report.plots.identifiability import LEAST, identifiability
 from auvnn.report.plots.swallowed import swallowed
 from auvnn.studies.uncertainties import Uncertainties
+from tests.report.html_reading import PageText, dangers
 
 
 def row(effect: str, name: str, alone: float, together: float, networks: float | None) -> dict[str, Any]:

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
+from auvnn.simulation.worlds import World, make_world
+from auvnn.simulation.worlds.law import commanded_wrench, ornstein_uhlenbeck
+from auvnn.simulation.worlds.sensing import Sensing
+from auvnn.simulation.worlds.world import Sensors, world_names
 
 from auvnn.errors import ConfigError
 from auvnn.models import load
-from auvnn.simulate import simulate
-from auvnn.simulate.noise import make_noise
-from auvnn.simulate.worlds import World, make_world
-from auvnn.simulate.worlds.law import commanded_wrench, ornstein_uhlenbeck
-from auvnn.simulate.worlds.sensing import Sensing
-from auvnn.simulate.worlds.world import Sensors, world_names
+from auvnn.simulation import simulate
+from auvnn.simulation.noise import make_noise
 
 SHORT = {"runs": 1, "duration": 4.0, "plant": "numpy", "max_step": 0.025}
 
@@ -69,7 +69,9 @@ def test_the_force_is_a_share_of_what_is_commanded_and_does_not_hang_on_what_is_
         for hidden in (None, {"net_buoyancy": {"force": 20.0}})
     ]
     run = plain.log.runs[0]
-    columns = np.array([[*u.direction, *np.cross(u.position, u.direction)] for u in model.vehicle.thrusters]).T
+    columns = np.array(
+        [[*u.direction, *np.cross(u.position, u.direction)] for u in model.vehicle.thrusters]
+    ).T
     most = np.array([np.where(run.thrusters > 0, [u.max_forward for u in model.vehicle.thrusters],
                               [u.max_reverse for u in model.vehicle.thrusters])])[0]  # fmt: skip
     wrench = (most * run.thrusters * np.abs(run.thrusters)) @ columns.T
@@ -92,8 +94,12 @@ def test_fins_count_among_what_is_commanded():
 
 @pytest.fixture(scope="module")
 def spoilt():
-    sensors = Sensors(correlation=0.5, outliers=0.01, dropouts=0.05, velocity_rate=5.0, tilt=0.01, jitter=0.005)
-    return Sensing(sensors, make_noise("realistic"), 0.05, 20_000, streams(2), streams(2, 1), np.random.default_rng(3))
+    sensors = Sensors(
+        correlation=0.5, outliers=0.01, dropouts=0.05, velocity_rate=5.0, tilt=0.01, jitter=0.005
+    )
+    return Sensing(
+        sensors, make_noise("realistic"), 0.05, 20_000, streams(2), streams(2, 1), np.random.default_rng(3)
+    )
 
 
 def test_sensors_spoil_as_much_as_they_say(spoilt):

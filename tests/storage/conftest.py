@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from stored import FILES
 
 from auvnn.storage import write_folder
+from tests.storage.stored import FILES
 
 
 @pytest.fixture

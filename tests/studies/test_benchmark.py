@@ -86,8 +86,12 @@ def test_each_repeat_has_a_seed_of_its_own():
     # No two effects are hidden under the same noise, and none changes with what else is asked for.
     both = cases({**OPTIONS, "effects": ["cg_offset", "waves"], "sizes": "small"})
     assert len({c.seed for c in both}) == 6
-    assert [c for c in both if c.hidden == "waves"] == cases({**OPTIONS, "effects": "waves", "sizes": "small"})
-    everything = {c.hidden: c.seed for c in cases({**OPTIONS, "effects": "all", "strangers": "all", "repeats": 1})}
+    assert [c for c in both if c.hidden == "waves"] == cases(
+        {**OPTIONS, "effects": "waves", "sizes": "small"}
+    )
+    everything = {
+        c.hidden: c.seed for c in cases({**OPTIONS, "effects": "all", "strangers": "all", "repeats": 1})
+    }
     assert len(set(everything.values())) == len(everything) > 40
 
 

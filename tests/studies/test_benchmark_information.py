@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from auvnn.diagnosis.cut import windows_for
-from auvnn.diagnosis.nuisance import FREE, lay_out
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.layout import FREE, lay_out
 from auvnn.models import load
-from auvnn.simulate import simulate
+from auvnn.simulation import simulate
 from auvnn.studies.benchmark.information import (
     NONE,
     Information,
@@ -19,7 +19,7 @@ from auvnn.studies.benchmark.information import (
     imitation,
     information,
     noise_sigma,
-    point_of,
+    truth_point,
 )
 from auvnn.studies.hidden import oracle_information
 
@@ -40,7 +40,7 @@ def log(model):
 
 @pytest.fixture(scope="module")
 def point(model, log):
-    return point_of(model, log, Truth(FORCE, {}), RIVALS, "realistic")
+    return truth_point(model, log, Truth(FORCE, {}), RIVALS, "realistic")
 
 
 @pytest.fixture(scope="module")

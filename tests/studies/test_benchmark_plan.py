@@ -13,7 +13,7 @@ from auvnn.config import config_dir, read_yaml
 from auvnn.effects import EFFECTS
 from auvnn.errors import ConfigError
 from auvnn.models import load
-from auvnn.simulate import EXCITATIONS, make_excitation
+from auvnn.simulation import EXCITATIONS, make_excitation
 from auvnn.studies.benchmark.cases import CLOSED, KEYS, Case, apart, cases, targets, together
 from auvnn.studies.benchmark.rates import NUMBERS, RATES
 from auvnn.studies.benchmark.strangers import said_axis, stranger_names
@@ -30,7 +30,9 @@ def plan(**parts: Any) -> dict[str, Any]:
 
 
 def test_a_plan_is_its_parts_one_after_the_other():
-    found = cases(plan(one={"effects": "cg_offset", "sizes": "small"}, two={"effects": "nothing", "repeats": 3}))
+    found = cases(
+        plan(one={"effects": "cg_offset", "sizes": "small"}, two={"effects": "nothing", "repeats": 3})
+    )
     away = apart("cg_offset")
     assert [(c.part, c.hidden, c.size, c.seed) for c in found] == [
         ("one", "cg_offset", "small", 10 + away), ("one", "cg_offset", "small", 11 + away),
@@ -102,12 +104,17 @@ def test_what_excludes_one_another_is_never_hidden_together():
 
 def test_loops_choose_among_the_manoeuvres():
     def manoeuvres(**more: Any) -> list[str]:
-        return [c.excitation for c in cases({**OPTIONS, "effects": "tether", "sizes": "large", "repeats": 1, **more})]
+        return [
+            c.excitation
+            for c in cases({**OPTIONS, "effects": "tether", "sizes": "large", "repeats": 1, **more})
+        ]
 
     assert manoeuvres(excitations=["multisine", "dives"], loops="closed") == ["dives"]
     assert manoeuvres(loops=["open", "closed"]) == ["multisine", "survey"]
     assert manoeuvres(excitations="survey", loops="open") == ["multisine"]
-    assert [c.loop for c in cases({**OPTIONS, "effects": "tether", "excitations": "survey"})] == ["closed"] * 4
+    assert [c.loop for c in cases({**OPTIONS, "effects": "tether", "excitations": "survey"})] == [
+        "closed"
+    ] * 4
 
 
 def test_the_closed_manoeuvres_are_those_with_a_controller():

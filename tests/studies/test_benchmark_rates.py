@@ -53,7 +53,9 @@ def test_a_group_counts_where_no_one_can_tell_its_members_apart():
     assert named_or_tied(row("a", *silent, imitation={"a": {"nothing": 3.2}})), "there was nothing to see"
     assert not named_or_tied(row("a", *silent, imitation={"a": {"nothing": 3.4}}))
     assert not named_or_tied(row("a", *silent))
-    assert not named_or_tied(row("a", *named("b"), imitation={"a": {"nothing": 0.0}})), "a wrong name is wrong"
+    assert not named_or_tied(row("a", *named("b"), imitation={"a": {"nothing": 0.0}})), (
+        "a wrong name is wrong"
+    )
     assert not named_or_tied(row("a", *GROUP)), "nobody has shown it"
     assert not named_or_tied(row("c", *GROUP, imitation={"c": {"a": 0.0, "b": 0.0}})), "not a member"
     three = [("ambiguous", ["a", "b", "c"])]
@@ -263,9 +265,16 @@ def test_the_summary_says_it_all_by_effect():
     assert answer.confusion == {
         "net_buoyancy": {"net_buoyancy": 3, "adequate": 1}, "nothing": {"adequate": 1}, "s": {"unknown": 1},
     }  # fmt: skip
-    assert answer.uniformity["net_buoyancy"]["below_0.05"] == 1 and answer.uniformity["tether"]["below_0.05"] == 0
+    assert (
+        answer.uniformity["net_buoyancy"]["below_0.05"] == 1
+        and answer.uniformity["tether"]["below_0.05"] == 0
+    )
     metrics = answer.metrics
-    assert (metrics["logs_with_effect"], metrics["logs_with_several"], metrics["logs_with_stranger"]) == (4, 1, 1)
+    assert (metrics["logs_with_effect"], metrics["logs_with_several"], metrics["logs_with_stranger"]) == (
+        4,
+        1,
+        1,
+    )
     assert metrics["median_fall_share"] == pytest.approx(0.85)
 
 

@@ -25,7 +25,14 @@ OPTIONS: dict[str, Any] = {
 
 def answered(case: Case) -> dict[str, Any]:
     """Return a row at once."""
-    return {**case.to_row(), "verdict": "named", "missing": [case.hidden], "fault": None, "errors": {}, "seconds": 0.1}
+    return {
+        **case.to_row(),
+        "verdict": "named",
+        "missing": [case.hidden],
+        "fault": None,
+        "errors": {},
+        "seconds": 0.1,
+    }
 
 
 @pytest.fixture
@@ -36,7 +43,9 @@ def todo() -> list[Case]:
 def test_rows_come_back_as_they_were_written(tmp_path, todo):
     journal = Journal(tmp_path / "work" / "rows.jsonl")
     written = {case: journal.append(answered(case)) for case in todo[:4]}
-    assert journal.rows(todo) == written and all(row["code"] == code_fingerprint() for row in written.values())
+    assert journal.rows(todo) == written and all(
+        row["code"] == code_fingerprint() for row in written.values()
+    )
     assert journal.rows(todo[2:]) == {case: written[case] for case in todo[2:4]}, "others do not belong here"
 
 

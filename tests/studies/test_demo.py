@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from auvnn.logs import Log
-from auvnn.metrics.rollouts import scale_of, table
+from auvnn.metrics.rollouts import rollout_table, scale_of
 from auvnn.models import load
 from auvnn.studies import demo
 
@@ -72,7 +72,7 @@ def test_the_errors_are_those_of_a_run_that_was_not_fitted(ran):
     test = Log.read(ran.folder / "simulate" / "test.parquet")
     truth = load("rov95").with_effects(demo.HIDDEN)
     scale = scale_of(test)
-    errors = {name: table(model, test, scale, ("5",))[0]["5"]["total"]
+    errors = {name: rollout_table(model, test, scale, ("5",))[0]["5"]["total"]
               for name, model in (("given", load("rov95")), ("true", truth),
                                   ("after", load(ran.folder / "add" / "model")))}  # fmt: skip
     metrics = ran.data["metrics"]

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 import torch
 
-from auvnn.diagnosis.cut import windows_for
-from auvnn.diagnosis.nuisance import lay_out, stated
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.layout import has_stated_uncertainty, lay_out
 from auvnn.errors import ConfigError
+from auvnn.estimation.normal_equations import LOOSE
+from auvnn.estimation.priors import set_parameters
+from auvnn.estimation.simulated_windows import output_error
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.models import GreyBox, load
-from auvnn.simulate import simulate
+from auvnn.simulation import simulate
 from auvnn.studies.hidden import BEYOND, SIZES, oracle_information, sized
-from auvnn.training.free_parameters import set_parameters
-from auvnn.training.ran import output_error
-from auvnn.training.window_sums import LOOSE
 
 # The contract's realistic noise: x, y, z; roll, pitch, yaw; u, v, w; p, q, r; accelerations are not measured.
 SIGMA = np.array([0.05, 0.05, 0.01, 0.003, 0.003, 0.008, *[0.006] * 3, *[0.003] * 3, *[np.inf] * 6])
@@ -88,7 +88,7 @@ def test_information_grows_as_noise_falls(model):
 @pytest.mark.parametrize("name", ["added_mass", "linear_damping", "quadratic_damping"])
 def test_a_coefficient_is_off_by_a_multiple_of_what_was_stated(model, name, size):
     factors = np.array(list(sized(model, name, size, seed=5, **SHORT).values()))
-    beyond = np.log(factors) / stated(model)[name] / BEYOND[size]
+    beyond = np.log(factors) / has_stated_uncertainty(model)[name] / BEYOND[size]
     assert np.abs(beyond).max() <= 1.5 + 1e-12
     # A direction of unit rms, which cutting at 1.5 shortens a little.
     assert 0.8 < np.sqrt(np.mean(beyond**2)) <= 1.0 + 1e-12
@@ -102,7 +102,7 @@ def test_sizes_of_coefficients_keep_their_order_and_direction(model):
 
 def test_what_was_not_stated_is_sized_by_the_log(model):
     sure = GreyBox(replace(model.vehicle, uncertainty={}))
-    assert "linear_damping" not in stated(sure)
+    assert "linear_damping" not in has_stated_uncertainty(sure)
     hidden = sized(sure, "linear_damping", "small", seed=1, **SHORT)
     null, value = nulls_and_values(sure, "linear_damping", hidden)
     information = oracle_information(sure, log_of(sure, 1), "linear_damping", SIGMA)

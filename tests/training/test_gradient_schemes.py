@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from problems import law, problem, velocities
 
 from auvnn.damping.bank import DampingBank
 from auvnn.training.fit_damping import fit_damping
 from auvnn.training.problem import DampingProblem
 from auvnn.training.schemes.adam import Adam
-from auvnn.training.schemes.base import Samples, Task
+from auvnn.training.schemes.base import Samples, SchemeTask
+from tests.training.problems import law, problem, velocities
 
 
 def task(bank, made, seed=0):
     bank.set_scales(made.nu, made.target)
-    return Task(bank, Samples.scaled(made, bank), None, made.spread() / bank.output_scale, seed, False)
+    return SchemeTask(bank, Samples.scaled(made, bank), None, made.spread() / bank.output_scale, seed, False)
 
 
 @pytest.mark.parametrize(

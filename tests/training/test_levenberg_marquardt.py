@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from problems import LINEAR, QUADRATIC, law, problem, velocities
 from scipy.optimize import least_squares
 
 from auvnn.damping.bank import DampingBank
 from auvnn.errors import ConfigError
 from auvnn.training.fit_damping import build_scheme, fit_damping
-from auvnn.training.least_squares import LeastSquares, Rules
-from auvnn.training.networks import NetworkProblems
+from auvnn.training.least_squares.batched import LeastSquares, Rules
+from auvnn.training.least_squares.networks import NetworkProblems
 from auvnn.training.problem import DampingProblem
+from tests.training.problems import LINEAR, QUADRATIC, law, problem, velocities
 
 
 def scipy_error(inputs, target, seed, nfev=60):

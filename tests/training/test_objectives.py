@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from small_logs import make_log, small_vehicle
 
 from auvnn.damping.bank import DampingBank
 from auvnn.errors import ConfigError, InputError
+from auvnn.estimation.sensitivity import respond
+from auvnn.estimation.simulated_windows import output_error
 from auvnn.metrics.free_run import initial_states
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.metrics.windows import cut_windows
@@ -23,8 +24,7 @@ from auvnn.training.objectives.differentiable import common_times
 from auvnn.training.objectives.shooting import Shooting
 from auvnn.training.objectives.weights import get_weights, set_weights
 from auvnn.training.objectives.windows import Shots, training_windows
-from auvnn.training.ran import output_error
-from auvnn.training.sensitivity import respond
+from tests.small_logs import make_log, small_vehicle
 
 VEHICLE = small_vehicle()
 BARE = replace(VEHICLE, linear_damping=None, quadratic_damping=None)

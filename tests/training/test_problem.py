@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from problems import law, problem, velocities
 
 from auvnn.damping.bank import DampingBank
 from auvnn.errors import ConfigError, InputError
 from auvnn.training.fit_damping import fit_damping
 from auvnn.training.problem import DampingProblem
+from tests.training.problems import law, problem, velocities
 
 
 def test_missing_samples_do_not_count():

@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from problems import problem
 
 from auvnn.damping.bank import DampingBank
 from auvnn.errors import ConfigError, InputError, ModelError
 from auvnn.training.checkpoint import Checkpoints
 from auvnn.training.fit_damping import fit_damping
 from auvnn.training.history import History, Progress, Record
+from tests.training.problems import problem
 
 MIXED = {"form": "mlp", "each": {"Y": "dissipative", "K": "polynomial", "M": "zero"}}
 SCHEMES = {
@@ -177,7 +177,7 @@ SCRIPT = """
 import sys, time, torch
 torch.set_num_threads(1)
 sys.path[:0] = {paths!r}
-from test_resume import fit
+from tests.training.test_resume import fit
 def slow(record):
     print(record.iteration, flush=True)
     time.sleep(0.03)

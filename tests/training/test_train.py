@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import torch
 from scipy.spatial.transform import Rotation
-from small_logs import make_log, small_vehicle
 
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run
 from auvnn.metrics.one_step import choose_derivative, one_step, scores
 from auvnn.models import GreyBox, load
 from auvnn.training.train import targets, train
+from tests.small_logs import make_log, small_vehicle
 
 VEHICLE = small_vehicle()
 NAMES = ("du", "dv", "dw", "dp", "dq", "dr")
@@ -153,7 +153,9 @@ def test_without_a_test_log_the_last_run_is_held_out(bare, measured):
 
 def test_options_reach_the_scheme_and_the_subnetworks_and_wrong_ones_are_refused(bare, measured):
     log = measured.select([0, 1, 2])
-    found = train(bare, log, {"scheme": "levenberg_marquardt", "max_iterations": 2}, {"form": "polynomial"}, seed=3)
+    found = train(
+        bare, log, {"scheme": "levenberg_marquardt", "max_iterations": 2}, {"form": "polynomial"}, seed=3
+    )
     assert found.damping["form"] == "polynomial" and found.seed == 3
     assert found.scheme["scheme"] == "levenberg_marquardt"
     with pytest.raises(ConfigError, match="levenberg_marquart"):

@@ -14,23 +14,25 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from small_logs import make_log, small_vehicle
 
 import auvnn
 from auvnn.errors import ConfigError, InputError
 from auvnn.executors import EXECUTORS, executor_for
+from auvnn.log_chunks import samples as pieces
+from auvnn.log_chunks import windows as parts
+from auvnn.log_chunks.samples import Reading, evenly_spread_runs, pieces_of_file
 from auvnn.logs import Log
-from auvnn.logs.mapping import Mapping
-from auvnn.metrics import parts, pieces
+from auvnn.logs.reading.mapping import Mapping
 from auvnn.metrics.one_step import choose_derivative, one_step, scores
-from auvnn.metrics.pieces import Reading, pieces_of_file, spread
 from auvnn.models import GreyBox
-from auvnn.training import groups, train, train_files
+from auvnn.training import train, train_files
 from auvnn.training import train_files as module_function
+from auvnn.training.distributed import grouped_sums as groups
+from auvnn.training.distributed.distributed_problem import DistributedProblem
+from auvnn.training.distributed.target_cache import Source
 from auvnn.training.held_out import score
-from auvnn.training.parted import PartedProblem
-from auvnn.training.scratch import Source
 from auvnn.training.targets import targets
+from tests.small_logs import make_log, small_vehicle
 
 files = sys.modules["auvnn.training.train_files"]
 VEHICLE = small_vehicle()
@@ -140,7 +142,7 @@ def test_pieces_of_a_long_run_hold_every_sample_once_and_what_the_whole_run_give
     found = pieces_of_file(Reading(mapping, samples=90), path)
     assert len(found.pieces) > 10 and found.samples == log.samples == found.rows
     assert found.duration == pytest.approx(log.duration, abs=1e-9)
-    stamps = [r.t for r in spread(found, found.samples, mapping)]
+    stamps = [r.t for r in evenly_spread_runs(found, found.samples, mapping)]
     np.testing.assert_array_equal(np.concatenate(stamps), np.concatenate([r.t for r in log.runs]))
     how = choose_derivative(log)
     nu, target, _ = targets(bare, log, how)
@@ -307,4 +309,4 @@ def test_memory_is_flat(tmp_path):
 def test_it_is_a_public_name():
     assert auvnn.train_files is module_function
     assert pieces.SAMPLES < parts.ROWS
-    assert PartedProblem.__dataclass_fields__["size"].default == groups.GROUP
+    assert DistributedProblem.__dataclass_fields__["size"].default == groups.GROUP

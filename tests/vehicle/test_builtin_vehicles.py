@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from auvnn.config import config_dir
 from auvnn.physics.drag import element_force
 from auvnn.physics.fins import fin_force
-from auvnn.vehicle import Table, Vehicle, builtin_vehicles, load_vehicle
+from auvnn.vehicle import ThrustTable, Vehicle, builtin_vehicles, load_vehicle
 
 NAMES = ["bluerov2", "bluerov2_heavy", "remus100", "rov90", "rov95"]
 
@@ -175,7 +175,7 @@ def test_bluerov2_heavy_reaches_its_published_top_speed() -> None:
     ahead = np.sign(np.round(matrix[0], 9))
     thrust = []
     for command, thruster in zip(ahead, vehicle.thrusters, strict=True):
-        assert isinstance(thruster.curve, Table)
+        assert isinstance(thruster.curve, ThrustTable)
         thrust.append(np.interp(command, thruster.curve.command, thruster.curve.thrust))
     wrench = matrix @ np.array(thrust)
     assert wrench[0] == pytest.approx(86.0, abs=0.1)
@@ -189,7 +189,7 @@ def test_bluerov2_heavy_reaches_its_published_top_speed() -> None:
 def test_bluerov2_heavy_curve_is_eq_18() -> None:
     commands = np.linspace(-1, 1, 2001)
     for thruster in load_vehicle("bluerov2_heavy").thrusters:
-        assert isinstance(thruster.curve, Table)
+        assert isinstance(thruster.curve, ThrustTable)
         table = np.interp(commands, thruster.curve.command, thruster.curve.thrust)
         assert np.abs(table - eq_18(commands)).max() < 0.16
         assert thruster.curve.thrust[-1] == pytest.approx(30.4, abs=1e-9)

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.logs.repair import Repair
+from auvnn.logs.reading.repair import Repair
 
 
 @dataclass

@@ -14,7 +14,7 @@ from auvnn.logs.readers import parquet_pages
 from auvnn.logs.readers.base import Reader, Table, Text
 from auvnn.logs.readers.frame import clean_names, to_table
 from auvnn.logs.readers.memory import refuse_more_than_memory
-from auvnn.logs.repair import Repair
+from auvnn.logs.reading.repair import Repair
 from auvnn.logs.writing import HASH_KEY, frame_hash
 
 

@@ -16,7 +16,7 @@ from auvnn.online.weights import Weights
 REST = 0.01
 
 
-class Replay(OnlineScheme):
+class ExperienceReplay(OnlineScheme):
     """A regularised projection onto the present sample and a batch of remembered ones, all weights at once.
 
     w <- w + rate J' (J J' + diag(R / n + c |J|^2))^-1 e   over the batch, each degree of freedom for itself

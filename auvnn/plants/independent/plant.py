@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from auvnn.plants.base import Look, Motion, Plant, Task, drive, refuse, refuse_learned
+from auvnn.plants.base import Look, Motion, Plant, PlantTask, drive, refuse, refuse_learned
 from auvnn.plants.independent.hull import CHANGES
 from auvnn.plants.independent.loads import LOADS
 from auvnn.plants.independent.sensors import SENSORS
@@ -34,7 +34,7 @@ class NumpyPlant(Plant):
             return ""
         return "it has no equations of its own for it; use plant=own"
 
-    def move(self, task: Task, look: Look) -> Motion:
+    def move(self, task: PlantTask, look: Look) -> Motion:
         """Run the equations."""
         refuse(self, (*task.effects, *task.strangers))
         refuse_learned(self, task)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from auvnn.errors import AuvnnError
-from auvnn.plants.base import LIMIT, Motion, Task, diverged
+from auvnn.plants.base import LIMIT, Motion, PlantTask, diverged
 from auvnn.plants.independent.equations import Equations, Held
 from auvnn.plants.independent.sensors import Reported, report
 from auvnn.plants.independent.thrust import Actuators
@@ -55,7 +55,7 @@ class Stretch:
         task: what to do.
     """
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: PlantTask) -> None:
         """Begin at the first row."""
         self.task = task
         self.actuators = Actuators(task.vehicle, task.actuation, task.effects, task.laws)

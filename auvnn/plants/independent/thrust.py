@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from auvnn.plants.independent.sizes import full_effort
 from auvnn.plants.laws import USUAL, Laws
-from auvnn.vehicle import Table, Vehicle
+from auvnn.vehicle import ThrustTable, Vehicle
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -64,7 +64,7 @@ class Actuators:
         out = np.empty_like(command)
         for i, unit in enumerate(self.vehicle.thrusters):
             c = command[:, i]
-            if isinstance(unit.curve, Table):
+            if isinstance(unit.curve, ThrustTable):
                 out[:, i] = np.interp(c, unit.curve.command, unit.curve.thrust)
             else:
                 out[:, i] = np.where(c > 0, unit.max_forward * c**2, -unit.max_reverse * c**2)

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from auvnn.report import style
-from auvnn.report.html import Table
+from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
 from auvnn.report.plots.adaptation import movement, skipped, with_and_without
@@ -88,7 +88,7 @@ class AdaptationPage(Page):
             ),
         ]
 
-    def tables(self, view: View) -> list[Table]:
+    def tables(self, view: View) -> list[HtmlTable]:
         """Return the tables."""
         rows, kinds = [], []
         for change in _changes(view):
@@ -107,8 +107,8 @@ class AdaptationPage(Page):
         ]
         metrics = [[str(k), number(v, 4)] for k, v in view.mapping("metrics").items()]
         return [
-            Table("Changes seen", ["time, s", "kind", *common.PARAMETER_HEAD], rows, words=4),
-            Table(
+            HtmlTable("Changes seen", ["time, s", "kind", *common.PARAMETER_HEAD], rows, words=4),
+            HtmlTable(
                 "What each kind of change would explain",
                 ["time, s", "kind", "evidence, nats", "share explained"],
                 kinds,
@@ -116,8 +116,8 @@ class AdaptationPage(Page):
                 "excitation cannot tell them apart and none is named.",
                 words=2,
             ),
-            Table("Samples not learned from", ["reason", "samples", "meaning"], refused),
-            Table("Metrics", ["name", "value"], metrics),
+            HtmlTable("Samples not learned from", ["reason", "samples", "meaning"], refused),
+            HtmlTable("Metrics", ["name", "value"], metrics),
         ]
 
     def assumed(self, view: View) -> list[tuple[str, str]]:

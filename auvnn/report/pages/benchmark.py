@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from auvnn.report.html import Table
+from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import outcomes
 from auvnn.report.pages.benchmark_rates import other_words, p_values_of, rate_tables, target_words
@@ -48,7 +48,12 @@ class BenchmarkPage(Page):
         if not rows:
             return []
         hidden = outcomes.with_effect(rows)
-        out = [*target_words(view), *_naming_words(hidden)[:1], *other_words(rows), *_naming_words(hidden)[1:]]
+        out = [
+            *target_words(view),
+            *_naming_words(hidden)[:1],
+            *other_words(rows),
+            *_naming_words(hidden)[1:],
+        ]
         out += [_null_words(outcomes.with_nothing(rows)), _wrong_words(rows, view.mapping("metrics"))]
         out += _interval_words(hidden)
         faults = sum(text(r, "verdict") == "fault" for r in rows)
@@ -126,7 +131,7 @@ class BenchmarkPage(Page):
             found += [_one_condition(i, *part) for i, part in enumerate(parts.items(), 1)]
         return found
 
-    def tables(self, view: View) -> list[Table]:
+    def tables(self, view: View) -> list[HtmlTable]:
         """Return the tables."""
         rows = rows_of(view)
         metrics = [[str(k), _value(v)] for k, v in view.mapping("metrics").items()]
@@ -136,7 +141,7 @@ class BenchmarkPage(Page):
         )
         return [
             *rate_tables(view),
-            Table(
+            HtmlTable(
                 "By condition",
                 *_condition_table(rows),
                 "Effects, nothing: logs that hide an effect, or nothing. Or in a group: named first, or in "
@@ -145,8 +150,8 @@ class BenchmarkPage(Page):
                 words=3,
             ),
             _case_table(view),
-            Table("Logs that were not answered right", *_wrong_table(rows), caption, words=7),
-            Table("Metrics", ["name", "value"], metrics),
+            HtmlTable("Logs that were not answered right", *_wrong_table(rows), caption, words=7),
+            HtmlTable("Metrics", ["name", "value"], metrics),
         ]
 
     def assumed(self, view: View) -> list[tuple[str, str]]:
@@ -265,7 +270,7 @@ def _of(k: int, n: int) -> str:
     return f"{count(k)} ({percent(k / n)})" if n else "–"
 
 
-def _case_table(view: View) -> Table:
+def _case_table(view: View) -> HtmlTable:
     entries = [e for e in view.items("table") if isinstance(e, Mapping)]
     shown = {"vehicle": "vehicle", "noise": "noise", "excitation": "manoeuvre"}
     # What is the same for all of them stands in the table above.
@@ -284,7 +289,7 @@ def _case_table(view: View) -> Table:
             *(named if e.get("hidden") != NOTHING else ["–", "–"]),
             percent(e.get("worst_relative_error")),
         ])  # fmt: skip
-    return Table("By what was hidden", [*head, *counted], out, words=len(head))
+    return HtmlTable("By what was hidden", [*head, *counted], out, words=len(head))
 
 
 def _wrong_table(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from auvnn.report.html import Table
+from auvnn.report.html import HtmlTable
 from auvnn.report.pages import outcomes
 from auvnn.report.pages.outcomes import Row, text
 from auvnn.report.view import View
@@ -54,7 +54,8 @@ def target_words(view: View) -> list[str]:
     words = f"{count(len(aims) - len(missed))} of {plural(len(aims), 'target')} are met"
     if missed:
         which = listing(
-            f"{_name(a)} in {text(a, 'part')} ({percent(a.get('share'))}, wanted {_wanted(a)})" for a in missed
+            f"{_name(a)} in {text(a, 'part')} ({percent(a.get('share'))}, wanted {_wanted(a)})"
+            for a in missed
         )
         words += f"; missed: {which}"
     return [f"{words}."]
@@ -79,18 +80,18 @@ def other_words(rows: Sequence[Row]) -> list[str]:
     return out
 
 
-def rate_tables(view: View) -> list[Table]:
+def rate_tables(view: View) -> list[HtmlTable]:
     """Return targets, rates by part, and rates by effect."""
     return [
-        Table("Targets", *_target_rows(view), words=2, folded=False),
-        Table(
+        HtmlTable("Targets", *_target_rows(view), words=2, folded=False),
+        HtmlTable(
             "Rates by part",
             *_rate_rows(view),
             "Intervals: Wilson's for shares of counts; of a median by its order statistics. What is counted: logs, "
             "names or parameters.",
             words=2,
         ),
-        Table(
+        HtmlTable(
             "By effect",
             *_effect_rows(view),
             "Single effects. Or tied: in a declared group whose other members nobody could tell from it on that "

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from auvnn.report.decimate import telling_window
-from auvnn.report.html import Table
+from auvnn.report.html import HtmlTable
 from auvnn.report.panels import NoData
 from auvnn.report.plots.measured_against_model import rms
 from auvnn.report.style import MOTIONS, VELOCITY, WRENCH
@@ -60,7 +60,7 @@ def horizon_words(horizon: str) -> str:
     return "whole run" if horizon == "full" else f"{horizon} s"
 
 
-def rollout_table(rollout: Mapping[str, Any]) -> Table:
+def rollout_table(rollout: Mapping[str, Any]) -> HtmlTable:
     """Return the normalised free-running error by horizon and channel."""
     rows = [
         [
@@ -77,10 +77,10 @@ def rollout_table(rollout: Mapping[str, Any]) -> Table:
         "knowing only the mean; – marks a channel that does not move enough to be judged. Velocity held: "
         "the total if the initial velocity simply stayed."
     )
-    return Table("Free-running error by horizon", head, rows, caption)
+    return HtmlTable("Free-running error by horizon", head, rows, caption)
 
 
-def one_step_table(one_step: Mapping[str, Any]) -> Table:
+def one_step_table(one_step: Mapping[str, Any]) -> HtmlTable:
     """Return the one-step error of the acceleration by channel."""
     rows = [
         [
@@ -94,7 +94,7 @@ def one_step_table(one_step: Mapping[str, Any]) -> Table:
         if name in one_step
     ]
     caption = "The error cannot fall below its noise floor; R² is 1 for a perfect prediction, 0 for the mean."
-    return Table(
+    return HtmlTable(
         "Acceleration, one step ahead",
         ["channel", "unit", "rmse", "noise floor", "R²"],
         rows,
@@ -126,9 +126,9 @@ def parameter_rows(fitted: Mapping[str, Any]) -> list[list[str]]:
     return rows
 
 
-def parameter_table(fitted: Mapping[str, Any]) -> Table:
+def parameter_table(fitted: Mapping[str, Any]) -> HtmlTable:
     """Return the fitted parameters."""
-    return Table("Fitted parameters", PARAMETER_HEAD, parameter_rows(fitted), words=2)
+    return HtmlTable("Fitted parameters", PARAMETER_HEAD, parameter_rows(fitted), words=2)
 
 
 def parameter_words(members: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from auvnn.report import style
-from auvnn.report.html import Table
+from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
 from auvnn.report.pages import comparison_words as say
@@ -122,7 +122,7 @@ class ComparisonPage(Page):
             plots.append(_whole(entry))
         return plots
 
-    def tables(self, view: View) -> list[Table]:
+    def tables(self, view: View) -> list[HtmlTable]:
         """Return the tables."""
         failures = [
             [common.channel_words(f.get("channel")), say.where(f), percent(f.get("share"))]
@@ -130,7 +130,7 @@ class ComparisonPage(Page):
             if isinstance(f, Mapping)
         ]
         return [
-            Table("Where the error sits", ["channel", "where", "share of the error"], failures, words=2),
+            HtmlTable("Where the error sits", ["channel", "where", "share of the error"], failures, words=2),
             common.rollout_table(view.mapping("rollout")),
             common.one_step_table(view.mapping("one_step")),
             _wrench_table(view.mapping("residual_wrench")),
@@ -240,7 +240,7 @@ def _map_caption(regimes: Mapping[str, Any], floor: Any) -> str:
     return f"{words} The largest: {best[1]}, {number(best[0], 2)} times {what}." if best[1] else words
 
 
-def _wrench_table(residual: Mapping[str, Any]) -> Table:
+def _wrench_table(residual: Mapping[str, Any]) -> HtmlTable:
     rows = [
         [
             common.channel_words(name),
@@ -254,7 +254,9 @@ def _wrench_table(residual: Mapping[str, Any]) -> Table:
         "What the model lacks: inertia, Coriolis, damping and restoring forces of the measured motion, less "
         "the command."
     )
-    return Table("Residual wrench", ["axis", "unit", "rms", "mean", "noise floor"], rows, caption, words=2)
+    return HtmlTable(
+        "Residual wrench", ["axis", "unit", "rms", "mean", "noise floor"], rows, caption, words=2
+    )
 
 
 def _quality_words(quality: Any) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from auvnn.report.html import Table
+from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
 from auvnn.report.pages.training import learned_plots
@@ -106,7 +106,7 @@ class DiagnosisPage(Page):
             *learned_plots(view),
         ]
 
-    def tables(self, view: View) -> list[Table]:
+    def tables(self, view: View) -> list[HtmlTable]:
         """Return the tables."""
         rows = []
         for rank, c in enumerate(_candidates(view), 1):
@@ -142,17 +142,17 @@ class DiagnosisPage(Page):
         )
         tested = view.mapping("residual_tests").get("after")
         return [
-            Table("Steps of the search", ["step", "verdict", "effects"], steps, words=3),
+            HtmlTable("Steps of the search", ["step", "verdict", "effects"], steps, words=3),
             *_whole_log(view),
-            Table("All candidates", head, rows, caption, words=2),
-            Table("Parameters of every candidate", *_parameter_columns(fitted), folded=True, words=2),
-            Table(
+            HtmlTable("All candidates", head, rows, caption, words=2),
+            HtmlTable("Parameters of every candidate", *_parameter_columns(fitted), folded=True, words=2),
+            HtmlTable(
                 "What the remaining residual depends on",
                 ["axis", *_channels(view)],
                 depends,
                 "Share of each residual that a smooth function of one measured input explains.",
             ),
-            Table(
+            HtmlTable(
                 "What is left, against the commands",
                 ["velocity", "component", "correlation", "lag, s", "in half-widths of the 99 % band"],
                 _with_commands(tested) if isinstance(tested, Mapping) else [],
@@ -160,7 +160,7 @@ class DiagnosisPage(Page):
                 "only what leaves its band. An actuator or inertia that is wrong shows here.",
                 folded=True,
             ),
-            Table(
+            HtmlTable(
                 "What to drive next",
                 ["manoeuvre", "expected standard errors"],
                 [
@@ -194,14 +194,19 @@ def _channels(view: View) -> list[str]:
     return list(dict.fromkeys(str(name) for row in rows for name in row))
 
 
-def _whole_log(view: View) -> list[Table]:
+def _whole_log(view: View) -> list[HtmlTable]:
     """Return what all of a long log says, beside the sample on which the search ran."""
     whole = view.mapping("whole_log")
     if not whole:
         return []
     fitted = {**(whole.get("parameters") or {}), **(whole.get("coefficients") or {})}
     rows = [
-        [str(c.get("effect")), p_value(c.get("p_value")), number(c.get("evidence"), 4), number(c.get("inflation"))]
+        [
+            str(c.get("effect")),
+            p_value(c.get("p_value")),
+            number(c.get("evidence"), 4),
+            number(c.get("inflation")),
+        ]
         for c in whole.get("candidates") or []
     ]
     words = str((whole.get("searched") or {}).get("words", ""))
@@ -213,8 +218,8 @@ def _whole_log(view: View) -> list[Table]:
     )
     left = "what is left is white" if whole.get("adequate") else "what is left is slower than white noise"
     return [
-        Table("On all of the log: tests", ["effect", "p", "evidence", "inflation"], rows, caption),
-        Table(
+        HtmlTable("On all of the log: tests", ["effect", "p", "evidence", "inflation"], rows, caption),
+        HtmlTable(
             "On all of the log: values",
             common.PARAMETER_HEAD,
             common.parameter_rows(fitted),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from auvnn.report.html import Table
+from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.plots.over_dives import MOST, over_dives
 from auvnn.report.view import View
@@ -53,7 +53,7 @@ class FleetPage(Page):
             )
         ]
 
-    def tables(self, view: View) -> list[Table]:
+    def tables(self, view: View) -> list[HtmlTable]:
         """Return the tables."""
         rows = []
         for t in _trends(view):
@@ -83,14 +83,14 @@ class FleetPage(Page):
             [str(f.get("file")), str(f.get("words"))] for f in view.items("failed") if isinstance(f, Mapping)
         ]
         return [
-            Table("Does it change?", head, rows, "Mean and slope ± one standard deviation; p of each test by itself, "
+            HtmlTable("Does it change?", head, rows, "Mean and slope ± one standard deviation; p of each test by itself, "
                   "and “changes” where one of them holds among all parameters (5 %, Bonferroni).", words=3),
-            Table("Values of each dive", ["dive", "file", "start", "effect", "parameter", "value", "verdict"], values,
+            HtmlTable("Values of each dive", ["dive", "file", "start", "effect", "parameter", "value", "verdict"], values,
                   words=5),
-            Table("Dives", ["dive", "file", "start", "verdict", "samples", "windows", "cv error"], names,
+            HtmlTable("Dives", ["dive", "file", "start", "verdict", "samples", "windows", "cv error"], names,
                   "Adequate: what is left is white. cv error: on stretches left out, in standard deviations of the "
                   "error; 1 is noise alone.", words=4),
-            Table("Dives that could not be fitted", ["file", "why"], failed, words=2),
+            HtmlTable("Dives that could not be fitted", ["file", "why"], failed, words=2),
         ]  # fmt: skip
 
     def assumed(self, view: View) -> list[tuple[str, str]]:

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from auvnn.report import style
-from auvnn.report.html import Table
+from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
 from auvnn.report.panels import NoData
@@ -107,13 +107,13 @@ class ImprovementPage(Page):
             plots.append(Plot(common.run_file(entry), title, draw, common.THINNED, folded=True))
         return plots
 
-    def tables(self, view: View) -> list[Table]:
+    def tables(self, view: View) -> list[HtmlTable]:
         """Return the tables."""
         refitted = view.mapping("coefficients")
         steps = [[str(s.get("step") or "–"), number(s.get("error"))] for s in _steps(view)]
         return [
             common.parameter_table(view.mapping("parameters")),
-            Table(
+            HtmlTable(
                 "Coefficients fitted beside it",
                 common.PARAMETER_HEAD,
                 common.parameter_rows(refitted),
@@ -122,7 +122,7 @@ class ImprovementPage(Page):
             ),
             _stage_table(view, "rollout", "Free-running error over {} by channel", "nrmse"),
             _stage_table(view, "one_step", "R² of the acceleration, one step ahead", "r2"),
-            Table("Error step by step", ["step", "error"], steps),
+            HtmlTable("Error step by step", ["step", "error"], steps),
         ]
 
     def assumed(self, view: View) -> list[tuple[str, str]]:
@@ -269,7 +269,7 @@ def _horizons(view: View) -> Figure:
     return error_against_horizon(models, common.over_horizons(rollouts["as given"], "persistence"))
 
 
-def _stage_table(view: View, part: str, title: str, key: str) -> Table:
+def _stage_table(view: View, part: str, title: str, key: str) -> HtmlTable:
     rows, horizon = [], None
     for stage, name in STAGES.items():
         found = _stage(view, stage, part)
@@ -282,7 +282,7 @@ def _stage_table(view: View, part: str, title: str, key: str) -> Table:
         if any(finite(c) is not None for c in cells):
             rows.append([name, *(number(c) for c in cells)])
     title = title.format(common.horizon_words(horizon)) if horizon else title.replace(" over {}", "")
-    return Table(title, ["model", *common.CHANNELS, *(["total"] if part == "rollout" else [])], rows)
+    return HtmlTable(title, ["model", *common.CHANNELS, *(["total"] if part == "rollout" else [])], rows)
 
 
 PAGE = ImprovementPage()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from auvnn.report.html import Table
+from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
 from auvnn.report.pages import quality_reading as reading
@@ -96,13 +96,13 @@ class QualityPage(Page):
             ),
         ]
 
-    def tables(self, view: View) -> list[Table]:
+    def tables(self, view: View) -> list[HtmlTable]:
         """Return the tables."""
         return [
-            Table("Findings", ["level", "where", "what", "how to mend it"], _finding_rows(view), words=4),
-            Table("Agreement of the sensors", _AGREEMENT_HEAD, _agreement_rows(view), words=2),
-            Table("Runs", list(_RUN_HEAD), _run_rows(view)),
-            Table("Channels", list(_CHANNEL_HEAD), _channel_rows(view), words=2),
+            HtmlTable("Findings", ["level", "where", "what", "how to mend it"], _finding_rows(view), words=4),
+            HtmlTable("Agreement of the sensors", _AGREEMENT_HEAD, _agreement_rows(view), words=2),
+            HtmlTable("Runs", list(_RUN_HEAD), _run_rows(view)),
+            HtmlTable("Channels", list(_CHANNEL_HEAD), _channel_rows(view), words=2),
         ]
 
     def assumed(self, view: View) -> list[tuple[str, str]]:

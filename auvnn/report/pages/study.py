@@ -7,7 +7,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from auvnn.report.html import Table
+from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.panels import NoData
 from auvnn.report.plots.damping_curves import damping_curves
@@ -58,15 +58,15 @@ class StudyPage(Page):
         """Return the figures, in the paper's order and then ours."""
         return [_plot(found) for found in view.items("drawn")]
 
-    def tables(self, view: View) -> list[Table]:
+    def tables(self, view: View) -> list[HtmlTable]:
         """Return the comparison, and all metrics."""
         rows = view.items("table")
         head = list(rows[0]) if rows else []
         cells = [[_cell(row.get(key)) for key in head] for row in rows]
         metrics = [[str(k), _cell(v)] for k, v in view.mapping("metrics").items()]
         return [
-            Table("Compared", [h.replace("_", " ") for h in head], cells, folded=False),
-            Table("Metrics", ["name", "value"], metrics, folded=True),
+            HtmlTable("Compared", [h.replace("_", " ") for h in head], cells, folded=False),
+            HtmlTable("Metrics", ["name", "value"], metrics, folded=True),
         ]
 
     def assumed(self, view: View) -> list[tuple[str, str]]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from auvnn.report.html import Table
+from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
 from auvnn.report.panels import NoData
@@ -85,13 +85,13 @@ class TrainingPage(Page):
             ),
         ]
 
-    def tables(self, view: View) -> list[Table]:
+    def tables(self, view: View) -> list[HtmlTable]:
         """Return the tables."""
         r2 = [[common.channel_words(k), number(a), number(b)] for k, (a, b) in _r2(view).items()]
         rows = [[str(k), _value(v)] for k, v in view.mapping("metrics").items()]
         return [
-            Table("R² of the acceleration, one step ahead, held out", ["channel", "before", "after"], r2),
-            Table("Metrics", ["name", "value"], rows),
+            HtmlTable("R² of the acceleration, one step ahead, held out", ["channel", "before", "after"], r2),
+            HtmlTable("Metrics", ["name", "value"], rows),
         ]
 
     def assumed(self, view: View) -> list[tuple[str, str]]:

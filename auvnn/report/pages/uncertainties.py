@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from auvnn.report.html import Table
+from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.plots.identifiability import identifiability
 from auvnn.report.plots.swallowed import swallowed
@@ -77,7 +77,7 @@ class UncertaintiesPage(Page):
             ),
         ]
 
-    def tables(self, view: View) -> list[Table]:
+    def tables(self, view: View) -> list[HtmlTable]:
         """Return the tables."""
         found = _manoeuvres(view)
         head = ["parameter", *(f"{m}: {c}" for m in found for c in ("together", "with networks"))]
@@ -100,15 +100,15 @@ class UncertaintiesPage(Page):
             for p in one["confounded_pairs"][:12]
         ]
         return [
-            Table("Standard error over that beforehand", head, rows),
-            Table(
+            HtmlTable("Standard error over that beforehand", head, rows),
+            HtmlTable(
                 "How much of each group's information is its own",
                 ["manoeuvre", "group", "own", *(f"like {n}" for n in names)],
                 groups,
                 "Own: left after the other two groups are projected out. Like: what the other group alone imitates.",
                 words=2,
             ),
-            Table(
+            HtmlTable(
                 "Parameters correlated by more than 0.9",
                 ["manoeuvre", "one", "other", "correlation"],
                 pairs,

@@ -66,7 +66,9 @@ def _ranks(ax: Axes, found: Mapping[str, np.ndarray]) -> None:
     ax.set_box_aspect(1)
     ax.set_anchor("N")
     style.show_grid(ax, "both")
-    ax.legend(loc="lower right", fontsize=7.5, frameon=True, facecolor="white", edgecolor="none", framealpha=1.0)
+    ax.legend(
+        loc="lower right", fontsize=7.5, frameon=True, facecolor="white", edgecolor="none", framealpha=1.0
+    )
     ax.set_xlabel("expected at its rank, uniform $p$")
     ax.set_ylabel("found, $p$")
 

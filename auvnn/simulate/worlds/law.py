@@ -7,14 +7,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from auvnn.simulation.worlds.world import World
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from auvnn.plants import Motion, Plant, Task
+from auvnn.plants import Motion, Plant, PlantTask
 from auvnn.plants.independent.fins import Fins
 from auvnn.plants.independent.thrust import Actuators
 from auvnn.plants.laws import Laws, Wander
-from auvnn.simulate.worlds.world import World
 from auvnn.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -82,10 +82,10 @@ def ornstein_uhlenbeck(
 def disturbed(
     world: World,
     plant: Plant,
-    task: Task,
+    task: PlantTask,
     generator: np.random.Generator,
     generators: Sequence[np.random.Generator],
-) -> tuple[Task, dict[str, Any]]:
+) -> tuple[PlantTask, dict[str, Any]]:
     """Return the task with a force that wanders, and what was drawn of it.
 
     Its size follows from the wrench that is commanded where nothing is hidden and nothing wanders; a degree of freedom

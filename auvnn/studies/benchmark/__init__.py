@@ -68,7 +68,9 @@ def benchmark(
     left = [case for case in todo if case not in rows]
     if only_done:
         if not rows:
-            raise InputError("only_done: no log of this benchmark is done by this code (any_code=true: by any)")
+            raise InputError(
+                "only_done: no log of this benchmark is done by this code (any_code=true: by any)"
+            )
         answer = summarise([rows[case] for case in todo if case in rows], options)
         if left:
             answer.warnings.insert(0, f"{len(rows)} of {len(todo)} logs are done; the others are not counted")

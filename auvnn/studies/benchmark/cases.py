@@ -15,7 +15,7 @@ import numpy as np
 from auvnn.catalogue import unknown_name
 from auvnn.effects import EFFECTS
 from auvnn.errors import ConfigError
-from auvnn.simulate.noise import make_noise
+from auvnn.simulation.noise import make_noise
 from auvnn.studies.benchmark.strangers import stranger_names
 from auvnn.vehicle import Vehicle, load_vehicle
 

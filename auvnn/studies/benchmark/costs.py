@@ -70,8 +70,8 @@ def costly(
     Raises:
         ConfigError: the effect changes nothing on this vehicle under this excitation.
     """
-    from auvnn.simulate import simulate
-    from auvnn.simulate.simulation import bottom_below
+    from auvnn.simulation import simulate
+    from auvnn.simulation.simulate import bottom_below
     from auvnn.studies.hidden import drawn_direction
 
     conditions = {**how, "runs": min(runs, 2), "duration": duration, "seed": seed, "max_step": max_step}

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from auvnn.diagnosis import add
-from auvnn.diagnosis.bake import baked
-from auvnn.diagnosis.cut import windows_for
-from auvnn.diagnosis.explain import explain
-from auvnn.diagnosis.gains import paired_gain
-from auvnn.diagnosis.nuisance import lay_out
+from auvnn.diagnosis.hypotheses.bake import with_fitted_parameters
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
+from auvnn.diagnosis.hypotheses.layout import lay_out
 from auvnn.errors import AuvnnError
+from auvnn.improvement import add
+from auvnn.improvement.gains import paired_gain
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
@@ -76,5 +76,7 @@ def _fitted(model: GreyBox, log: Log, held_out: Log, names: Sequence[str]) -> tu
         improved = add(model, log, list(names), test=held_out, horizons=(HORIZON,))
         return improved.refitted_model, improved.model
     layout = lay_out(model, [])
-    alone = baked(model, layout, explain(layout, windows_for(model, log), list(layout.names), ()))
+    alone = with_fitted_parameters(
+        model, layout, fit_hypothesis(layout, windows_for(model, log), list(layout.names), ())
+    )
     return alone, alone

@@ -21,16 +21,16 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from auvnn.diagnosis.cut import windows_for
-from auvnn.diagnosis.nuisance import FREE, Layout, lay_out, stated
-from auvnn.diagnosis.probes import Probed, extent_of, probed
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.layout import FREE, Layout, has_stated_uncertainty, lay_out
+from auvnn.diagnosis.score_tests.probes import Probed, extent_of, probed
+from auvnn.estimation.normal_equations import TRUST, linearise, motion, normal_equations
+from auvnn.estimation.priors import bounded_step, set_parameters
 from auvnn.logs import Log
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import CHANNELS, Windows
 from auvnn.models import GreyBox
-from auvnn.simulate.noise import make_noise
-from auvnn.training.free_parameters import bounded_step, set_parameters
-from auvnn.training.window_sums import TRUST, answers, motion, reduce
+from auvnn.simulation.noise import make_noise
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Mapping[str, float]]
@@ -72,7 +72,7 @@ class Information:
         return min(self._distance(hidden, name) for name in self.starts.get(rival, [rival]))
 
     def _distance(self, hidden: str, rival: str) -> float:
-        layout, uncertain = self.layout, stated(self.layout.model)
+        layout, uncertain = self.layout, has_stated_uncertainty(self.layout.model)
         mine = layout.columns[hidden]
         described = layout.described(hidden)
         away = np.array(
@@ -124,7 +124,7 @@ def noise_sigma(noise: str | Mapping[str, Any], windows: Windows) -> Array:
 
 
 @dataclass(frozen=True)
-class Point:
+class TruthPoint:
     """A log cut into windows, and the truth as a model with every effect in it that is asked for.
 
     Attributes:
@@ -142,9 +142,9 @@ class Point:
     truth: Truth
 
 
-def point_of(
+def truth_point(
     model: GreyBox, log: Log, truth: Truth, rivals: Sequence[str], noise: str | Mapping[str, Any]
-) -> Point:
+) -> TruthPoint:
     """Return where the information is asked for: the truth, with the rivals at their nulls."""
     names = list(dict.fromkeys([*truth.hidden, *rivals]))
     layout = lay_out(model, names)
@@ -158,18 +158,18 @@ def point_of(
     sigma = noise_sigma(noise, windows)
     states = initial_states(at, windows)
     for _ in range(2):
-        _, change, _ = reduce(windows, answers(at, windows, states, list(truth.hidden)), sigma)
+        _, change, _ = normal_equations(windows, linearise(at, windows, states, list(truth.hidden)), sigma)
         states = moved(states, torch.as_tensor(change))
     asked = probed(layout, [n for n in rivals if n not in truth.hidden], extent_of(windows))
-    return Point(asked, windows, states, sigma, truth)
+    return TruthPoint(asked, windows, states, sigma, truth)
 
 
-def information(point: Point) -> Information:
+def information(point: TruthPoint) -> Information:
     """Return the information at a point, by the package's own equations."""
     asked = point.probed
     names = asked.layout.model.effect_names
-    sums, _, _ = reduce(
-        point.windows, answers(asked.layout.model, point.windows, point.states, names), point.sigma
+    sums, _, _ = normal_equations(
+        point.windows, linearise(asked.layout.model, point.windows, point.states, names), point.sigma
     )
     starts = {effect: list(found) for effect, found in asked.starts.items()}
     return Information(sums.hessian.sum(0), asked.layout, starts, point.truth)

@@ -67,7 +67,7 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
     """Return what is answered; note in `begun` once there is a log to answer for."""
     from auvnn.diagnosis import diagnose
     from auvnn.models import load
-    from auvnn.simulate import simulate
+    from auvnn.simulation import simulate
     from auvnn.studies.benchmark.falls import fall, names_to_add
 
     model, began = load(case.vehicle), time.monotonic()
@@ -136,7 +136,7 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
 
 def _hidden(case: Case, model: Any) -> dict[str, dict[str, float]]:
     """Return what is hidden, each of its size."""
-    from auvnn.simulate import make_noise
+    from auvnn.simulation import make_noise
     from auvnn.studies.hidden import sized
 
     if case.kind == "stranger":
@@ -166,13 +166,13 @@ def _ties(case: Case, model: Any, log: Any, truth: Mapping[str, Any], found: Any
     Of every candidate by the package's own equations; of a group that was declared, holds a hidden effect
     and one that can pass for it, also by differences of the plant, where another plant made the log and windows say it.
     """
-    from auvnn.studies.benchmark.information import Truth, imitation, information, point_of
+    from auvnn.studies.benchmark.information import Truth, imitation, information, truth_point
     from auvnn.studies.benchmark.plant_information import covers, plant_information
 
     hidden = {name: truth["hidden"][name] for name in case.effects}
     rivals = [c["effect"] for c in found.candidates if c["p_value"] is not None]
     rivals = [n for n in rivals if n not in hidden]
-    point = point_of(model, log, Truth(hidden, truth["coefficients"]), rivals, noise_of(case))
+    point = truth_point(model, log, Truth(hidden, truth["coefficients"]), rivals, noise_of(case))
     own = imitation(information(point), rivals)
     out: dict[str, Any] = {"imitation": own}
     group = [s["effects"] for s in found.steps if s["verdict"] == "ambiguous" and {*s["effects"]} & {*hidden}]

@@ -11,13 +11,13 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.effects import effect_class
+from auvnn.estimation.normal_equations import normal_equations
+from auvnn.estimation.sensitivity import Response
 from auvnn.metrics.free_run import moved
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 from auvnn.physics.attitude import quat_conjugate, quat_multiply, quat_to_rotvec
-from auvnn.studies.benchmark.information import Information, Point
-from auvnn.training.sensitivity import Response
-from auvnn.training.window_sums import reduce
+from auvnn.studies.benchmark.information import Information, TruthPoint
 
 Array = NDArray[np.float64]
 # Steps: of a parameter, as a share of its plausible scale; of an initial state, m, rad, m/s and rad/s.
@@ -58,14 +58,14 @@ class PlantOutputs:
         strangers: Mapping[str, Mapping[str, float]] | None = None,
     ) -> Array:
         """Return position, quaternion, velocity and its derivative, (R, L, 19), R being a multiple of B."""
-        from auvnn.plants import Task
+        from auvnn.plants import PlantTask
 
         times = len(states) // len(self.command)
 
         def repeat(x: Array | None) -> Array | None:
             return None if x is None else np.tile(x, (times, *[1] * (x.ndim - 1)))
 
-        task = Task(
+        task = PlantTask(
             vehicle=self.model.vehicle, actuation=self.model.actuation, effects=dict(effects),
             strangers=dict(strangers or {}), model=None, eta0=states[:, :7], nu0=states[:, 7:], t=self.t,
             command=repeat(self.command), fins=repeat(self.fins), voltage=repeat(self.voltage), bottom=self.bottom,
@@ -104,7 +104,7 @@ def covers(plant: str, names: Sequence[str]) -> bool:
 
 
 def plant_information(
-    plant: str, model: GreyBox, point: Point, names: Sequence[str], bottom: float | None = None
+    plant: str, model: GreyBox, point: TruthPoint, names: Sequence[str], bottom: float | None = None
 ) -> Information:
     """Return the information on some effects and the coefficients at a point, by differences of a plant.
 
@@ -147,6 +147,6 @@ def plant_information(
     )
     seen = point.windows.mask.unsqueeze(-1)
     response = Response(response.error, response.state * seen, response.parameters * seen)
-    sums, _, _ = reduce(point.windows, [response], point.sigma)
+    sums, _, _ = normal_equations(point.windows, [response], point.sigma)
     part = replace(layout, names=tuple(columns), columns=columns, means=means)
     return Information(sums.hessian.sum(0), part, {n: list(s) for n, s in starts.items()}, point.truth)

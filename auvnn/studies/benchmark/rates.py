@@ -64,7 +64,9 @@ RATES: dict[str, Callable[[Sequence[Row]], list[bool]]] = {
     ],
     "coverage_95": _within,
     "exact_ties": lambda rows: [_tie(r) for r in rows if kind_of(r) == "effect" and r.get("imitation")],
-    "unseen": lambda rows: [counting.unseen(r) for r in rows if kind_of(r) == "effect" and r.get("imitation")],
+    "unseen": lambda rows: [
+        counting.unseen(r) for r in rows if kind_of(r) == "effect" and r.get("imitation")
+    ],
     "not_made": lambda rows: [not counting.was_made(r) for r in rows],
     "faults": lambda rows: [r["verdict"] == "fault" for r in rows],
 }

@@ -65,14 +65,14 @@ def sized_stranger(model: Any, name: str, size: str, *, seed: int = 0, **how: An
     """
     import torch
 
-    from auvnn.diagnosis.cut import windows_for
+    from auvnn.diagnosis.hypotheses.candidates import windows_for
+    from auvnn.estimation.normal_equations import normal_equations
+    from auvnn.estimation.sensitivity import Response
     from auvnn.metrics.free_run import initial_states
-    from auvnn.simulate import simulate
+    from auvnn.simulation import simulate
     from auvnn.studies.benchmark.information import noise_sigma
     from auvnn.studies.benchmark.plant_information import PlantOutputs, change, state_slopes
     from auvnn.studies.hidden import SIZES
-    from auvnn.training.sensitivity import Response
-    from auvnn.training.window_sums import reduce
 
     how = {**how, "noise": "realistic"}
     windows = windows_for(model, simulate(model, seed=seed, max_step=0.025, **how).log)
@@ -86,7 +86,7 @@ def sized_stranger(model: Any, name: str, size: str, *, seed: int = 0, **how: An
         torch.as_tensor(state_slopes(outputs, states, now, {})) * seen,
         torch.as_tensor(change(now, there)[..., None] / STEP) * seen,
     )
-    sums, _, _ = reduce(windows, [response], noise_sigma("realistic", windows))
+    sums, _, _ = normal_equations(windows, [response], noise_sigma("realistic", windows))
     information = float(sums.hessian.sum())
     if not information > 1e-18:
         raise ConfigError(

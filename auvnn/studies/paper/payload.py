@@ -14,7 +14,7 @@ from auvnn.logs import Run
 from auvnn.models import GreyBox, Inputs, load
 from auvnn.models.structures.base import without_damping
 from auvnn.physics.attitude import quat_to_matrix
-from auvnn.simulate.noise import Draws, make_noise
+from auvnn.simulation.noise import Draws, make_noise
 from auvnn.studies.paper.answer import Study
 from auvnn.studies.paper.cylinder import Cylinder, factored, grasp, with_cylinder
 from auvnn.studies.paper.following import (

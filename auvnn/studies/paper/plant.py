@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from auvnn.errors import AuvnnError, ConfigError
 from auvnn.logs import Log, Run
 from auvnn.models import GreyBox, load
-from auvnn.simulate import simulate
+from auvnn.simulation import simulate
 from auvnn.studies.paper.options import Options, word
 
 Array = NDArray[np.float64]

@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from torch.func import functional_call
 
 from auvnn.errors import ConfigError, InputError
+from auvnn.estimation.simulated_windows import window_error
 from auvnn.logs import Log
 from auvnn.metrics.free_run import moved
 from auvnn.metrics.windows import Windows
@@ -22,7 +23,6 @@ from auvnn.training.objectives.base import Objective, Refined, Tell
 from auvnn.training.objectives.starting import best_start, sound_shots, start_option
 from auvnn.training.objectives.weights import get_weights, set_weights
 from auvnn.training.objectives.windows import Shots
-from auvnn.training.ran import window_error
 from auvnn.training.schemes.base import positive, whole
 
 # Share of a step by which the windows' spacing in time may differ before they have no common time axis.

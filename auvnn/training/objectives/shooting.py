@@ -16,7 +16,7 @@ from auvnn.models import GreyBox
 from auvnn.training.objectives.base import Objective, Refined, Tell
 from auvnn.training.objectives.starting import best_start, sound_shots, start_option
 from auvnn.training.objectives.weights import get_weights, set_weights
-from auvnn.training.objectives.windows import Shots, Sums
+from auvnn.training.objectives.windows import ShootingSums, Shots
 from auvnn.training.schemes.base import positive, whole
 
 Array = NDArray[np.float64]
@@ -135,7 +135,7 @@ class _Descent:
         set_weights(self.model, self.best)
         return Refined(self.model, tuple(train), tuple(judged), reason, tuple(self.warnings))
 
-    def _step(self, sums: Sums, weights: Array, damping: float) -> tuple[Array, float, float] | None:
+    def _step(self, sums: ShootingSums, weights: Array, damping: float) -> tuple[Array, float, float] | None:
         """Take one step; return weights, damping and relative gain, or None where no step is good."""
         precision = self.options.prior**-2
         away = weights - self.first
@@ -158,6 +158,6 @@ class _Descent:
         return None
 
 
-def _error(sums: Sums) -> float:
+def _error(sums: ShootingSums) -> float:
     """Return the root mean square of the weighted error."""
     return float(np.sqrt(sums.cost.sum() / max(sums.count.sum(), 1.0)))

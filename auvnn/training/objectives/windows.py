@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.errors import InputError
+from auvnn.estimation.normal_equations import CHUNK, LOOSE, TRUST, motion
+from auvnn.estimation.sensitivity import Response, respond
+from auvnn.estimation.simulated_windows import output_error
 from auvnn.logs import Log
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import ACCELERATION, POSITION, Windows, cut_windows
 from auvnn.models import GreyBox
-from auvnn.training.ran import output_error
-from auvnn.training.sensitivity import Response, respond
-from auvnn.training.window_sums import CHUNK, LOOSE, TRUST, motion
 
 Array = NDArray[np.float64]
 # History from which the state of lagging actuators is worked out, s.
@@ -52,7 +52,7 @@ def training_windows(model: GreyBox, log: Log, horizon: float) -> Windows:
 
 
 @dataclass(frozen=True)
-class Sums:
+class ShootingSums:
     """Normal equations of the subnetworks' weights over all windows, best initial states taken out.
 
     Attributes:
@@ -103,7 +103,9 @@ class Shots:
         total = float((output_error(model, self.windows, initial) * _weights(sigma)).square().sum())
         return total if np.isfinite(total) else np.inf
 
-    def settle(self, model: GreyBox, sigma: Array | None = None, rounds: int = 2) -> tuple[Sums, Array]:
+    def settle(
+        self, model: GreyBox, sigma: Array | None = None, rounds: int = 2
+    ) -> tuple[ShootingSums, Array]:
         """Fit the initial states alone; return the sums without weights and each channel's error, (18,)."""
         fixed = sigma
         if sigma is None:
@@ -133,14 +135,14 @@ class Shots:
             self.initial = initial
         return value
 
-    def spread(self, sums: Sums, parameters: int) -> Array:
+    def spread(self, sums: ShootingSums, parameters: int) -> Array:
         """Return each channel's root-mean-square error for the degrees of freedom spent, (18,)."""
         spent = (12 * len(sums.cost) + parameters) * sums.count / max(sums.count.sum(), 1.0)
         with np.errstate(invalid="ignore", divide="ignore"):
             value = np.sqrt(sums.channel / np.maximum(sums.count - spent, 0.25 * sums.count))
         return np.where(sums.count > 0, np.maximum(value, self.floor), np.inf)
 
-    def sums(self, model: GreyBox, sigma: Array, *, weights: bool, names: Sequence[str] = ()) -> Sums:
+    def sums(self, model: GreyBox, sigma: Array, *, weights: bool, names: Sequence[str] = ()) -> ShootingSums:
         """Linearise towards the initial states, effects' parameters and, if asked for, the subnetworks' weights."""
         used = np.flatnonzero(np.isfinite(sigma) & (self.windows.mask.sum((0, 1)).numpy() > 0))
         scale = torch.as_tensor(1.0 / sigma[used])
@@ -152,7 +154,7 @@ class Shots:
         hessian, slope = sum(p[0] for p in parts), sum(p[1] for p in parts)
         channel = np.zeros(18)
         channel[used] = sum(p[3] for p in parts)
-        return Sums(
+        return ShootingSums(
             np.asarray(hessian),
             np.asarray(slope),
             np.concatenate([p[2] for p in parts]),

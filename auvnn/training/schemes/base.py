@@ -10,13 +10,13 @@ from torch import Tensor
 
 from auvnn.damping.bank import DampingBank
 from auvnn.errors import ConfigError
-from auvnn.training.samples import Samples, Sums
+from auvnn.training.samples import Samples, SampleSums
 
-__all__ = ["Samples", "Scheme", "State", "Sums", "Task", "positive", "relative_errors", "whole"]
+__all__ = ["SampleSums", "Samples", "Scheme", "SchemeTask", "State", "positive", "relative_errors", "whole"]
 
 
 @dataclass(frozen=True)
-class Task:
+class SchemeTask:
     """What a scheme works on.
 
     Args:
@@ -29,8 +29,8 @@ class Task:
     """
 
     bank: DampingBank
-    train: Sums
-    held_out: Sums | None
+    train: SampleSums
+    held_out: SampleSums | None
     spread: Tensor
     seed: int
     warm: bool
@@ -54,7 +54,7 @@ class Scheme:
         """Return the options that rebuild this scheme, as plain data."""
         raise TypeError(f"training scheme '{type(self).__name__}' does not state its options")
 
-    def begin(self, task: Task) -> None:
+    def begin(self, task: SchemeTask) -> None:
         """Get ready: draw what is to be drawn."""
         raise TypeError(f"training scheme '{type(self).__name__}' cannot begin")
 
@@ -83,7 +83,7 @@ class Scheme:
         raise TypeError(f"training scheme '{type(self).__name__}' gives no answer")
 
 
-def relative_errors(bank: DampingBank, samples: Sums, spread: Tensor) -> Tensor:
+def relative_errors(bank: DampingBank, samples: SampleSums, spread: Tensor) -> Tensor:
     """Return the weighted root-mean-square error of the bank divided by the spread, (6,) float64."""
     square, weight = samples.error_sums(bank)
     return (square / weight.clamp_min(1e-300)).sqrt() / spread

@@ -11,7 +11,7 @@ from torch.func import functional_call
 
 from auvnn.damping.bank import DampingBank
 from auvnn.errors import ConfigError, ModelError
-from auvnn.training.schemes.base import Samples, Scheme, State, Task, positive, relative_errors, whole
+from auvnn.training.schemes.base import Samples, Scheme, SchemeTask, State, positive, relative_errors, whole
 
 SCHEDULES = ("constant", "cosine")
 MOST_RETREATS = 10
@@ -68,7 +68,7 @@ class GradientScheme(Scheme):
         """Return the optimiser of this scheme over the parameters."""
         raise TypeError(f"training scheme '{type(self).__name__}' does not name its optimiser")
 
-    def begin(self, task: Task) -> None:
+    def begin(self, task: SchemeTask) -> None:
         """Draw the first weights, and evaluate them."""
         self.task, self.bank = task, task.bank
         if not task.warm:

@@ -12,11 +12,19 @@ from auvnn.damping.base import AXES, DampingForm
 from auvnn.damping.mlp import MLP
 from auvnn.damping.polynomial import Polynomial
 from auvnn.errors import ConfigError
-from auvnn.training.forms import pack, unpack
-from auvnn.training.least_squares import REASONS, LeastSquares, Rules
-from auvnn.training.linear import solve_triangles
-from auvnn.training.networks import Problems
-from auvnn.training.schemes.base import Scheme, State, Sums, Task, positive, relative_errors, whole
+from auvnn.training.least_squares.batched import REASONS, LeastSquares, Rules
+from auvnn.training.least_squares.forms import pack, unpack
+from auvnn.training.least_squares.linear import solve_triangles
+from auvnn.training.least_squares.networks import Problems
+from auvnn.training.schemes.base import (
+    SampleSums,
+    Scheme,
+    SchemeTask,
+    State,
+    positive,
+    relative_errors,
+    whole,
+)
 
 MOST_HIDDEN = 200
 
@@ -71,7 +79,7 @@ class LevenbergMarquardt(Scheme):
         """Return the options that rebuild this scheme."""
         return {name: getattr(self.rules, name) for name in Rules.__dataclass_fields__}
 
-    def begin(self, task: Task) -> None:
+    def begin(self, task: SchemeTask) -> None:
         """Solve what is linear, and set up the iteration for the rest."""
         self.task = task
         self._solvers: list[tuple[DampingForm, LeastSquares]] = []
@@ -155,7 +163,7 @@ class LevenbergMarquardt(Scheme):
         return self.task.bank
 
 
-def _problems(form: DampingForm, samples: Sums) -> Problems:
+def _problems(form: DampingForm, samples: SampleSums) -> Problems:
     if type(form) is MLP and form.hidden > MOST_HIDDEN:
         raise ConfigError(
             f"levenberg_marquardt takes networks of up to {MOST_HIDDEN} hidden units, not {form.hidden}: "

@@ -13,7 +13,7 @@ from auvnn.damping.bank import DampingBank
 from auvnn.errors import ConfigError
 from auvnn.models import GreyBox, load
 from auvnn.models.structures.base import without_damping
-from auvnn.simulate import simulate
+from auvnn.simulation import simulate
 from auvnn.studies.paper.following import Change, snapshot_of, tracked
 from auvnn.studies.paper.options import Options
 from auvnn.studies.paper.payload import _offline

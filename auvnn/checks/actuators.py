@@ -1,0 +1,366 @@
+"""Are the thrusters where the model file puts them? Reversed, exchanged or dead ones, by the pattern they leave.
+
+What acceleration follows each command is estimated from the log by regression, drag, products of velocities, gravity
+and constants fitted beside, and held against the columns of M^-1 B of the model: a reversed thruster has its column
+turned round, two exchanged ones each other's. Assignments are searched by turning and exchanging, each weighed by
+chi-square with a free positive gain per actuator (thrust curves are never exact), and given with the odds against
+every other assignment that was looked at.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.answers import plain
+from auvnn.checks import regression
+from auvnn.errors import AuvnnError
+from auvnn.logs import Log
+from auvnn.metrics.one_step import inertia_of
+from auvnn.models import GreyBox
+
+Array = NDArray[np.float64]
+
+GAIN, SPREAD = 1.0, 0.5  # of the static thrust, and how far from it a thruster may be
+SMALLEST_GAIN = 0.05
+DEAD = 0.15  # of the stated thrust: less is as good as nothing
+EXCITED = 0.03  # of full thrust, beyond what the others explain
+SURE = 0.95
+# Relative misfit that no chi-square counts against an assignment: geometry and inertia are not exact either.
+MODEL_ERROR = 0.15
+TIE = 2.0  # difference of the misfit below which two assignments are one
+ROUNDS = 24
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """Which stated actuator answers each command.
+
+    Args:
+        place: of each command, which stated actuator, (n,).
+        sign: of each command, +1 or -1, (n,).
+    """
+
+    place: tuple[int, ...]
+    sign: tuple[int, ...]
+
+    def words(self, names: list[str]) -> list[str]:
+        """Say what differs from the model file."""
+        out = []
+        seen: set[int] = set()
+        for i, (k, s) in enumerate(zip(self.place, self.sign, strict=True)):
+            if k == i and s < 0:
+                out.append(f"{names[i]} is reversed")
+            if k != i and i not in seen:
+                cycle, at = [i], k
+                while at != i and at not in cycle:
+                    cycle.append(at)
+                    at = self.place[at]
+                seen |= set(cycle)
+                turned = [names[c] for c in cycle if self.sign[c] < 0]
+                what = (
+                    " and ".join(names[c] for c in cycle)
+                    if len(cycle) == 2
+                    else " -> ".join(names[c] for c in [*cycle, cycle[0]])
+                )
+                out.append(f"{what} are exchanged" + (f" ({', '.join(turned)} reversed)" if turned else ""))
+        return out
+
+
+@dataclass(frozen=True)
+class ActuatorCheck:
+    """What a log says of a model's actuators.
+
+    Args:
+        names: of the actuators.
+        as_stated: whether the model file's order and signs hold.
+        findings: in words, what is exchanged, reversed or dead.
+        confidence: share of the odds, among all assignments tried, of the one found.
+        assignment: the one found.
+        gains: thrust of each over what the model file states, under it; NaN where the log says nothing.
+        untold: actuators that the log does not move enough by themselves.
+        alike: groups of actuators whose exchange would make no difference that this log could show.
+        misfit: root mean square distance of the estimated columns from the stated ones, in standard errors.
+    """
+
+    names: list[str]
+    as_stated: bool
+    findings: list[str]
+    confidence: float
+    assignment: Assignment
+    gains: Array
+    untold: list[str]
+    alike: list[list[str]] = field(default_factory=list)
+    misfit: float = 0.0
+
+    @property
+    def sure(self) -> bool:
+        """Whether something is wrong, and known with a confidence of 95 %."""
+        return bool(self.findings) and self.confidence >= SURE
+
+    @property
+    def words(self) -> list[str]:
+        """The answer as warnings; empty where nothing is wrong or nothing can be said with confidence."""
+        if not self.sure:
+            return []
+        what = "; ".join(self.findings)
+        return [
+            f"actuators: {what} (confidence {100 * min(self.confidence, 0.999):.3g} %): check order and signs of the "
+            "command columns against the model file"
+        ]
+
+    @property
+    def story(self) -> list[str]:
+        """The answer in sentences, whatever it is."""
+        if len(self.untold) == len(self.names):
+            return [
+                "the log does not move the actuators independently of one another: nothing can be said of them"
+            ]
+        odds = f"confidence {100 * min(self.confidence, 0.999):.3g} %"
+        out = [
+            f"{'; '.join(self.findings)} ({odds})"
+            if self.findings
+            else f"as the model file states them ({odds})"
+        ]
+        if self.untold:
+            out.append(
+                f"nothing can be said of {', '.join(self.untold)}: not moved independently of the others"
+            )
+        out += [f"{' and '.join(pair)} cannot be told from each other" for pair in self.alike]
+        return out
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data."""
+        return plain(
+            {
+                "as_stated": self.as_stated,
+                "findings": self.findings,
+                "confidence": self.confidence,
+                "gains": dict(zip(self.names, self.gains, strict=True)),
+                "place": dict(zip(self.names, [self.names[k] for k in self.assignment.place], strict=True)),
+                "sign": dict(zip(self.names, self.assignment.sign, strict=True)),
+                "cannot_tell": self.untold,
+                "alike": self.alike,
+                "story": self.story,
+            }
+        )
+
+
+def check_actuators(model: GreyBox, log: Log) -> ActuatorCheck:
+    """Say which actuators of a model are exchanged, reversed or dead, by a log.
+
+    Args:
+        model: the model, driven by what the log has.
+        log: measurements in which the actuators move independently of one another.
+
+    Raises:
+        InputError: the log lacks the commands that drive the model.
+    """
+    data = regression.regression_rows(model, log)
+    names = _names(model)
+    inverse = np.linalg.inv(inertia_of(model, log.runs[0]))
+    stated = inverse @ model.actuators.allocation.numpy()
+    # The model's own thrust is put back: what is regressed is all of the acceleration that commands cause.
+    wanted = regression.without(data.nuisance, data.gap + data.thrust @ stated.T)
+    thrust = regression.without(data.nuisance, data.thrust)
+    full = np.maximum(np.abs(data.thrust).max(0), 1e-9)
+    moved = _alone(thrust) > EXCITED * full
+    told = np.flatnonzero(moved)
+    untold = [names[i] for i in np.flatnonzero(~moved)]
+    same = Assignment(tuple(range(len(names))), (1,) * len(names))
+    gains = np.full(len(names), np.nan)
+    if len(told) == 0 or len(wanted) < 20 * len(names):
+        return ActuatorCheck(names, True, [], 0.0, same, gains, untold or names)
+    # What the log does not move independently stays as stated.
+    wanted = np.asarray(wanted - thrust[:, ~moved] @ stated[:, ~moved].T, dtype=np.float64)
+    problem = _ActuatorRegression.of(
+        data, thrust[:, told], wanted, np.asarray(stated[:, told], dtype=np.float64)
+    )
+    place = {int(i): k for k, i in enumerate(told)}
+    best, costs = problem.search()
+    found = Assignment(
+        tuple(int(told[best.place[place[i]]]) if i in place else i for i in range(len(names))),
+        tuple(best.sign[place[i]] if i in place else 1 for i in range(len(names))),
+    )
+    cost = np.array(list(costs.values()))
+    least = float(cost.min())
+    rivals = np.exp(-0.5 * (cost - least))
+    alike = [[names[told[i]], names[told[j]]] for i, j in problem.ties(best, costs)]
+    confidence = float(
+        np.exp(-0.5 * (costs[best] - least))
+        / (
+            rivals.sum()
+            - sum(
+                rivals[k]
+                for k, a in enumerate(costs)
+                if a != best and costs[a] - least < TIE and problem.same(a, best)
+            )
+        )
+    )
+    gains[told] = problem.gains(best)
+    words = found.words(names)
+    dead = [i for i in told if gains[i] < DEAD]
+    words += [f"{names[i]} gives {100 * gains[i]:.0f} % of the stated thrust" for i in dead]
+    return ActuatorCheck(
+        names,
+        not words,
+        words,
+        confidence,
+        found,
+        gains,
+        untold,
+        alike,
+        float(np.sqrt(problem.distance(best))),
+    )
+
+
+def doubts(model: GreyBox, log: Log) -> list[str]:
+    """Return what to warn of; nothing where the check cannot be made."""
+    try:
+        return check_actuators(model, log).words
+    except (AuvnnError, np.linalg.LinAlgError):
+        return []
+
+
+def _names(model: GreyBox) -> list[str]:
+    if model.actuation == "wrench":
+        return [f"tau_{a}" for a in "XYZKMN"]
+    return [f"thruster_{i + 1}" for i in range(model.actuators.size)]
+
+
+def _alone(thrust: Array) -> Array:
+    """Return the root mean square of each column that the others do not explain, (n,)."""
+    gram = thrust.T @ thrust / len(thrust)
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    correlation = gram / np.outer(scale, scale) + 1e-9 * np.eye(len(gram))
+    return scale / np.sqrt(np.maximum(np.diag(np.linalg.inv(correlation)), 1.0))
+
+
+@dataclass
+class _ActuatorRegression:
+    """Estimated columns and what an assignment would have them be.
+
+    Args:
+        estimate: (6, n) acceleration per newton of each command.
+        stated: (6, n) of the model file.
+        gram: (n, n), newtons squared, summed over the samples and divided by the inflation.
+        weight: (6,) one over the variance of the residual.
+    """
+
+    estimate: Array
+    stated: Array
+    gram: Array
+    weight: Array
+
+    @classmethod
+    def of(
+        cls, data: regression.RegressionRows, thrust: Array, wanted: Array, stated: Array
+    ) -> _ActuatorRegression:
+        """Regress, once more with outliers left out, and work out what the estimates are worth."""
+        keep = np.ones(len(wanted), dtype=bool)
+        solution = np.zeros((thrust.shape[1], 6))
+        for _ in range(2):
+            solution = np.linalg.lstsq(thrust[keep], wanted[keep], rcond=1e-10)[0]
+            left = wanted - thrust @ solution
+            spread = 1.4826 * np.median(np.abs(left), axis=0) + 1e-12
+            keep = (np.abs(left) < 6.0 * spread).all(1)
+        left = (wanted - thrust @ solution)[keep]
+        factor = regression.variance_inflation(data, left, thrust[keep])
+        gram = thrust[keep].T @ thrust[keep] / factor
+        estimate = np.asarray(solution.T, dtype=np.float64)
+        # A share of the stated columns' own effect counts as error: nothing about a model is exact.
+        effect = np.einsum("di,ij,dj->d", stated, gram, stated) / max(len(gram), 1)
+        variance = (left**2).mean(0) + MODEL_ERROR**2 * effect
+        return cls(estimate, stated, gram, 1.0 / np.maximum(variance, 1e-300))
+
+    def columns(self, a: Assignment) -> Array:
+        """Return what the stated columns are under an assignment, (6, n)."""
+        return self.stated[:, list(a.place)] * np.array(a.sign, dtype=float)
+
+    def gains(self, a: Assignment) -> Array:
+        """Return the gains (n,) that fit best, positive, each within reason of one."""
+        c = self.columns(a)
+        square = np.einsum("di,d,dj->ij", c, self.weight, c) * self.gram + np.eye(c.shape[1]) / SPREAD**2
+        right = np.einsum("di,d,dj,ij->i", c, self.weight, self.estimate, self.gram) + GAIN / SPREAD**2
+        gains = np.linalg.solve(square, right)
+        for _ in range(len(gains)):
+            low = gains < SMALLEST_GAIN
+            if not low.any():
+                break
+            free = ~low
+            gains = np.where(low, SMALLEST_GAIN, gains)
+            if free.any():
+                rest = right[free] - square[np.ix_(free, low)] @ gains[low]
+                gains[free] = np.linalg.solve(square[np.ix_(free, free)], rest)
+                if (gains[free] >= SMALLEST_GAIN).all():
+                    break
+        return np.maximum(gains, SMALLEST_GAIN)
+
+    def distance(self, a: Assignment) -> float:
+        """Return the mean squared distance of the estimates from an assignment, in variances."""
+        return self.cost(a) / self.estimate.size
+
+    def cost(self, a: Assignment) -> float:
+        """Return chi-square of an assignment with its best gains."""
+        gains = self.gains(a)
+        gap = self.estimate - self.columns(a) * gains
+        return float(
+            np.einsum("di,d,dj,ij->", gap, self.weight, gap, self.gram)
+            + (((gains - GAIN) / SPREAD) ** 2).sum()
+        )
+
+    def search(self) -> tuple[Assignment, dict[Assignment, float]]:
+        """Return the best assignment, and chi-square of all that were looked at: from the stated one downhill."""
+        n = self.stated.shape[1]
+        current = Assignment(tuple(range(n)), (1,) * n)
+        costs = {current: self.cost(current)}
+        for _ in range(ROUNDS):
+            around = _neighbours(current)
+            for a in around:
+                if a not in costs:
+                    costs[a] = self.cost(a)
+            best = min(around, key=lambda a: costs[a])
+            # The model file is believed unless something else is better beyond doubt.
+            if costs[best] > costs[current] - TIE:
+                break
+            current = best
+        return current, costs
+
+    def same(self, a: Assignment, b: Assignment) -> bool:
+        """Say whether two assignments put like columns into the same places."""
+        return bool(np.allclose(self.columns(a), self.columns(b), rtol=1e-6, atol=1e-12))
+
+    def ties(self, best: Assignment, costs: dict[Assignment, float]) -> list[tuple[int, int]]:
+        """Return the pairs of commands whose exchange changes the misfit by next to nothing."""
+        out = []
+        for i, j in combinations(range(len(best.place)), 2):
+            other = _exchanged(best, i, j)
+            if other in costs and abs(costs[other] - costs[best]) < TIE:
+                out.append((i, j))
+        return out
+
+
+def _exchanged(a: Assignment, i: int, j: int) -> Assignment:
+    place, sign = list(a.place), list(a.sign)
+    place[i], place[j], sign[i], sign[j] = place[j], place[i], sign[j], sign[i]
+    return Assignment(tuple(place), tuple(sign))
+
+
+def _turned(a: Assignment, *which: int) -> Assignment:
+    return Assignment(a.place, tuple(-s if i in which else s for i, s in enumerate(a.sign)))
+
+
+def _neighbours(a: Assignment) -> list[Assignment]:
+    """Return what one turn, one exchange (with turns), or a turn or reversal of all makes of an assignment."""
+    n = len(a.place)
+    found = [_turned(a, i) for i in range(n)]
+    for i, j in combinations(range(n), 2):
+        b = _exchanged(a, i, j)
+        found += [b, _turned(b, i), _turned(b, j), _turned(b, i, j)]
+    found.append(_turned(a, *range(n)))
+    found.append(Assignment(a.place[::-1], a.sign[::-1]))
+    return list(dict.fromkeys(found))

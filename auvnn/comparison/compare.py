@@ -1,0 +1,245 @@
+"""Model against measurements: one step, free running, and where the error sits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.answers import Answer, plain
+from auvnn.checks.doubts import doubts
+from auvnn.comparison.locate import AXES, failures, locate
+from auvnn.errors import ConfigError
+from auvnn.logs import Log
+from auvnn.metrics.one_step import OneStep, choose_derivative, one_step, scores
+from auvnn.metrics.rollouts import HORIZONS, NAMES, Rolled, rollout_table, scale_of
+from auvnn.models import GreyBox
+from auvnn.models.excursions import region_of, words_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Comparison(Answer):
+    """How well a model explains a log; `to_dict` is `comparison.json` of the public contract."""
+
+    kind = "comparison"
+    model: str
+    log: str
+    samples: int
+    runs: int
+    derivative: dict[str, Any]
+    one_step: dict[str, dict[str, float]]
+    rollout: dict[str, dict[str, Any]]
+    residual_wrench: dict[str, dict[str, float]]
+    failures: list[dict[str, Any]]
+    warnings: list[str] = field(default_factory=list)
+    series: list[dict[str, Any]] = field(default_factory=list)
+    regimes: dict[str, dict[str, Any]] = field(default_factory=dict)
+    noise_floor: Array = field(default_factory=lambda: np.zeros(6))
+    quality: Any = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON answer."""
+        names = (
+            "model",
+            "log",
+            "samples",
+            "runs",
+            "derivative",
+            "one_step",
+            "rollout",
+            "residual_wrench",
+            "failures",
+            "warnings",
+        )
+        return plain({"schema": "auvnn/comparison/1", **{n: getattr(self, n) for n in names}})
+
+    def write(self, folder: str | Path, *, report: bool = True) -> Path:
+        """Write the answer, the predictions as a table, and the report."""
+        path = super().write(folder, report=report)
+        write_predictions(self.series, Path(folder) / "predictions.parquet")
+        return path
+
+
+def compare(
+    model: GreyBox,
+    log: Log,
+    *,
+    horizons: Sequence[str | float] = HORIZONS,
+    derivative: Mapping[str, Any] | None = None,
+) -> Comparison:
+    """Compare a model with a log.
+
+    Args:
+        model: the model.
+        log: measurements; nothing is fitted to them here.
+        horizons: seconds of free running from measured states, and "full".
+        derivative: how accelerations are obtained where they were not measured: `method`, `half_width`, `order`.
+
+    Raises:
+        InputError: the log lacks the commands that drive the model.
+        ConfigError: a horizon that is no positive number.
+    """
+    wanted = tuple(_horizon(h) for h in horizons)
+    how = choose_derivative(log, derivative)
+    parts = one_step(model, log, how)
+    scale = scale_of(log)
+    rolled_table, rolled = rollout_table(model, log, scale, wanted)
+    wrench = np.concatenate([p.wrench for p in parts])
+    noise = _wrench_noise(parts)
+    located = locate(log, parts)
+    dt = float(np.median([run.dt for run in log.runs]))
+    with np.errstate(invalid="ignore"):
+        residual = {
+            axis: {
+                "rms": float(np.sqrt(np.nanmean(wrench[:, k] ** 2))),
+                "mean": float(np.nanmean(wrench[:, k])),
+                "noise_floor": float(noise[k]),
+            }
+            for k, axis in enumerate(AXES)
+        }
+    shown = rolled.get("5") or next(iter(rolled.values()), None)
+    return Comparison(
+        model.vehicle.name,
+        log.name,
+        log.samples,
+        len(log.runs),
+        how.describe(dt),
+        scores(parts),
+        rolled_table,
+        residual,
+        failures(parts, located, noise),
+        _warnings(model, log, rolled),
+        [_series(run.number, run.nu, p, shown) for run, p in zip(log.runs, parts, strict=True)],
+        located,
+        noise,
+        None,
+    )
+
+
+def _horizon(value: str | float) -> str:
+    if value == "full":
+        return "full"
+    try:
+        number = float(value)
+    except ValueError:
+        number = float("nan")
+    if not 0 < number < 1e6:
+        raise ConfigError(f"horizon {value!r} must be a number of seconds above zero, or full")
+    return f"{number:g}"
+
+
+def _wrench_noise(parts: list[OneStep]) -> Array:
+    """Return what noise would leave in the residual wrench of a perfect model, (6,)."""
+    weight = np.array([len(p.t) for p in parts], dtype=float)
+    return np.sqrt(np.average([p.wrench_noise**2 for p in parts], axis=0, weights=weight))
+
+
+def _series(number: int, nu: Array, part: OneStep, rolled: Rolled | None) -> dict[str, Any]:
+    """Return a run's traces for plots: windows of free running stitched one after the other."""
+    stitched = np.full_like(nu, np.nan)
+    if rolled is not None:
+        stitched = stitch(rolled, number, nu)
+    return {
+        "run": number,
+        "t": part.t,
+        "measured": nu,
+        "model": stitched,
+        "measured_acc": part.measured,
+        "model_acc": part.model,
+        "residual": part.wrench,
+    }
+
+
+def stitch(rolled: Rolled, number: int, nu: Array) -> Array:
+    """Return the predictions of every other window (they overlap by half) as one trace of a run, (N, 6)."""
+    trace = np.full_like(nu, np.nan)
+    upto = -1
+    for b in np.flatnonzero(rolled.windows.run == number):
+        first, length = int(rolled.windows.first[b]), int(rolled.windows.length[b])
+        if first < upto:
+            continue
+        trace[first : first + length] = rolled.predicted[b, :length]
+        upto = first + length - 1
+    return trace
+
+
+def write_predictions(series: list[dict[str, Any]], path: Path) -> Path:
+    """Write measured and predicted velocities and accelerations and the residual wrench as one Parquet table."""
+    import os
+
+    import polars as pl
+
+    frames = []
+    for s in series:
+        columns: dict[str, Any] = {"run": np.full(len(s["t"]), s["run"]), "t": s["t"]}
+        for key, names, suffix in (
+            ("measured", NAMES, ""),
+            ("model", NAMES, "_model"),
+            ("measured_acc", [f"d{n}" for n in NAMES], ""),
+            ("model_acc", [f"d{n}" for n in NAMES], "_model"),
+            ("residual", AXES, "_residual"),
+        ):
+            columns.update({f"{n}{suffix}": s[key][:, k] for k, n in enumerate(names)})
+        frames.append(pl.DataFrame(columns))
+    if not frames:
+        return path
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_name(f".{path.name}.part")
+    pl.concat(frames).fill_nan(None).write_parquet(beside)
+    os.replace(beside, path)
+    return path
+
+
+def _warnings(model: GreyBox, log: Log, rolled: dict[str, Rolled]) -> list[str]:
+    found = [*model.vehicle.warnings, *log.quality().reservations]
+    if not model.vehicle.has_damping and model.damping is None:
+        found.append("the model has no damping at all: train its subnetworks, or state damping in its file")
+    gone = {h: int(r.diverged.sum()) for h, r in rolled.items() if r.diverged.any()}
+    if gone:
+        found.append("free runs diverged: " + ", ".join(f"{n} of horizon {h} s" for h, n in gone.items()))
+    found += _extrapolated(model, rolled)
+    found += doubts(model, log)
+    if (
+        log.runs[0].wrench is not None
+        and log.runs[0].thrusters is not None
+        and model.actuation == "thrusters"
+    ):
+        found.append(_commanded_against_thrusters(model, log))
+    return found
+
+
+def _extrapolated(model: GreyBox, rolled: dict[str, Rolled]) -> list[str]:
+    """Say where free runs leave the velocities that the damping was trained on."""
+    region = region_of(model)
+    if region is None or not rolled:
+        return []
+    import torch
+
+    predicted = np.concatenate([r.predicted.reshape(-1, 6) for r in rolled.values()])
+    beyond = region.words(torch.tensor(predicted))
+    return [f"free runs go {words_of(beyond)}"] if beyond else []
+
+
+def _commanded_against_thrusters(model: GreyBox, log: Log) -> str:
+    """Return how the logged wrench compares with what the model's thrusters give for the logged commands."""
+    import torch
+
+    slopes = []
+    for axis in range(6):
+        mine, theirs = [], []
+        for run in log.runs:
+            assert run.thrusters is not None and run.wrench is not None
+            with torch.no_grad():
+                thrust = model.actuators.static(torch.tensor(np.nan_to_num(run.thrusters)))
+                mine.append((thrust @ model.actuators.allocation.mT).numpy()[:, axis])
+            theirs.append(np.nan_to_num(run.wrench[:, axis]))
+        a, b = np.concatenate(mine), np.concatenate(theirs)
+        slopes.append(float(a @ b / (b @ b)) if b @ b > 0 else float("nan"))
+    shown = ", ".join(f"{axis} {s:.2f}" for axis, s in zip(AXES, slopes, strict=True) if np.isfinite(s))
+    return f"the log has thrusters and a wrench; the thrusters are used; their wrench over the logged one: {shown}"

@@ -1,0 +1,77 @@
+"""What of a log a diagnosis looks at: effects that it can speak of, and windows of free running."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from auvnn.effects import EFFECTS
+from auvnn.errors import ConfigError, InputError
+from auvnn.logs import Log
+from auvnn.metrics.windows import Windows, cut_windows
+from auvnn.models import GreyBox
+
+HORIZON, WARMUP = 5.0, 3.0
+
+
+def candidates_for(
+    model: GreyBox, log: Log, wanted: str | Sequence[str] | None
+) -> tuple[list[str], dict[str, list[str]]]:
+    """Return the effects that can be asked for, and for the others which channels they lack."""
+    if isinstance(wanted, str):
+        wanted = [wanted]
+    names = EFFECTS.names() if wanted is None else list(dict.fromkeys(wanted))
+    needs: dict[str, list[str]] = {}
+    usable = []
+    for name in names:
+        kind = EFFECTS.get(name)
+        absent = [c for c in kind.channels if not _has(log, c)]
+        absent += kind.lacks(model.vehicle, model.actuation)
+        needs[name] = absent
+        if not absent and (name not in model.effect_names):
+            usable.append(name)
+    return usable, needs
+
+
+def _has(log: Log, channel: str) -> bool:
+    if channel in ("phi", "theta", "psi"):
+        return True
+    return all(channel in run.channels for run in log.runs)
+
+
+def windows_for(model: GreyBox, log: Log, window: float | None = None) -> Windows:
+    """Cut a log for fitting: windows of 5 s, or shorter where that leaves fewer than twelve.
+
+    Args:
+        model: says which commands drive it.
+        log: the log.
+        window: another length, s. Where disturbances rather than sensors limit the prediction, short windows
+            tell more: errors that a disturbance leaves grow with time, those of a sensor do not.
+
+    Raises:
+        ConfigError: a length that is no positive number.
+        InputError: no run is as long.
+    """
+    check_window_length(window)
+    if window is not None:
+        longest = max(run.duration for run in log.runs)
+        if window > longest:
+            raise InputError(
+                f"window={window:g} s is longer than every run of {log.name} (the longest has {longest:.4g} s): "
+                "choose a shorter window, or record longer runs"
+            )
+    horizon = float(np.clip(log.duration / 12, 1.0, HORIZON)) if window is None else float(window)
+    return cut_windows(log, horizon, warmup=WARMUP, kind=model.actuation, partial=True)
+
+
+def check_window_length(window: float | None) -> None:
+    """Refuse a length of windows that is no positive number.
+
+    Raises:
+        ConfigError: it is not.
+    """
+    if window is None:
+        return
+    if isinstance(window, bool) or not isinstance(window, (int, float)) or not 0 < window < np.inf:
+        raise ConfigError(f"window={window} must be a number of seconds above zero")

@@ -1,0 +1,201 @@
+"""Fit explanations to a log and judge them on runs left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.diagnosis.hypotheses.layout import DETERMINED, Layout, priors, scales, shapes
+from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
+from auvnn.diagnosis.score_tests.score import variance_inflation
+from auvnn.estimation.normal_equations import Statistics
+from auvnn.estimation.prediction_error import Fitted, fit
+from auvnn.estimation.priors import Priors
+from auvnn.metrics.windows import Windows
+
+Array = NDArray[np.float64]
+# Runs left out at a time where there are many, and stretches where there is one run only.
+FOLDS = 5
+
+
+@dataclass(frozen=True)
+class FittedHypothesis:
+    """A set of effects fitted jointly with what is uncertain.
+
+    Attributes:
+        effects: what is supposed to be missing.
+        fitted: the fit.
+        names: effects whose parameters were free, in order of their columns.
+        evidence: logarithm of the marginal likelihood, up to a constant that all explanations share.
+        left_out: (B,) weighted squared error of each window, fitted without its fold.
+        left_out_count: (B,) samples of each window.
+        misfit: the part of minus twice the evidence that is fit: squared error and departure from what was stated.
+        judged: what is assumed of the parameters where something is left out; as in the fit by default.
+    """
+
+    effects: tuple[str, ...]
+    fitted: Fitted
+    names: tuple[str, ...]
+    evidence: float
+    left_out: Array
+    left_out_count: Array
+    misfit: float = 0.0
+    judged: Priors | None = None
+
+    @property
+    def cv(self) -> float:
+        """Root-mean-square weighted error on what was left out; one is noise alone."""
+        return float(np.sqrt(self.left_out.sum() / max(self.left_out_count.sum(), 1.0)))
+
+
+def folds(run: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the fold of windows of these runs, (B,): by run where there are several, else by stretch of time."""
+    runs = np.unique(run)
+    if len(runs) >= 2:
+        return np.searchsorted(runs, run) % FOLDS
+    return (np.arange(len(run)) * min(FOLDS, len(run)) // max(len(run), 1)).astype(np.int64)
+
+
+def plausible(
+    layout: Layout, names: Sequence[str], effects: Sequence[str], held: Priors, theta: Array
+) -> Priors:
+    """Return the priors of a fit with the effects asked for within what is plausible of them.
+
+    What is left out may be all that says anything of a parameter. It is then not foreseen anywhere, but where the
+    evidence looks for it too; a shape near where it was found.
+    """
+    mean, precision = held.mean.copy(), held.precision.copy()
+    for name, own in layout.places(names).items():
+        if name in effects:
+            precision[own] = np.maximum(precision[own], scales(layout, name) ** -2.0)
+            mean[own] = np.where(shapes(layout, name), theta[own], mean[own])
+    return replace(held, mean=mean, precision=precision)
+
+
+def left_out(statistics: Statistics, theta: Array, held: Priors, fold: NDArray[np.int64]) -> Array:
+    """Return each window's weighted squared error under parameters fitted without its fold, (B,).
+
+    The fit is linear about the fit on everything, from the windows' own sums: no run is simulated again.
+    """
+    cost = np.empty(len(fold))
+    free = held.inside(theta)
+    for f in np.unique(fold):
+        keep = fold != f
+        if not keep.any():
+            keep = fold == f
+        hessian = statistics.hessian[keep].sum(0) + np.diag(held.precision)
+        gradient = statistics.slope[keep].sum(0) - held.precision * (theta - held.mean)
+        step = np.zeros(len(theta))
+        if free.any():
+            step[free] = np.linalg.lstsq(hessian[np.ix_(free, free)], gradient[free], rcond=1e-12)[0]
+        out = ~keep if (~keep).any() else keep
+        cost[out] = (
+            statistics.cost[out]
+            - 2 * statistics.slope[out] @ step
+            + np.einsum("i,bij,j->b", step, statistics.hessian[out], step)
+        )
+    return cost
+
+
+def fit_hypothesis(
+    layout: Layout,
+    windows: Windows,
+    base: Sequence[str],
+    effects: Sequence[str],
+    *,
+    start: Fitted | None = None,
+    guess: Layout | None = None,
+    sigma: Array | None = None,
+    iterations: int = 15,
+) -> FittedHypothesis:
+    """Fit effects jointly with the base and judge them on folds left out.
+
+    Args:
+        layout: stated values and columns.
+        windows: of the log.
+        base: effects that are free anyway: stated uncertainties and effects found before.
+        effects: effects asked for; a stated uncertainty among them is set free.
+        start: a fit whose initial states and weights to start from.
+        guess: a layout whose model holds values to start from.
+        sigma: fixed weights; estimated where absent.
+        iterations: at most this many steps of the fit.
+    """
+    names = tuple(dict.fromkeys([*base, *effects]))
+    held = priors(layout, names, free=effects)
+    model = (guess or layout).model
+    if start is None and sigma is None:
+        fitted = fit_with_outlier_restart(model, windows, names, held, iterations=iterations)
+    else:
+        initial = None if start is None else start.initial
+        fitted = fit(model, windows, names, held, initial=initial, sigma=sigma, iterations=iterations)
+    judged = plausible(layout, names, effects, held, fitted.theta)
+    cost = left_out(fitted.statistics, fitted.theta, judged, folds(windows.run))
+    count = fitted.statistics.count[:, np.isfinite(fitted.sigma)].sum(1)
+    return FittedHypothesis(tuple(effects), fitted, names, 0.0, cost, count, judged=judged)
+
+
+def log_evidence(layout: Layout, explanation: FittedHypothesis, factor: float) -> FittedHypothesis:
+    """Return the explanation with its evidence: Laplace's approximation with priors of plausible size.
+
+    Args:
+        layout: stated values.
+        explanation: to be weighed.
+        factor: variance of the scores over that of white noise; divides the data's say.
+
+    Reference: MacKay (1992), Neural Computation 4(3).
+    """
+    fitted, prior = explanation.fitted, []
+    means = []
+    for name in explanation.names:
+        mean = layout.means[name]
+        means.append(mean)
+        size = scales(layout, name)
+        if name in layout.spreads and name not in explanation.effects:
+            size = layout.spreads[name]
+        prior.append(np.broadcast_to(size, mean.shape))
+    # With nothing uncertain and nothing asked for, there is nothing to weigh but the data.
+    size = np.concatenate([np.zeros(0), *prior])
+    away = (fitted.theta - np.concatenate([np.zeros(0), *means])) / size
+    # Where it begins and how often it swings is as likely in one place as in another.
+    away[np.concatenate([np.zeros(0, dtype=bool), *(shapes(layout, n) for n in explanation.names)])] = 0.0
+    data = float(fitted.statistics.cost.sum()) / factor
+    information = fitted.statistics.total * size[:, None] * size / factor
+    volume = np.linalg.slogdet(information + np.eye(len(size)))[1]
+    misfit = data + float(away @ away)
+    return replace(explanation, evidence=-0.5 * (misfit + volume), misfit=misfit)
+
+
+def determined(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return whether the log says more of some parameters than their priors do.
+
+    Args:
+        explanation: a fit.
+        columns: positions within its own parameter vector.
+    """
+    fitted = explanation.fitted
+    variance = np.diag(fitted.covariance())[columns]
+    return variance * fitted.priors.precision[columns] < DETERMINED**2
+
+
+def standard_errors(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> tuple[Array, float]:
+    """Return standard errors of some parameters, and the inflation that went into them.
+
+    A parameter of which the log says no more than its prior has none: NaN.
+
+    Args:
+        explanation: a fit.
+        columns: positions within its own parameter vector.
+    """
+    statistics, fitted = explanation.fitted.statistics, explanation.fitted
+    covariance = fitted.covariance()
+    others = np.setdiff1d(np.arange(len(fitted.theta)), columns)
+    total = statistics.total + np.diag(fitted.priors.precision)
+    carry = np.linalg.lstsq(total[np.ix_(others, others)], total[np.ix_(others, columns)], rcond=1e-12)[0]
+    by_window = statistics.slope[:, columns] - statistics.slope[:, others] @ carry
+    information = total[np.ix_(columns, columns)] - total[np.ix_(columns, others)] @ carry
+    factor = variance_inflation(by_window, information, statistics.run)
+    std = np.sqrt(np.maximum(np.diag(covariance)[columns], 0.0) * factor)
+    return np.where(determined(explanation, columns), std, np.nan), factor

@@ -1,0 +1,140 @@
+"""All effects that remain, asked for at a fit: one linearisation, a test for each, a closer look where one is due."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.layout import Layout
+from auvnn.diagnosis.score_tests.probes import Probed, extent_of, probed
+from auvnn.diagnosis.score_tests.score import Score, similarity
+from auvnn.diagnosis.score_tests.shape_search import ShapeSearch
+from auvnn.diagnosis.selection.choose import ALPHA
+from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
+from auvnn.estimation.priors import set_parameters
+from auvnn.metrics.windows import Windows
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Tested:
+    """The tests of some effects at a fit.
+
+    Attributes:
+        scores: by effect.
+        at: the layout at the fit.
+        alike: entry (a, b) is how much of the first effect's trace the second one's can imitate, see `similarity`;
+            empty where that was not asked for.
+    """
+
+    scores: dict[str, Score]
+    at: Layout
+    alike: Array
+
+    @property
+    def p_value(self) -> float:
+        """Of all of them together."""
+        return bonferroni([s.p_value for s in self.scores.values() if s.degrees])
+
+
+class NullTests:
+    """Tests at the null, of one log.
+
+    Args:
+        layout: stated values.
+        windows: of the log.
+        say: told in words what is being done.
+    """
+
+    def __init__(self, layout: Layout, windows: Windows, say: Callable[[str], None]) -> None:
+        """Look how far the log reaches."""
+        self.layout, self.windows, self.say = layout, windows, say
+        self.extent = extent_of(windows)
+
+    def __call__(
+        self,
+        current: FittedHypothesis,
+        remaining: Sequence[str],
+        base: Sequence[str],
+        chosen: Sequence[str],
+        alike: bool = False,
+    ) -> Tested:
+        """Test the effects that remain.
+
+        The sums over all effects, the largest thing in a diagnosis, are gone when this returns.
+
+        Args:
+            current: the fit.
+            remaining: effects that are asked for.
+            base: effects that are free anyway.
+            chosen: those of the base that were asked for, and found, before.
+            alike: also say how much they look like one another.
+        """
+        sums, at, asked = self._statistics(current, remaining)
+        asked_at = {n: asked.score(sums, base, n, chosen) for n in remaining}
+        scores = {n: found for n, (found, _) in asked_at.items()}
+        labels = [k for _, k in asked_at.values()] if alike else []
+        matrix = similarity(sums, asked.layout, base, labels)
+        del sums
+        return Tested(scores | self._closer(current, at, base, chosen, scores), at, matrix)
+
+    def _statistics(
+        self, found: FittedHypothesis, remaining: Sequence[str]
+    ) -> tuple[Statistics, Layout, Probed]:
+        """Linearise towards every parameter at a fit, those of the remaining effects at several shapes."""
+        model = self.layout.model.rebuilt(self.layout.model.copied_effects())
+        set_parameters(model, found.names, found.fitted.theta)
+        at = replace(self.layout, model=model)
+        asked = probed(at, remaining, self.extent)
+        sums, _, _ = normal_equations(
+            self.windows,
+            linearise(
+                asked.layout.model, self.windows, found.fitted.initial, asked.layout.model.effect_names
+            ),
+            found.fitted.sigma,
+        )
+        return sums, at, asked
+
+    def _closer(
+        self,
+        current: FittedHypothesis,
+        at: Layout,
+        base: Sequence[str],
+        chosen: Sequence[str],
+        scores: dict[str, Score],
+    ) -> dict[str, Score]:
+        """Return the scores of effects that were looked at more closely, by name.
+
+        An effect of many shapes is looked at at a few. Where one of them takes away more of the errors than any other
+        effect does, or than chance does where no effect is significant, what the shapes in between would take is worth
+        knowing: the errors that a wrong shape leaves count as noise in its test, and may hide it.
+        """
+        # A stated coefficient that is set free takes what was stated of it away too: its gain is another matter.
+        told = {n: s for n, s in scores.items() if s.degrees and n not in self.layout.nuisance}
+        if not told:
+            return {}
+        promises = max(told, key=lambda n: told[n].gain - told[n].degrees)
+        surest = max(told, key=lambda n: told[n].evidence)
+        nothing = len(told) * min(s.p_value for s in told.values()) >= ALPHA
+        closer = ShapeSearch(at, self.windows, current, base, chosen, self.extent)
+        found: dict[str, Score] = {}
+        for n in told if nothing else dict.fromkeys([promises, surest]):
+            promised = chi2.sf(told[n].gain, told[n].degrees)
+            if promised * len(told) >= ALPHA or not closer.due(n):
+                continue
+            self.say(f"looking at {n} more closely")
+            best = closer.look(n)
+            if best is not None and best.p_value < told[n].p_value:
+                found[n] = best
+        return found
+
+
+def bonferroni(p_values: list[float]) -> float:
+    """Return one p-value for many dependent tests: Bonferroni's, which holds whatever the dependence."""
+    return float(min(1.0, len(p_values) * min(p_values))) if p_values else 1.0

@@ -1,0 +1,313 @@
+"""Which effect to take: the leading ones are refitted, weighed, and must pay on runs left out.
+
+Forward, one effect at a time; and backward: what was taken before must still be needed once another is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, log_evidence
+from auvnn.diagnosis.hypotheses.layout import Layout, initial_guess, shapes
+from auvnn.diagnosis.score_tests.score import Score, variance_inflation
+from auvnn.diagnosis.selection.model_comparison import ALPHA_NEEDED, ODDS, ModelComparison
+from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
+from auvnn.effects import effect_class
+from auvnn.estimation.priors import parameters_of, set_parameters
+from auvnn.metrics.windows import Windows
+
+Array = NDArray[np.float64]
+ALPHA = 0.05
+# Explanations are refitted in full, nonlinearly, as long as their one-step evidence is within reach of the best.
+LEADERS, REACH, REACH_SHARE = 5, 30.0, 0.5
+# Parts of what a test estimates from which a fit is begun, the next where it went astray from the one before: near the
+# bottom the force grows faster than any slope says.
+SHARES = (1.0, 0.1)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What the leading effects came to.
+
+    Attributes:
+        verdict: named, ambiguous or unknown.
+        best: the explanation that is taken; None where none pays.
+        tried: all that were refitted.
+        rivals: where ambiguous, the explanations between which the log cannot decide; the first is the one taken.
+    """
+
+    verdict: str
+    best: FittedHypothesis | None
+    tried: list[FittedHypothesis]
+    rivals: list[FittedHypothesis]
+
+
+@dataclass(frozen=True)
+class Chooser:
+    """Weighs explanations of one log.
+
+    Attributes:
+        layout: stated values.
+        windows: of the log.
+        say: told in words what is being done.
+    """
+
+    layout: Layout
+    windows: Windows
+    say: Callable[[str], None]
+
+    @property
+    def rivals(self) -> ModelComparison:
+        """Who compares explanations."""
+        return ModelComparison(self.layout, self.windows, self.say)
+
+    def choose(
+        self,
+        scores: dict[str, Score],
+        at: Layout,
+        base: list[str],
+        chosen: list[str],
+        current: FittedHypothesis,
+    ) -> Choice:
+        """Refit the leading effects beside those chosen before, and take the one that explains best.
+
+        Args:
+            scores: tests of the effects that remain.
+            at: the layout at the current fit.
+            base: effects that are free anyway.
+            chosen: effects found before.
+            current: the fit without any of those that remain.
+        """
+        significant = [s for s in scores.values() if s.degrees and s.p_value < ALPHA]
+        leading = sorted(significant, key=lambda s: -s.evidence)[:LEADERS]
+        top = leading[0].evidence if leading else 0.0
+        leading = [s for s in leading if s.evidence > min(top - REACH, REACH_SHARE * top)]
+        leading += self._promising(significant, leading)
+        # Evidence counts an effect of many parameters low while it is small; a test that is clear even among
+        # all the others lets it be judged by what it does on runs left out.
+        clear = {s.effect for s in significant if s.p_value < ALPHA / len(scores)}
+        tried = [self._refitted(s, at, base, chosen, current) for s in leading]
+        if not tried:
+            return Choice("unknown", None, [], [])
+        factor = min(self._factor(e) for e in tried)
+        current = log_evidence(self.layout, current, factor)
+        tried = sorted((log_evidence(self.layout, e, factor) for e in tried), key=lambda e: -e.evidence)
+        paying = [
+            e
+            for e in tried
+            if (e.evidence > current.evidence or e.effects[-1] in clear)
+            and improves_predictive_density(e, self._without(e, base, current))
+        ]
+        if not paying:
+            return Choice("unknown", None, tried, [])
+        best, standing = self.rivals.standing(paying, at, base, factor)
+        rivals = [e for e in standing if not self.rivals.told_apart(best, e)]
+        if rivals:
+            both = self._joined(best, rivals[0], at, base, factor)
+            if both is not None:
+                return Choice("named", both, tried, [])
+            plainer = effect_class(best.effects[-1]).plainer
+            group = sorted([best, *rivals], key=lambda e: e.effects[-1] not in plainer)
+            # The first stands for all of them while more is asked for.
+            final = self._settled(group[0], at, base)
+            return Choice("ambiguous", final, tried, [final, *group[1:]])
+        final = self._settled(best, at, base)
+        return Choice("named", final, [final, *tried[1:]] if tried[0] is best else [final, *tried], [])
+
+    @staticmethod
+    def _promising(significant: list[Score], leading: list[Score]) -> list[Score]:
+        """Return the test, if any, of the effect that might refute those in the lead by its better fit."""
+        if not leading:
+            return []
+        most = leading[0].gain
+        more = [
+            s for s in significant if s not in leading and s.gain - most > chi2.isf(ALPHA_NEEDED, s.degrees)
+        ]
+        return sorted(more, key=lambda s: s.degrees - s.gain)[:1]
+
+    def _settled(self, best: FittedHypothesis, at: Layout, base: list[str]) -> FittedHypothesis:
+        """Return an explanation refitted with the weights that follow from the errors that it leaves."""
+        guess = replace(at, model=best.fitted.model)
+        return fit_hypothesis(self.layout, self.windows, base, best.effects, start=best.fitted, guess=guess)
+
+    def _instead(
+        self, taken: FittedHypothesis, base: Sequence[str], name: str, other: FittedHypothesis
+    ) -> FittedHypothesis:
+        """Return an explanation refitted with the last effect of another one in the place of one of its own."""
+        member = other.effects[-1]
+        model = taken.fitted.model.rebuilt(taken.fitted.model.copied_effects())
+        set_parameters(model, [name], self.layout.means[name])
+        set_parameters(model, [member], parameters_of(other.fitted.model, [member]))
+        return fit_hypothesis(
+            self.layout,
+            self.windows,
+            base,
+            (*(e for e in taken.effects if e != name), member),
+            start=taken.fitted,
+            guess=replace(self.layout, model=model),
+            sigma=taken.fitted.sigma,
+            iterations=6,
+        )
+
+    def regrouped(
+        self, taken: FittedHypothesis, base: Sequence[str], group: Sequence[FittedHypothesis]
+    ) -> list[FittedHypothesis]:
+        """Return a group between whose members the log still cannot decide, with all in it that was found after it.
+
+        Args:
+            taken: the explanation with the group's first and what came after it.
+            base: effects that are free whatever is chosen.
+            group: as it was found.
+
+        Returns:
+            explanations with the member in question last, the one to be taken first; one alone where the others are
+            told apart from it now.
+        """
+        name = group[0].effects[-1]
+        others = tuple(e for e in taken.effects if e != name)
+        first = replace(taken, effects=(*others, name))
+        members = [first, *(self._instead(taken, base, name, e) for e in group[1:])]
+        factor = min(self._factor(e) for e in members)
+        best, *more = sorted(
+            (log_evidence(self.layout, e, factor) for e in members), key=lambda e: -e.evidence
+        )
+        left = [best, *(e for e in more if not self.rivals.told_apart(best, e))]
+        plainer = effect_class(best.effects[-1]).plainer
+        left.sort(key=lambda e: e.effects[-1] not in plainer)
+        if left[0].effects[-1] == name:
+            return left
+        guess = replace(self.layout, model=left[0].fitted.model)
+        return [
+            fit_hypothesis(
+                self.layout, self.windows, base, left[0].effects, start=left[0].fitted, guess=guess
+            ),
+            *left[1:],
+        ]
+
+    def _joined(
+        self, best: FittedHypothesis, other: FittedHypothesis, at: Layout, base: list[str], factor: float
+    ) -> FittedHypothesis | None:
+        """Return two explanations as one, where each is needed beside the other; then they are no rivals.
+
+        Of two effects that are both missing, one alone may do as badly as the other.
+        """
+        both = self.rivals.together(best, other, at, base)
+        gain = log_evidence(self.layout, both, factor).evidence - best.evidence
+        if gain < ODDS or not improves_predictive_density(both, best):
+            return None
+        return fit_hypothesis(
+            self.layout,
+            self.windows,
+            base,
+            both.effects,
+            start=both.fitted,
+            guess=replace(at, model=both.fitted.model),
+        )
+
+    def withdrawn(self, taken: FittedHypothesis, base: Sequence[str]) -> tuple[FittedHypothesis, list[str]]:
+        """Return the explanation without those effects that it no longer needs, and their names.
+
+        An effect that was taken first may have stood in for the ones that came after it. It goes where the
+        evidence is no lower without it, or where it does not pay on runs left out, everything else refitted.
+
+        Args:
+            taken: the explanation, the newest effect last.
+            base: effects that are free whatever is chosen.
+        """
+        gone: list[str] = []
+        for name in taken.effects[:-1]:
+            left = tuple(e for e in taken.effects if e != name)
+            self.say(f"asking whether {name} is still needed")
+            model = taken.fitted.model.rebuilt(taken.fitted.model.copied_effects())
+            set_parameters(model, [name], self.layout.means[name])
+            without = fit_hypothesis(
+                self.layout,
+                self.windows,
+                base,
+                left,
+                start=taken.fitted,
+                guess=replace(self.layout, model=model),
+                sigma=taken.fitted.sigma,
+                iterations=6,
+            )
+            factor = self._factor(taken)
+            needed = (
+                log_evidence(self.layout, taken, factor).evidence
+                > log_evidence(self.layout, without, factor).evidence
+            )
+            if not needed or not improves_predictive_density(taken, without):
+                gone.append(name)
+                taken = fit_hypothesis(
+                    self.layout,
+                    self.windows,
+                    base,
+                    left,
+                    start=without.fitted,
+                    guess=replace(self.layout, model=without.fitted.model),
+                )
+        return taken, gone
+
+    def without(self, taken: FittedHypothesis, base: Sequence[str], names: Sequence[str]) -> FittedHypothesis:
+        """Return the explanation refitted without some of its effects."""
+        model = taken.fitted.model.rebuilt(taken.fitted.model.copied_effects())
+        for name in names:
+            set_parameters(model, [name], self.layout.means[name])
+        left = tuple(e for e in taken.effects if e not in names)
+        guess = replace(self.layout, model=model)
+        return fit_hypothesis(self.layout, self.windows, base, left, start=taken.fitted, guess=guess)
+
+    def _refitted(
+        self, candidate: Score, at: Layout, base: list[str], chosen: list[str], current: FittedHypothesis
+    ) -> FittedHypothesis:
+        name = candidate.effect
+        self.say(f"fitting {name}")
+        guess = at.model.rebuilt(at.model.copied_effects())
+        known = parameters_of(at.model, [name])
+        start, shape = initial_guess(self.layout, name, candidate.estimate), shapes(self.layout, name)
+        for share in SHARES:
+            begin = np.where(shape, start, known + share * (start - known))
+            set_parameters(guess, [name], begin)
+            found = fit_hypothesis(
+                self.layout,
+                self.windows,
+                base,
+                [*chosen, name],
+                start=current.fitted,
+                guess=replace(at, model=guess),
+                sigma=current.fitted.sigma,
+                iterations=6,
+            )
+            # It holds the fit without the effect: one that is worse than that has gone astray.
+            if found.fitted.cost <= current.fitted.cost:
+                break
+        return found
+
+    def _without(
+        self, after: FittedHypothesis, base: list[str], current: FittedHypothesis
+    ) -> FittedHypothesis:
+        """Return the same model without the effect, everything else refitted.
+
+        Where the effect is a coefficient group that is uncertain anyway, that group stays as stated.
+        """
+        effect = after.effects[-1]
+        if effect not in base:
+            return current
+        return fit_hypothesis(
+            self.layout,
+            self.windows,
+            [n for n in base if n != effect],
+            after.effects[:-1],
+            start=current.fitted,
+            sigma=current.fitted.sigma,
+            iterations=6,
+        )
+
+    @staticmethod
+    def _factor(explanation: FittedHypothesis) -> float:
+        sums = explanation.fitted.statistics
+        return variance_inflation(sums.slope, sums.total, sums.run)

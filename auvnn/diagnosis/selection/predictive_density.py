@@ -1,0 +1,68 @@
+"""Whether an effect pays: free running on what was left out must improve by more than its own uncertainty."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_solve
+
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds
+from auvnn.estimation.priors import limits
+
+Array = NDArray[np.float64]
+
+
+def improves_predictive_density(after: FittedHypothesis, before: FittedHypothesis) -> bool:
+    """Whether what was left out is foreseen better by more than the gain's own uncertainty."""
+    gain = cross_validated_log_density(before) - cross_validated_log_density(after)
+    return float(gain.sum()) > float(np.sqrt(len(gain)) * gain.std(ddof=1))
+
+
+def cross_validated_log_density(explanation: FittedHypothesis) -> Array:
+    """Return how well each window was foreseen: minus twice its log predictive density, up to a constant, (B,).
+
+    A fold of runs is left out, its windows foreseen one after the other, each from the other folds and from those
+    before it: the terms of a fold sum to its joint density. What the others leave open of the parameters is part of
+    what they foresee, so that one window that alone says something of a parameter is neither held against an effect
+    nor taken for it: with a guess put in place of what they leave open, it outweighed the gain in all others.
+
+    References: Geisser and Eddy (1979), JASA 74(365) 153-160 (predictive densities of what is left out); Dawid (1984),
+    JRSS A 147(2) 278-292 (one after the other).
+    """
+    fitted = explanation.fitted
+    held, theta = explanation.judged or fitted.priors, fitted.theta
+    # What a bound holds stays there, whatever the slope beyond it promises.
+    low, high = limits(fitted.model, explanation.names, held)
+    inside = np.nonzero(held.inside(theta) & (theta != low) & (theta != high))[0]
+    sums = fitted.statistics.columns(inside.tolist())
+    fold = folds(sums.run)
+    precision = held.precision[inside]
+    pull = precision * (theta - held.mean)[inside]
+    out = sums.cost.copy()
+    for f in np.unique(fold):
+        own = np.nonzero(fold == f)[0]
+        known = sums.hessian[fold != f].sum(0) + np.diag(precision)
+        step, volume = _solved(known, sums.slope[fold != f].sum(0) - pull)
+        for w in own[np.lexsort((sums.first[own], sums.run[own]))]:
+            hessian, slope = sums.hessian[w], sums.slope[w]
+            out[w] += step @ hessian @ step - 2 * slope @ step
+            ahead = slope - hessian @ step
+            known = known + hessian
+            change, after = _solved(known, ahead)
+            out[w] += after - volume - ahead @ change
+            step, volume = step + change, after
+    return out
+
+
+def _solved(square: Array, right: Array) -> tuple[Array, float]:
+    """Return the solution of a symmetric system, and the logarithm of its determinant."""
+    # In units of each parameter's own: what is hardly known must not pass for rounding beside what is well known.
+    unit = 1.0 / np.sqrt(np.maximum(np.diag(square), 1e-300))
+    even, right = square * unit[:, None] * unit, right * unit
+    scale = 2.0 * float(np.log(unit).sum())
+    try:
+        factor = np.linalg.cholesky(even)
+    except np.linalg.LinAlgError:
+        return np.linalg.lstsq(even, right, rcond=1e-12)[0] * unit, float(np.linalg.slogdet(even)[1]) - scale
+    solved = cho_solve((factor, True), right, check_finite=False)
+    return solved * unit, 2.0 * float(np.log(np.diagonal(factor)).sum()) - scale

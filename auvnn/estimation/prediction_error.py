@@ -1,0 +1,166 @@
+"""Fit effect parameters to a log by the error of free-running windows (multiple shooting).
+
+Each window starts from a state of its own, which is estimated with the parameters, so that measurement noise
+enters only where it is: in the outputs. No derivative is taken and nothing is smoothed, which is why neither a
+filter nor the hold of the commands can pass for a lag. Windows are reduced to small sums, so that memory
+does not grow with the log and runs can be left out without another pass.
+
+Reference: Ljung (1999), System Identification, section 7; Bock (1983) for multiple shooting.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from auvnn.estimation.normal_equations import (
+    TRUST,
+    Statistics,
+    cost_of,
+    linearise,
+    motion,
+    normal_equations,
+    residual_std,
+)
+from auvnn.estimation.priors import Priors, bounded_step, limits, parameters_of, set_parameters
+from auvnn.metrics.free_run import initial_states, moved
+from auvnn.metrics.windows import Windows
+from auvnn.models import GreyBox
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A model fitted to windows.
+
+    Attributes:
+        model: with the fitted values.
+        names: effects whose parameters are free, in order of the P columns.
+        theta: (P,).
+        initial: (B, 13) fitted initial states.
+        sigma: (18,) weights' standard deviations; infinite for channels not measured.
+        statistics: at the fitted point.
+        priors: what was assumed.
+        cost: weighted squared error at the fitted point, prior terms included.
+        converged: whether the last step was negligible.
+        iterations: steps taken.
+    """
+
+    model: GreyBox
+    names: tuple[str, ...]
+    theta: Array
+    initial: Tensor
+    sigma: Array
+    statistics: Statistics
+    priors: Priors
+    cost: float
+    converged: bool
+    iterations: int
+
+    def covariance(self) -> Array:
+        """Return the covariance (P, P) of the parameters under white noise of `sigma`."""
+        precision = self.statistics.total + np.diag(self.priors.precision)
+        # In units of each parameter's own: what is hardly known must not pass for rounding beside what is well known.
+        unit = 1.0 / np.sqrt(np.maximum(np.diag(precision), 1e-300))
+        return np.linalg.pinv(precision * unit[:, None] * unit, hermitian=True) * unit[:, None] * unit
+
+
+def fit(
+    model: GreyBox,
+    windows: Windows,
+    names: Sequence[str],
+    priors: Priors,
+    *,
+    initial: Tensor | None = None,
+    sigma: Array | None = None,
+    iterations: int = 15,
+    progress: Callable[[str], None] | None = None,
+) -> Fitted:
+    """Fit the named effects' parameters and every window's initial state by damped Gauss-Newton.
+
+    Unless `sigma` is given the weights follow the errors that are left, channel by channel, so that a channel
+    that the model cannot explain does not drown the others.
+
+    Args:
+        model: holds the named effects; it is not changed.
+        windows: what to fit.
+        names: effects whose parameters are free.
+        priors: of those parameters.
+        initial: initial states to start from; the measured ones by default.
+        sigma: (18,) fixed weights, by default estimated.
+        iterations: at most this many steps.
+        progress: told in words after each step.
+    """
+    model = model.rebuilt(model.copied_effects())
+    names, fixed = tuple(names), sigma is not None
+    if initial is None:
+        initial = initial_states(model, windows)
+    floor = TRUST * motion(windows) + 1e-9
+    theta = parameters_of(model, names)
+    low, high = limits(model, names, priors)
+    theta = np.clip(theta, low, high)
+    set_parameters(model, names, theta)
+    here = list(linearise(model, windows, initial, names))
+    if sigma is None:
+        measured = windows.mask.sum((0, 1)).numpy() > 0
+        sigma = np.where(measured, 100 * floor + 1e-6, np.inf)
+        # The errors of the model as given set the first weights, once the initial states fit them.
+        for _ in range(2):
+            sigma = residual_std(normal_equations(windows, here, sigma)[0], floor, 0)
+    converged, taken, damping = False, 0, 0.0
+
+    def penalty(at: Array) -> float:
+        return float(priors.precision @ (at - priors.mean) ** 2)
+
+    for taken in range(1, iterations + 1):
+        statistics, a, slopes = normal_equations(windows, here, sigma)
+        hessian = statistics.total + np.diag(priors.precision)
+        gradient = statistics.slope.sum(0) - priors.precision * (theta - priors.mean)
+        scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+        normal = hessian / scale[:, None] / scale
+        now = cost_of(here, sigma) + penalty(theta)
+        for _attempt in range(8):
+            step = (
+                bounded_step(
+                    normal + damping * np.eye(len(theta)),
+                    gradient / scale,
+                    (low - theta) * scale,
+                    (high - theta) * scale,
+                )
+                / scale
+            )
+            set_parameters(model, names, theta + step)
+            reached = parameters_of(model, names)
+            change = a - np.einsum("bij,j->bi", slopes, reached - theta)
+            trial = moved(initial, torch.as_tensor(change / (1 + damping)))
+            there = list(linearise(model, windows, trial, names))
+            then = cost_of(there, sigma) + penalty(reached)
+            if then <= now * (1 + 1e-9) + 1e-6:
+                break
+            damping = max(4 * damping, 1e-2)
+        else:
+            set_parameters(model, names, theta)
+            break
+        gain, damping = now - then, damping / 8 if damping > 1e-4 else 0.0
+        theta, initial, here = reached, trial, there
+        renewed = (
+            sigma if fixed else residual_std(normal_equations(windows, here, sigma)[0], floor, len(theta))
+        )
+        usable = np.isfinite(sigma)
+        drift = np.max(np.abs(np.log(renewed[usable] / sigma[usable])), initial=0.0)
+        if progress is not None:
+            progress(f"step {taken}: error {then:.4g}")
+        sigma = renewed
+        if gain < 0.05 + 1e-6 * now and drift < 0.02:
+            converged = True
+            break
+    statistics, a, _ = normal_equations(windows, here, sigma)
+    initial = moved(initial, torch.as_tensor(a))
+    total = float(statistics.cost.sum()) + penalty(theta)
+    return Fitted(model, names, theta, initial, sigma, statistics, priors, total, converged, taken)

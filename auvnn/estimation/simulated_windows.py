@@ -1,0 +1,151 @@
+"""Windows run free once: what they predict, by how much that is wrong, and what their thrusts depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+from torch.func import functional_call
+
+from auvnn.effects import Sensed
+from auvnn.estimation.few_inputs import slopes
+from auvnn.metrics.free_run import predict
+from auvnn.metrics.windows import Windows
+from auvnn.models import GreyBox
+from auvnn.models.rollout import steps_per_interval
+from auvnn.physics.attitude import quat_conjugate, quat_multiply, quat_to_matrix, quat_to_rotvec
+
+
+class Thrust(nn.Module):
+    """Mean thrust of every interval, and the thrust as it begins, as functions of the effects' parameters."""
+
+    def __init__(self, model: GreyBox) -> None:
+        super().__init__()
+        self.model = model
+
+    def forward(self, windows: Windows, substeps: int) -> tuple[Tensor, Tensor]:
+        """Return both, (B, L, n) each, by so many substeps in an interval."""
+        model = self.model
+        drive = model.actuators.drive(
+            windows.inputs.command,
+            windows.times,
+            model.before_thrust,
+            substeps,
+            windows.warmup,
+        )
+        mean = torch.stack([sum(parts[1:], parts[0]) / len(parts) for parts in drive.mean], dim=-2)
+        return mean, torch.stack(drive.start, dim=-2)
+
+
+def output_error(model: GreyBox, windows: Windows, initial: Tensor) -> Tensor:
+    """Return measured minus predicted outputs, (B, L, 18); zero where nothing was measured."""
+    with torch.no_grad():
+        eta, nu = predict(model, windows, initial)
+        return window_error(model, windows, eta, nu)
+
+
+def window_error(model: GreyBox, windows: Windows, eta: Tensor, nu: Tensor) -> Tensor:
+    """Return measured minus predicted outputs of runs (B, L, 7) and (B, L, 6), (B, L, 18); differentiable."""
+    rate = None
+    if windows.nu_dot is not None:
+        _, thrust = Thrust(model)(windows, substeps_of(windows))
+        rate = model.nu_dot(
+            eta[..., :3],
+            quat_to_matrix(eta[..., 3:]),
+            nu,
+            thrust,
+            windows.inputs.rows(windows.warmup),
+            windows.times[:, windows.warmup :],
+        )
+    seen = model.sense(Sensed(eta[..., :3], eta[..., 3:], nu, rate))
+    angle = quat_to_rotvec(quat_multiply(quat_conjugate(seen.quaternion), windows.eta[..., 3:]))
+    parts = [windows.eta[..., :3] - seen.position, angle, windows.nu - seen.nu]
+    parts.append(
+        torch.zeros_like(nu)
+        if seen.nu_dot is None or windows.nu_dot is None
+        else windows.nu_dot - seen.nu_dot
+    )
+    error = torch.cat(parts, dim=-1)
+    return torch.where(windows.mask > 0, error, torch.zeros_like(error))
+
+
+def substeps_of(windows: Windows) -> int:
+    """Return into how many steps the integrator divides an interval."""
+    return steps_per_interval(windows.times, windows.max_step)
+
+
+@dataclass(frozen=True)
+class SimulatedWindows:
+    """Windows run free once, and what their thrusts depend on: what all chunks of a response share.
+
+    Attributes:
+        eta: (B, L, 7).
+        nu: (B, L, 6).
+        error: measured minus predicted outputs, (B, L, 18).
+        mean: mean thrust of every interval, (B, L, n).
+        start: thrust as it begins, (B, L, n).
+        columns: which of the P parameters the thrusts depend on, (Q,).
+        mean_slope: change of `mean` with those, (B, L, n, Q).
+        start_slope: change of `start` with those, (B, L, n, Q).
+    """
+
+    eta: Tensor
+    nu: Tensor
+    error: Tensor
+    mean: Tensor
+    start: Tensor
+    columns: list[int]
+    mean_slope: Tensor
+    start_slope: Tensor
+
+    def pick(self, part: slice) -> SimulatedWindows:
+        """Return some of the windows."""
+        return SimulatedWindows(
+            self.eta[part],
+            self.nu[part],
+            self.error[part],
+            self.mean[part],
+            self.start[part],
+            self.columns,
+            self.mean_slope[part],
+            self.start_slope[part],
+        )
+
+
+def simulate_windows(
+    model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str]
+) -> SimulatedWindows:
+    """Run windows free, and differentiate their thrusts by the parameters of the named effects.
+
+    Both go step by step through time, which costs the same for few windows as for many.
+    """
+    module, substeps = Thrust(model), substeps_of(windows)
+    with torch.no_grad():
+        # What is not there yet is differentiated elsewhere; the run itself is the same without it.
+        there = model.without_absent()
+        # Many runs follow: compiling pays, and the same bits must come each time.
+        eta, nu = predict(there, windows, initial, engine="firm")
+        error = window_error(there, windows, eta, nu)
+        mean, start = module(windows, substeps)
+    acting = {id(e) for e in model.before_thrust}
+    keys, columns, at = {}, [], 0
+    for name in names:
+        k = model.effect_names.index(name)
+        size = model.members[k].theta.numel()
+        if id(model.members[k]) in acting:
+            keys[f"model.effects.{k}.theta"] = model.members[k].theta.detach()
+            columns += range(at, at + size)
+        at += size
+    if not keys:
+        none = mean.new_zeros(*mean.shape, 0)
+        return SimulatedWindows(eta, nu, error, mean, start, [], none, none)
+    sizes = [theta.numel() for theta in keys.values()]
+
+    def thrusts(values: Tensor) -> tuple[Tensor, Tensor]:
+        some = dict(zip(keys, values.split(sizes), strict=True))
+        return functional_call(module, some, (windows, substeps))
+
+    joined = [x.detach() for x in slopes(thrusts, torch.cat(list(keys.values())))]
+    return SimulatedWindows(eta, nu, error, mean, start, columns, joined[0], joined[1])

@@ -1,0 +1,319 @@
+"""The same effects over many dives: each dive is fitted by itself, and the values are held against one another."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from auvnn.answers import Answer, plain
+from auvnn.diagnosis.answers.table import values
+from auvnn.diagnosis.full_data.large_logs import SEARCH
+from auvnn.diagnosis.hypotheses.candidates import (
+    HORIZON,
+    WARMUP,
+    candidates_for,
+    check_window_length,
+    windows_for,
+)
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
+from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
+from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
+from auvnn.diagnosis.score_tests.probes import null_is_no_start
+from auvnn.diagnosis.score_tests.shape_search import search_shapes
+from auvnn.effects import effect_class
+from auvnn.errors import AuvnnError, ConfigError, InputError, one_line
+from auvnn.estimation.normal_equations import TRUST, motion
+from auvnn.executors import Lost, executor_for
+from auvnn.improvement.trend import Trend, trend
+from auvnn.log_chunks.windows import WindowCut, plan_file, runs_of
+from auvnn.logs import Log
+from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.portions import is_large, kind_of, log_files, start_of
+from auvnn.models import GreyBox
+
+# Level of the tests over dives, shared by all parameters (Bonferroni).
+LEVEL = 0.05
+_DAY = 86400.0
+_DATE = re.compile(
+    r"(?<!\d)(20\d\d)[-_]?([01]\d)[-_]?([0-3]\d)(?:[T_-]?([0-2]\d)[-_:]?([0-5]\d)(?:[-_:]?([0-5]\d))?)?"
+)
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of every dive.
+
+    Attributes:
+        model: as known.
+        effects: to be fitted, beside the uncertain coefficients.
+        mapping: of the columns.
+        window: length of the windows, s; None: 5, or less where the dive is short.
+        windows: at most so many of a dive, evenly spread.
+        force: go on with a log that contradicts itself.
+    """
+
+    model: GreyBox
+    effects: tuple[str, ...]
+    mapping: Mapping
+    window: float | None
+    windows: int
+    force: bool
+
+
+@dataclass
+class Fleet(Answer):
+    """Values of effects over dives; `to_dict` is `fleet.json`.
+
+    Attributes:
+        model: its name.
+        effects: that were fitted.
+        dives: in order of their dates, or of their names: file, start, values, verdict of adequacy.
+        failed: dives that could not be fitted, and why.
+        trends: one for each parameter, as `trend` gives it.
+        along: "date" (days since the first dive) or "dive" (their numbers): what the trends are over.
+        warnings: what to keep in mind.
+    """
+
+    kind = "fleet"
+    model: str
+    effects: list[str]
+    dives: list[dict[str, Any]]
+    failed: list[dict[str, str]]
+    trends: list[dict[str, Any]]
+    along: str
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def metrics(self) -> dict[str, float]:
+        """A few numbers by name."""
+        adequate = sum(d["verdict"] == "adequate" for d in self.dives)
+        changing = sum(t["changes"] for t in self.trends)
+        return {
+            "dives_fitted": len(self.dives),
+            "dives_failed": len(self.failed),
+            "dives_adequate": adequate,
+            "parameters_changing": changing,
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON answer."""
+        names = ("model", "effects", "along", "dives", "failed", "trends", "metrics", "warnings")
+        return plain({"schema": "auvnn/fleet/1", **{n: getattr(self, n) for n in names}})
+
+
+def fleet(
+    model: GreyBox | str | Path,
+    logs: str | Path | Sequence[str | Path],
+    effects: str | Sequence[str],
+    *,
+    mapping: Any = None,
+    window: float | None = None,
+    windows: int = SEARCH,
+    workers: int = 1,
+    executor: str | None = None,
+    address: str | None = None,
+    force: bool = False,
+    progress: Callable[[str], None] | None = None,
+) -> Fleet:
+    """Fit the same effects to every dive by itself, and say whether their values change from dive to dive.
+
+    Each file is a dive, with all its runs. The effects are fitted jointly with the coefficients that are uncertain, as
+    `diagnose` does; a dive that cannot be fitted fails alone.
+
+    Args:
+        model: the model as known, or its name or path.
+        logs: a folder, a pattern, a file or a list of these.
+        effects: names; those that the model has already are fitted anew on each dive.
+        mapping: how the files' columns are named.
+        window: length of the windows of free running, s.
+        windows: at most so many of each dive, evenly spread: bounds time and memory.
+        workers: processes.
+        executor: who computes: `serial`, `processes`, `ray` or `dask`.
+        address: of a Ray or Dask cluster that is running.
+        force: fit dives that contradict themselves, too.
+        progress: told in words what is being done.
+
+    Raises:
+        ConfigError: an unknown effect, or none.
+        InputError: there is no log, or no dive could be fitted.
+    """
+    from auvnn.models import load
+
+    say = progress or (lambda words: None)
+    check_window_length(window)
+    names = [effects] if isinstance(effects, str) else list(effects)
+    if not names:
+        raise ConfigError("effects=[]: name at least one effect to follow over the dives")
+    for name in names:
+        effect_class(name)
+        if names.count(name) > 1:
+            raise ConfigError(f"effect {name} is named twice: name it once")
+    if isinstance(windows, bool) or not isinstance(windows, int) or windows < 4:
+        raise ConfigError(f"windows={windows} must be a whole number, at least 4")
+    paths = log_files([logs] if isinstance(logs, (str, Path)) else logs)
+    if not isinstance(model, GreyBox):
+        model = load(str(model), actuation=kind_of(paths, mapping))
+    question = Question(model, tuple(names), Mapping.read(mapping), window, windows, force)
+    dives, failed = [], []
+    with executor_for(executor, workers, address) as pool:
+        for path, found in zip(paths, pool.run(dive, question, paths, losses=True), strict=True):
+            say(f"fitted {path}")
+            if isinstance(found, Lost):
+                found = str(found)
+            if isinstance(found, str):
+                failed.append({"file": str(path), "words": found})
+            else:
+                dives.append(found)
+    if not dives:
+        raise InputError(f"none of {len(paths)} dives could be fitted; the first: {failed[0]['words']}")
+    return _together(model, names, dives, failed)
+
+
+def dive(question: Question, path: Path) -> dict[str, Any] | str:
+    """Return one dive's values, or why there are none: whatever befalls a dive is its own affair."""
+    try:
+        return _fitted(question, path)
+    except AuvnnError as problem:
+        return one_line(problem)
+    except Exception as fault:
+        return f"{path}: a fault of the program ({type(fault).__name__}: {one_line(fault, 200)})"
+
+
+def _fitted(question: Question, path: Path) -> dict[str, Any]:
+    model, names = question.model, question.effects
+    log = _log(question, path)
+    log.quality().refuse_contradictions(question.force)
+    _, needs = candidates_for(model, log, names)
+    for name in names:
+        if needs[name]:
+            raise InputError(f"{path}: {name} needs {', '.join(needs[name])}, which are not there")
+    windows = windows_for(model, log, question.window)
+    if len(windows) < 4:
+        raise InputError(f"{path}: only {len(windows)} windows of free running: the dive is too short")
+    known, spread = with_drag_only(model, log)
+    layout = lay_out(known, names, spread)
+    base = [n for n in layout.names if n not in names or n in layout.nuisance]
+    found = fit_hypothesis(layout, windows, [n for n in base if n not in names], ())
+    for k in range(1, len(names) + 1):
+        looked = null_is_no_start(layout, names[k - 1])
+        guess = search_shapes(layout, windows, found, base).start(names[k - 1]) if looked else None
+        found = fit_hypothesis(layout, windows, base, names[:k], start=found.fitted, guess=guess)
+    start, source = start_of(path, question.mapping), "t"
+    if start is None:
+        start, source = _named(path), "name"
+    return {
+        "file": str(path),
+        "start": None if start is None else datetime.fromtimestamp(start, UTC).isoformat(timespec="seconds"),
+        "start_from": None if start is None else source,
+        "seconds": log.duration,
+        "samples": log.samples,
+        "windows": len(windows),
+        "verdict": "unknown" if is_autocorrelated(found, TRUST * motion(windows) + 1e-9) else "adequate",
+        "cv": found.cv,
+        "settled": found.fitted.converged,
+        "parameters": values(layout, found, names),
+        "coefficients": values(layout, found, [n for n in layout.nuisance if n not in names]),
+    }
+
+
+def _log(question: Question, path: Path) -> Log:
+    """Return a dive's log; of one that is long, stretches that are evenly spread."""
+    if not is_large([path]):
+        return Log.read(path, question.mapping)
+    horizon = HORIZON if question.window is None else float(question.window)
+    cut = WindowCut(horizon, WARMUP, question.model.actuation, question.mapping)
+    return Log.from_runs(runs_of(plan_file(cut, path).spread(question.windows), cut), path.stem)
+
+
+def _named(path: Path) -> float | None:
+    """Return the date in a file's name, s since 1970, None without one."""
+    match = _DATE.search(path.stem)
+    if match is None:
+        return None
+    try:
+        return datetime(*(int(g or 0) for g in match.groups()), tzinfo=UTC).timestamp()  # type: ignore[misc]
+    except ValueError:
+        return None
+
+
+def _together(
+    model: GreyBox, names: list[str], dives: list[dict[str, Any]], failed: list[dict[str, str]]
+) -> Fleet:
+    dated = all(d["start"] is not None for d in dives) and len({d["start"] for d in dives}) == len(dives) > 1
+    if dated:
+        dives = sorted(dives, key=lambda d: d["start"])
+    begin = datetime.fromisoformat(dives[0]["start"]) if dated else None
+    for number, each in enumerate(dives, 1):
+        each["dive"] = number
+        each["days"] = (
+            None if begin is None else (datetime.fromisoformat(each["start"]) - begin).total_seconds() / _DAY
+        )
+    x = [d["days"] if dated else d["dive"] for d in dives]
+    rows = []
+    for effect in names:
+        for name, first in dives[0]["parameters"][effect].items():
+            each = [d["parameters"][effect][name] for d in dives]
+            found = trend(x, [e["value"] for e in each], [e["std"] for e in each])
+            rows.append(_row(effect, name, first["unit"], found, dated))
+    count = len([r for r in rows if r["dives"] > 1])
+    for row in rows:
+        row["changes"] = _below(row["constancy"]["p_value"], count) or _below(row["slope"]["p_value"], count)
+        row["words"] = _words(row, dated)
+    warnings = []
+    if not dated:
+        warnings.append("not every dive has a date of its own: they are taken in the order of their names")
+    poor = [d["file"] for d in dives if d["verdict"] != "adequate"]
+    if poor:
+        warnings.append(
+            f"{len(poor)} of {len(dives)} dives leave something that these effects do not explain (first: {poor[0]}): "
+            "their values may stand in for it; auvnn diagnose asks what it is"
+        )
+    if failed:
+        warnings.append(f"{len(failed)} dives could not be fitted; the first: {failed[0]['words']}")
+    return Fleet(model.vehicle.name, names, dives, failed, rows, "date" if dated else "dive", warnings)
+
+
+def _below(p: float, count: int) -> bool:
+    return bool(np.isfinite(p) and p * count < LEVEL)
+
+
+def _row(effect: str, name: str, unit: str, found: Trend, dated: bool) -> dict[str, Any]:
+    per = "d" if dated else "dive"
+    return {
+        "effect": effect,
+        "parameter": name,
+        "unit": unit,
+        "dives": found.count,
+        "mean": {"value": found.mean, "std": found.mean_std},
+        "constancy": {"chi2": found.chi2, "degrees": max(found.count - 1, 0), "p_value": found.constant_p},
+        "slope": {
+            "value": found.slope,
+            "std": found.slope_std,
+            "unit": f"1/{per}" if unit in ("", "1") else f"{unit}/{per}",
+            "p_value": found.slope_p,
+        },
+        "line": {"middle": found.middle, "level": found.level, "std": found.level_std},
+        "scatter": found.scatter,
+    }
+
+
+def _words(row: dict[str, Any], dated: bool) -> str:
+    label = f"{row['effect']}.{row['parameter']}"
+    if row["dives"] < 2:
+        return f"{label}: {row['dives']} dives say something of it, too few to compare"
+    mean, slope, unit = row["mean"], row["slope"], "" if row["unit"] in ("", "1") else f" {row['unit']}"
+    constant = row["constancy"]["p_value"]
+    told = f"{label}: mean {mean['value']:.3g} ± {mean['std']:.2g}{unit} over {row['dives']} dives"
+    if not row["changes"]:
+        return f"{told}, the same on all (p = {constant:.2g})"
+    line = ""
+    if np.isfinite(slope["value"]):
+        line = f"; {slope['value']:+.3g} ± {slope['std']:.2g} {slope['unit']} (p = {slope['p_value']:.2g})"
+    return f"{told}, not the same on all (p = {constant:.2g}){line}"

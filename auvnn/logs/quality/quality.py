@@ -1,0 +1,192 @@
+"""The quality report: what was read, repaired, implausible and excited, before anything is fitted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from auvnn.answers import Answer, plain
+from auvnn.errors import InputError
+from auvnn.logs.log import Log
+from auvnn.logs.quality import channel_quality, excitation, findings, kinematics, vertical
+from auvnn.logs.quality.channel_quality import Channel
+from auvnn.logs.quality.excitation import Excitation
+from auvnn.logs.quality.findings import Finding
+from auvnn.logs.quality.kinematics import Agreement
+from auvnn.logs.reading.repair import LEVELS, Level
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+@dataclass(frozen=True, eq=False)
+class Quality(Answer):
+    """What a log is worth.
+
+    Args:
+        log: the log.
+        channels: by column name.
+        findings: what a person should know, errors first.
+        kinematics: by velocity component, those that can be compared.
+        excitation: by velocity component.
+        condition: of [nu, |nu| nu] over the excited components.
+        runs: samples, duration, rate, jitter and gaps of every run.
+        actuators: what the log says of a model's actuators, where it was asked; plain data.
+    """
+
+    kind: ClassVar[str] = "quality"
+
+    log: Log
+    channels: dict[str, Channel]
+    findings: list[Finding]
+    kinematics: dict[str, Agreement]
+    excitation: dict[str, Excitation]
+    condition: float
+    runs: list[dict[str, float]] = field(default_factory=list)
+    actuators: dict[str, Any] | None = None
+
+    def with_actuators(self, checked: Any) -> Quality:
+        """Return the report with what a check of a model's actuators said, its warnings among the findings."""
+        found = [Finding("warning", "actuators", w.removeprefix("actuators: ")) for w in checked.words]
+        findings = sorted([*self.findings, *found], key=lambda f: LEVELS.index(f.level))
+        return replace(self, findings=findings, actuators=checked.to_dict())
+
+    def of_level(self, level: Level) -> list[Finding]:
+        """Return the findings of one level."""
+        return [f for f in self.findings if f.level == level]
+
+    @property
+    def errors(self) -> list[Finding]:
+        """Findings that forbid fitting."""
+        return self.of_level("error")
+
+    @property
+    def warnings(self) -> list[Finding]:
+        """Findings that ask for care."""
+        return self.of_level("warning")
+
+    def refuse_errors(self) -> None:
+        """Raise where the log must not be fitted.
+
+        Raises:
+            InputError: there is a finding of level "error"; the message names the first and its cure.
+        """
+        self._refuse(self.errors)
+
+    @property
+    def contradictions(self) -> list[Finding]:
+        """Errors that show the log at odds with itself: signs, units, axes, the order of a quaternion."""
+        return [f for f in self.errors if f.where != "excitation"]
+
+    @property
+    def reservations(self) -> list[str]:
+        """What whoever fits or scores the log should repeat with the result: contradictions, samples left out."""
+        return [
+            f"{f.where}: {f.what}" for f in self.findings if f in self.contradictions or f.where == "spikes"
+        ]
+
+    def refuse_contradictions(self, force: bool = False) -> None:
+        """Raise where the log contradicts itself, unless that is to be tolerated.
+
+        What a log merely says too little about is no contradiction: fits name the parameters concerned.
+
+        Raises:
+            InputError: with the first contradiction and its cure.
+        """
+        if not force:
+            self._refuse(self.contradictions, "; force=true fits it all the same")
+
+    def _refuse(self, found: list[Finding], way_out: str = "") -> None:
+        if found:
+            first = found[0]
+            more = f" (and {len(found) - 1} more errors)" if len(found) > 1 else ""
+            cure = f"; {first.cure}" if first.cure and first.cure not in first.what else ""
+            raise InputError(f"log '{self.log.name}': {first.where}: {first.what}{cure}{more}{way_out}")
+
+    @property
+    def metrics(self) -> dict[str, float]:
+        """Flat named numbers, units in the names."""
+        with np.errstate(over="ignore"):
+            speed = np.concatenate([np.linalg.norm(run.nu[:, :3], axis=1) for run in self.log.runs])
+        valid = sum(int(run.valid.sum()) for run in self.log.runs)
+        return {
+            "samples": self.log.samples,
+            "runs": len(self.log.runs),
+            "duration_s": self.log.duration,
+            "rate_hz": float(np.median([1.0 / run.dt for run in self.log.runs])),
+            "valid_share": valid / self.log.samples,
+            "gaps": sum(int(r["gaps"]) for r in self.runs),
+            "speed_max_m_s": float(np.nanmax(speed)) if np.isfinite(speed).any() else np.nan,
+            "excited_directions": sum(e.excited for e in self.excitation.values()),
+            "condition": self.condition,
+            "repaired_samples": sum(r.count for r in self.log.repairs if r.level == "repair"),
+            **{f"{level}s": len(self.of_level(level)) for level in ("error", "warning", "repair")},
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return `quality.json` as plain data."""
+        log = self.log
+        return plain(
+            {
+                "schema": "auvnn/quality/1",
+                "log": log.name,
+                "read": {
+                    "files": [str(p) for p in log.paths],
+                    "sha256": log.sha256,
+                    "columns": log.columns,
+                    "unknown_columns": list(log.unknown),
+                    "actuation": log.kind,
+                },
+                "metrics": self.metrics,
+                "runs": self.runs,
+                "channels": {name: c.to_dict() for name, c in self.channels.items()},
+                "findings": [f.to_dict() for f in self.findings],
+                "repairs": [r.to_dict() for r in log.repairs],
+                "kinematics": {name: a.to_dict() for name, a in self.kinematics.items()},
+                **({} if self.actuators is None else {"actuators": self.actuators}),
+                "excitation": {
+                    "condition": self.condition,
+                    "directions": {name: e.to_dict() for name, e in self.excitation.items()},
+                },
+            }
+        )
+
+
+def assess(log: Log) -> Quality:
+    """Judge a log: channels, agreement of rates with attitude, excitation, and findings in plain words."""
+    # A simulation that has diverged overflows here, and the report says so by its numbers.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return _assess(log)
+
+
+def _assess(log: Log) -> Quality:
+    channels = channel_quality.assess(log)
+    agreement = kinematics.check_kinematics(log)
+    order = kinematics.attitude_order(log)
+    directions, condition = excitation.assess(log, {n: c.noise_std for n, c in channels.items()})
+    time = findings.gaps(log)
+    runs = [
+        {
+            "run": run.number,
+            "samples": run.samples,
+            "duration_s": run.duration,
+            "rate_hz": 1.0 / run.dt,
+            "jitter": time[run.number][2],
+            "gaps": time[run.number][0],
+            "longest_step_s": time[run.number][1],
+            "valid_share": float(run.valid.mean()),
+        }
+        for run in log.runs
+    ]
+    clocks = kinematics.clocks(log, agreement) if order is None else {}
+    depth = vertical.check_vertical(log)
+    found = findings.collect(log, channels, agreement, directions, order, clocks, depth)
+    return Quality(log, channels, found, agreement, directions, condition, runs)
+
+
+def check(log: Log | str | Path | Sequence[str | Path], mapping: Any = None) -> Quality:
+    """Return the quality report of a log, given as such or as what `Log.read` reads."""
+    return (log if isinstance(log, Log) else Log.read(log, mapping)).quality()

@@ -1,0 +1,322 @@
+"""The mapping file: a user's own columns turned into the canonical ones, by data alone.
+
+A value passes through these steps, in this order: the curve `(value - neutral) / span` cut to [-1, 1],
+`value * scale + offset`, the unit (`angles`, `rates`, `time`), and last the frame (`FLU` to `FRD`, `ENU`
+to `NED`). A `scale: -1` therefore turns a sign in the frame in which the file was recorded.
+
+`valid: {from: bottom_lock, is: 1}` takes a value only where another column of the file says that it is good (`is` one
+value or a list, numbers or words; `above`, `below`); elsewhere it counts as missing. An estimator of several cores is
+followed by `from: [u_0, u_1], by: primary`, or, where each core has rows of its own, by `core: {column: C, primary: PI}`.
+
+A `delay` says by how many seconds a column lags behind the time it is stamped with (`auvnn check` measures it for
+the velocities): once the runs are told apart, each of them takes its values from that much later in the record.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping as MappingType
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.catalogue import unknown_name
+from auvnn.config import read_yaml
+from auvnn.errors import ConfigError, InputError
+from auvnn.logs.channels import EULER, FIXED, QUATERNION, RESET, is_canonical
+from auvnn.logs.readers.base import Table
+from auvnn.logs.reading import cores
+from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.validity import Validity
+
+_KEYS = ("columns", "frame", "angles", "rates", "quaternion", "time", "run", "core")
+_COLUMN_KEYS = ("from", "scale", "offset", "curve", "delay", "value", "valid", "by")
+_TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_RATES = ("p", "q", "r", "dp", "dq", "dr")
+_NO_SIGNAL = 65535.0
+_LONGEST_DELAY = 60.0  # s
+
+
+@dataclass(frozen=True)
+class Column:
+    """How one canonical column is made: from a column of the file, from one for each core, or a constant."""
+
+    source: str | None
+    scale: float = 1.0
+    offset: float = 0.0
+    neutral: float | None = None
+    span: float = 1.0
+    value: float = 0.0
+    delay: float = 0.0
+    cores: tuple[str, ...] = ()
+    by: str | None = None
+    valid: Validity | None = None
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """A mapping file's content, checked.
+
+    Args:
+        columns: canonical name to how it is made; names not listed are taken from the file as they are.
+        body: frame in which velocities, accelerations and the wrench are given, "FRD" or "FLU".
+        world: frame in which attitude and position are given, "NED" or "ENU".
+        angles: "rad" or "deg", of phi, theta, psi and the fins.
+        rates: "rad" or "deg", of p, q, r and their derivatives.
+        quaternion: "wxyz", or "xyzw" where the columns qw qx qy qz, in this order, hold x, y, z, w.
+        time_unit: unit of `t`: "s", "ms", "us" or "ns".
+        run: column that numbers or names the runs, None for `run`, "file" for one run per file.
+        core: columns that hold a row's core and the core in use, where each core has rows of its own.
+        where: the mapping's file, for messages.
+    """
+
+    columns: dict[str, Column] = field(default_factory=dict)
+    body: str = "FRD"
+    world: str = "NED"
+    angles: str = "rad"
+    rates: str = "rad"
+    quaternion: str = "wxyz"
+    time_unit: str = "s"
+    run: str | None = None
+    where: str = "mapping"
+    core: tuple[str, str] | None = None
+
+    @classmethod
+    def read(cls, source: str | Path | MappingType[str, Any] | Mapping | None) -> Mapping:
+        """Read a mapping from a YAML file or a dict; None gives the mapping that changes nothing.
+
+        Raises:
+            ConfigError: a key or a value is unknown.
+            InputError: the file cannot be read.
+        """
+        if source is None:
+            return cls()
+        if isinstance(source, Mapping):
+            return source
+        if isinstance(source, MappingType):
+            return _build(dict(source), "mapping")
+        return _build(read_yaml(Path(source)), str(source))
+
+    def apply(self, table: Table, where: str) -> Table:
+        """Return the table under canonical names; columns that were not asked for keep theirs.
+
+        Raises:
+            InputError: a column named in the mapping is not in the file, or is text.
+        """
+        if self.core is not None:
+            table = cores.rows_of_primary(table, *self.core, where, self.where)
+        result = Table({}, table.rows, {}, set(), list(table.repairs))
+        used: set[str] = set()
+        for name, column in self.columns.items():
+            if column.source is None:
+                result.columns[name] = np.full(table.rows, column.value)
+                continue
+            if column.by is not None:
+                each = [self._source(table, name, c, where) for c in column.cores]
+                chosen = self._source(table, name, column.by, where)
+                values = cores.chosen(each, chosen, name, column.by, where)
+                used |= {*column.cores, column.by}
+                cores.note_switches(result, chosen, column.by, where)
+            else:
+                values = self._source(table, name, column.source, where)
+                used.add(column.source)
+            if column.source in table.seconds:
+                result.seconds.add(name)
+            values = self._convert(values, column, name, where, result)
+            if column.valid is not None:
+                values, note = column.valid.mask(values, table, name, where, self.where)
+                result.repairs += note
+                used.add(column.valid.source)
+            result.columns[name] = values
+        if self.run not in (None, "file"):
+            self._source(table, "run", str(self.run), where, numbers=False)
+        if self.core is not None:
+            used |= set(self.core)
+            result.columns.setdefault(RESET, table.columns[self.core[1]])
+        for name in table.names:
+            if name in self.columns and name not in used:
+                words = f"column '{name}' of the file replaced by the mapping's"
+                result.repairs.append(Repair(words, where, 1, "info"))
+            elif name not in used:
+                kind = "columns" if name in table.columns else "text"
+                getattr(result, kind)[name] = getattr(table, kind)[name]
+                if name in table.seconds:
+                    result.seconds.add(name)
+        self._units(result)
+        return result
+
+    def _source(self, table: Table, name: str, source: str, where: str, numbers: bool = True) -> NDArray[Any]:
+        if source in table.columns:
+            return table.columns[source]
+        if source in table.text:
+            if not numbers:
+                return np.empty(0)
+            bad = table.text[source].bad
+            raise InputError(f"{where}: column '{source}' for '{name}' is no column of numbers: {bad}")
+        raise InputError(f"{where}: {self.where} takes '{name}' from a column that is not there: "
+                         f"{unknown_name('column', source, table.names)}")  # fmt: skip
+
+    def _convert(
+        self, raw: NDArray[Any], column: Column, name: str, where: str, result: Table
+    ) -> NDArray[Any]:
+        if column.neutral is None and column.scale == 1.0 and column.offset == 0.0:
+            return raw
+        values = raw.astype(np.float64)
+        if column.neutral is not None:
+            silent = (values <= 0.0) | (values == _NO_SIGNAL)
+            if silent.any() and column.neutral > 0.0:
+                values[silent] = np.nan
+                words = f"values of '{column.source}' that mean no signal (0, 65535) read as missing"
+                result.repairs.append(Repair(words, where, int(silent.sum())))
+            values = (values - column.neutral) / column.span
+            beyond = int((np.abs(values) > 1.0).sum())
+            if beyond:
+                words = f"commands of '{name}' beyond neutral plus or minus span cut to [-1, 1]"
+                result.repairs.append(Repair(words, where, beyond, "warning", "give the curve its true span"))
+                values = np.clip(values, -1.0, 1.0)
+        return values * column.scale + column.offset
+
+    def _units(self, table: Table) -> None:
+        degree = math.pi / 180.0
+        fins = tuple(n for n in table.columns if n.startswith("fin_") and is_canonical(n))
+        for unit, names in ((self.angles, EULER + fins), (self.rates, _RATES)):
+            for name in names if unit == "deg" else ():
+                if name in table.columns:
+                    table.columns[name] = table.columns[name] * degree
+        if self.quaternion == "xyzw" and all(n in table.columns for n in QUATERNION):
+            x, y, z, w = (table.columns[n] for n in QUATERNION)
+            table.columns.update(zip(QUATERNION, (w, x, y, z), strict=True))
+
+    def seconds(self, values: NDArray[Any], already: bool) -> NDArray[np.float64]:
+        """Return the column `t` in seconds; integers in a finer unit are counted from their first value."""
+        factor = 1.0 if already else _TIME_UNITS[self.time_unit]
+        if values.dtype != np.float64:
+            # Subtracting first keeps the digits that a float64 of the date would lose.
+            values = (values - values[0]).astype(np.float64)
+        return values * factor
+
+
+def _build(data: dict[str, Any], where: str) -> Mapping:
+    _known(data, _KEYS, where)
+    frame = _section(data, "frame", where)
+    _known(frame, ("body", "world"), f"{where}: frame")
+    time = data.get("time", {})
+    time = {"unit": time} if isinstance(time, str) else _section(data, "time", where)
+    _known(time, ("unit",), f"{where}: time")
+    columns = {name: _column(name, value, where) for name, value in _section(data, "columns", where).items()}
+    return Mapping(
+        columns=columns,
+        body=_one_of(frame.get("body", "FRD"), ("FRD", "FLU"), f"{where}: frame: body"),
+        world=_one_of(frame.get("world", "NED"), ("NED", "ENU"), f"{where}: frame: world"),
+        angles=_one_of(data.get("angles", "rad"), ("rad", "deg"), f"{where}: angles"),
+        rates=_one_of(data.get("rates", "rad"), ("rad", "deg"), f"{where}: rates"),
+        quaternion=_one_of(data.get("quaternion", "wxyz"), ("wxyz", "xyzw"), f"{where}: quaternion"),
+        time_unit=_one_of(time.get("unit", "s"), tuple(_TIME_UNITS), f"{where}: time: unit"),
+        run=_run(data.get("run"), where),
+        where=where,
+        core=_core(data.get("core"), where),
+    )
+
+
+def _core(value: Any, where: str) -> tuple[str, str] | None:
+    if value is None:
+        return None
+    if not isinstance(value, MappingType):
+        raise ConfigError(f"{where}: core must be {{column: ..., primary: ...}}, not {value!r}")
+    _known(value, ("column", "primary"), f"{where}: core")
+    pair = value.get("column"), value.get("primary")
+    if not all(isinstance(name, str) for name in pair):
+        raise ConfigError(f"{where}: core: 'column' and 'primary' must name columns of the file")
+    return str(pair[0]), str(pair[1])
+
+
+def _run(value: Any, where: str) -> str | None:
+    if isinstance(value, MappingType):
+        _known(value, ("from",), f"{where}: run")
+        value = value.get("from")
+        if not isinstance(value, str):
+            raise ConfigError(f"{where}: run: 'from' must name a column, not {value!r}")
+        return value
+    if value is None or value == "file":
+        return value
+    raise ConfigError(f"{where}: run: {value!r} is neither {{from: column}} nor 'file' (one run per file)")
+
+
+def _column(name: str, value: Any, where: str) -> Column:
+    here = f"{where}: columns: {name}"
+    if not is_canonical(name):
+        numbered = ("thruster_1", "fin_1")
+        raise ConfigError(f"{where}: columns: {unknown_name('canonical column', name, (*FIXED, *numbered))}")
+    if isinstance(value, str):
+        return Column(value)
+    if not isinstance(value, MappingType):
+        raise ConfigError(f"{here}: must name a column or say {{from: column, ...}}, not {value!r}")
+    _known(value, _COLUMN_KEYS, here)
+    if "value" in value:
+        if len(value) > 1:
+            raise ConfigError(f"{here}: 'value' is a constant and stands alone")
+        return Column(None, value=_number(value["value"], f"{here}: value"))
+    source, by = value.get("from", name), value.get("by")
+    several: tuple[str, ...] = ()
+    if by is not None:
+        if not (isinstance(source, list) and source and all(isinstance(s, str) for s in source)):
+            raise ConfigError(f"{here}: with 'by', 'from' must list one column for each core, [u_0, u_1]")
+        if not isinstance(by, str):
+            raise ConfigError(f"{here}: 'by' must name the column that says which core is in use, not {by!r}")
+        several, source = tuple(source), source[0]
+    if not isinstance(source, str):
+        raise ConfigError(f"{here}: 'from' must be a column's name, not {source!r}")
+    valid = Validity.read(value["valid"], f"{here}: valid") if "valid" in value else None
+    numbers: dict[str, float] = {
+        k: _number(value[k], f"{here}: {k}") for k in ("scale", "offset", "delay") if k in value
+    }
+    if abs(numbers.get("delay", 0.0)) > _LONGEST_DELAY:
+        raise ConfigError(
+            f"{here}: delay: {numbers['delay']:g} s is beyond {_LONGEST_DELAY:g} s; give seconds"
+        )
+    if "delay" in numbers and name in ("t", "run"):
+        raise ConfigError(f"{here}: '{name}' takes no delay: give it to the columns that are late")
+    if numbers.get("scale") == 0.0:
+        raise ConfigError(f"{here}: scale: 0 would wipe the column out; use 'value: 0' for a constant")
+    if "curve" in value:
+        curve = value["curve"]
+        if not isinstance(curve, MappingType):
+            raise ConfigError(f"{here}: curve must be {{neutral: ..., span: ...}}, not {curve!r}")
+        _known(curve, ("neutral", "span"), f"{here}: curve")
+        for key in ("neutral", "span"):
+            if key not in curve:
+                raise ConfigError(f"{here}: curve needs '{key}'")
+            numbers[key] = _number(curve[key], f"{here}: curve: {key}")
+        if numbers["span"] == 0.0:
+            raise ConfigError(f"{here}: curve: span must not be 0")
+    return Column(source, **numbers, cores=several, by=by, valid=valid)
+
+
+def _section(data: dict[str, Any], key: str, where: str) -> dict[str, Any]:
+    value = data.get(key)
+    if value is None:
+        return {}
+    if not isinstance(value, MappingType):
+        raise ConfigError(f"{where}: '{key}' must hold `name: value` lines, not {value!r}")
+    return dict(value)
+
+
+def _known(data: MappingType[str, Any], keys: tuple[str, ...], where: str) -> None:
+    for key in data:
+        if key not in keys:
+            raise ConfigError(f"{where}: {unknown_name('key', str(key), keys)}")
+
+
+def _one_of(value: Any, choices: tuple[str, ...], where: str) -> str:
+    if value not in choices:
+        raise ConfigError(f"{where}: {unknown_name('choice', str(value), choices)}")
+    return str(value)
+
+
+def _number(value: Any, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ConfigError(f"{where}: {value!r} is not a finite number")
+    return float(value)

@@ -1,0 +1,154 @@
+"""Some rows of a long recording, made into runs by the same steps as a whole log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.errors import InputError
+from auvnn.logs.readers import READERS, choose
+from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.reading import Collector, collect
+from auvnn.logs.run import Run
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Portion:
+    """Rows of a file and the runs in them.
+
+    Attributes:
+        t: stamps as the file has them, s, (N,); NaN where one is missing.
+        label: run number of each row, (N,); ones where the file has none.
+        runs: in the order of the file; mended as on reading a whole log, with what these rows say alone.
+    """
+
+    t: Array
+    label: Array
+    runs: tuple[Run, ...]
+
+
+def rows_in(path: Path) -> int:
+    """Return the number of rows of a log file.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    return choose(path)[0].rows(path)
+
+
+def read_portion(path: Path, mapping: Mapping, first: int, count: int) -> Portion:
+    """Read `count` rows of a file from row `first` on.
+
+    Raises:
+        InputError: they cannot be read, or hold no run; runs that have names in the place of numbers.
+    """
+    reader, _ = choose(path)
+    collector = Collector()
+    with np.errstate(all="ignore"):
+        table = mapping.apply(reader.read_rows(path, first, count), str(path))
+        if table.rows == 0:
+            raise InputError(f"{path}: has no row {first}")
+        name = mapping.run if mapping.run not in (None, "file") else "run"
+        if mapping.run != "file" and name in table.text:
+            raise InputError(
+                f"{path}: column '{name}' names the runs: a log that is read in parts needs numbers there, or one "
+                "run per file (mapping run: file)"
+            )
+        collect(table, mapping, path, collector)
+    t = mapping.seconds(table.columns["t"], "t" in table.seconds)
+    numbered = mapping.run != "file" and name in table.columns
+    label = table.columns[str(name)].astype(np.float64) if numbered else np.ones(table.rows)
+    return Portion(t, label, tuple(collector.runs))
+
+
+def log_files(places: Iterable[str | Path]) -> list[Path]:
+    """Return the log files that paths, folders and patterns name, those of a folder or pattern in order of their names.
+
+    Args:
+        places: a path that is there is taken as it is, a folder stands for the log files in it, and what holds
+            `*`, `?` or `[` for all that match.
+
+    Raises:
+        InputError: a folder or a pattern with no log file.
+    """
+    known = tuple(s for name in READERS.names() for s in READERS.get(name).suffixes)
+    found: list[Path] = []
+    for place in map(Path, places):
+        if place.is_dir():
+            inside = sorted(p for p in place.iterdir() if p.is_file() and p.suffix.lower() in known)
+            if not inside:
+                raise InputError(
+                    f"{place}: is a folder without a log file in it; they end in {', '.join(known)}"
+                )
+            found += inside
+        elif not place.exists() and any(sign in str(place) for sign in "*?["):
+            root = Path(place.anchor) if place.is_absolute() else Path()
+            pattern = str(place.relative_to(root)) if place.is_absolute() else str(place)
+            inside = sorted(p for p in root.glob(pattern) if p.is_file())
+            if not inside:
+                raise InputError(f"{place}: no file matches this pattern")
+            found += inside
+        else:
+            found.append(place)
+    return list(dict.fromkeys(found))
+
+
+# Rows beyond which a log is better taken in parts, and bytes of a text file that are about one row.
+LARGE, ROW_BYTES = 200_000, 300
+
+
+def is_large(paths: Sequence[Path]) -> bool:
+    """Say whether log files hold more than `LARGE` rows together, by their tables of contents or their sizes.
+
+    Raises:
+        InputError: a file cannot be read.
+    """
+    rows = 0
+    for path in paths:
+        reader, _ = choose(path)
+        rows += reader.rows(path) if reader.name == "parquet" else path.stat().st_size // ROW_BYTES
+        if rows > LARGE:
+            return True
+    return False
+
+
+# Rows by which a file's kind is told.
+_FIRST = 5000
+
+
+def kind_of(paths: Sequence[Path], mapping: Any = None) -> str:
+    """Return what drives the vehicle of a log: "thrusters" or "wrench", by the first rows of its first file.
+
+    Raises:
+        InputError: they cannot be read.
+    """
+    return read_portion(paths[0], Mapping.read(mapping), 0, _FIRST).runs[0].kind
+
+
+# s since 1970 beyond which a stamp is a date.
+_UNIX = 1e8
+
+
+def start_of(path: Path, mapping: Mapping) -> float | None:
+    """Return when a log begins, s since 1970, or None where its stamps count from another beginning.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    reader, _ = choose(path)
+    source = mapping.columns["t"].source if "t" in mapping.columns else "t"
+    stamp = None if source is None else reader.first_stamp(path, source)
+    if stamp is not None:
+        return stamp
+    table = mapping.apply(reader.read_rows(path, 0, 1), str(path))
+    if "t" not in table.columns or table.rows == 0:
+        return None
+    first = float(mapping.seconds(table.columns["t"], "t" in table.seconds)[0])
+    return first if first > _UNIX else None

@@ -1,0 +1,312 @@
+"""`simulate`: a log of a model with hidden effects, driven by an excitation, through noisy sensors."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from auvnn.effects import EFFECTS
+from auvnn.effects.sizes import radius
+from auvnn.errors import ConfigError
+from auvnn.logs import Log, Run
+from auvnn.models import GreyBox
+from auvnn.plants import PLANTS, Motion, PlantTask
+from auvnn.plants.base import refuse
+from auvnn.plants.strangers import STRANGERS
+from auvnn.simulation.excitations import EXCITATIONS, make_excitation
+from auvnn.simulation.noise import make_noise
+from auvnn.simulation.plant import as_hidden, drawn_factors, make_plant, typical_values
+from auvnn.simulation.worlds import World, make_world
+from auvnn.simulation.worlds.law import disturbed, drawn_laws
+from auvnn.simulation.worlds.sensing import Sensing
+
+Array = NDArray[np.float64]
+
+COEFFICIENTS = ("exact", "drawn")
+# Every kind of random number has a stream of its own: another noise must not change the manoeuvre.
+STREAMS = ("excitation", "noise", "hidden", "voltage", "added_mass", "linear_damping", "quadratic_damping",
+           "inertia", "altitude", "law", "force", "sensing")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A made log and the truth behind it.
+
+    Attributes:
+        log: what the sensors recorded.
+        truth: the content of `truth.json`.
+        plant: the model with everything hidden in it that the catalogue of effects knows, as a torch model,
+            whichever plant made the motion.
+        set_points: what a controller was told to follow, by name, (runs, samples) each; empty in open loop.
+    """
+
+    log: Log
+    truth: dict[str, Any]
+    plant: GreyBox
+    set_points: dict[str, Array] = field(default_factory=dict)
+
+
+def simulate(
+    model: GreyBox,
+    excitation: str | Mapping[str, Any] = "multisine",
+    noise: str | Mapping[str, Any] = "none",
+    hidden: Mapping[str, Mapping[str, float] | None] | Sequence[str] | str | None = None,
+    seed: int = 0,
+    *,
+    runs: int = 4,
+    duration: float = 60.0,
+    rate: float = 20.0,
+    coefficients: str = "exact",
+    accelerations: bool | None = None,
+    actuation: str | None = None,
+    max_step: float = 0.01,
+    bottom: float | None = None,
+    plant: str = "own",
+    world: str | Mapping[str, Any] | World | None = None,
+) -> Simulation:
+    """Make a log: the model with effects hidden in it, driven and measured.
+
+    Commands are held: row k acts from t_k until t_{k+1}. A logged acceleration is that just after row k's
+    command has begun to act.
+
+    Args:
+        model: what the user knows; excitation and controllers are designed with it.
+        excitation: `paper`, `multisine` or `survey`, or a mapping of its options with `name`.
+        noise: `none`, `paper` or `realistic`, or a mapping of its options.
+        hidden: effects that the log has and the model has not: parameters by name, or None for typical ones.
+            With `plant="numpy"` or `"mujoco"` also strangers, effects that are not in the catalogue.
+        seed: of all random numbers; the same seed gives the same log.
+        runs: how many, numbered from 0; run i does not change when more are asked for.
+        duration: of each run, s.
+        rate: samples per second.
+        coefficients: `exact`, or `drawn`: the plant's added mass, damping and inertia differ from the model's
+            by factors 1 + N(0, stated uncertainty). A group that is itself hidden stays exact.
+        accelerations: whether to log them; by default as the noise condition says.
+        actuation: `thrusters` or `wrench`; by default the model's.
+        max_step: longest step of the integrator (RK4), s.
+        bottom: depth of a flat bottom, m: the log gets an `altitude`. By default there is one, close below the
+            nominal model's deepest point, only where a hidden effect needs it.
+        plant: what makes the motion: `own`, the model's own equations; `numpy`, independent ones with an adaptive
+            solver; `mujoco`, a physics engine. Excitation, sampling and sensors' noise are the same for all.
+        world: what departs from the assumptions of models: `between`, `disturbed_10`, `disturbed_25`, `shaped`,
+            `sensors`, `conventions`, `everything`, or a mapping of options. Other laws need `plant="numpy"`.
+
+    Returns:
+        Log, truth and plant.
+
+    Raises:
+        ConfigError: an option is unknown or out of range, or the plant does not know a hidden effect.
+        MissingExtra: the plant's package is not installed.
+        AuvnnError: the plant diverges; the message says when and by which term.
+    """
+    _check(seed, runs, duration, rate, coefficients, max_step)
+    if accelerations is not None and not isinstance(accelerations, bool):
+        raise ConfigError(f"accelerations = {accelerations!r}: true or false is needed, or null")
+    manner = make_excitation(excitation, EXCITATIONS)
+    condition = make_noise(noise)
+    around = make_world(world)
+    every = around.every(rate)
+    maker = PLANTS.get(plant)()
+    model = _actuated(model, actuation)
+    truth_hidden: dict[str, dict[str, float]] = {}
+    strangers: dict[str, dict[str, float]] = {}
+    near = False
+    wanted = as_hidden(hidden)
+    # Before anything is planned: that takes seconds.
+    refuse(maker, wanted)
+    for name, values in wanted.items():
+        if name in STRANGERS:
+            generator = _generator(seed, "hidden", zlib.crc32(name.encode()))
+            strangers[name] = STRANGERS.get(name).checked(values, generator)
+            continue
+        if values is None:
+            # Its own stream by its name: the order of the effects must not matter.
+            generator = _generator(seed, "hidden", zlib.crc32(name.encode()))
+            values = typical_values(EFFECTS.get(name).describe(model.vehicle, model.actuation), generator)
+        truth_hidden[name] = values
+        _can_be_hidden(model, name)
+        near = near or "altitude" in EFFECTS.get(name).channels
+    if bottom is None and near:
+        bottom = bottom_below(model, excitation, seed, runs=runs, duration=duration, rate=rate)
+    factors = {}
+    if coefficients == "drawn":
+        streams = {s: _generator(seed, s, 0) for s in STREAMS[4:8]}
+        factors = drawn_factors(model.vehicle, list(truth_hidden), streams)
+    hiding = make_plant(model, truth_hidden, factors)
+    hiding.bottom = bottom
+
+    # Rows of what is commanded; the log has every so many of them.
+    t = np.arange(every * round(duration * rate) + 1) / (every * rate)
+    with torch.inference_mode():
+        plan = manner.plan(model, t, [_generator(seed, "excitation", i) for i in range(runs)])
+        sensing = Sensing(
+            around.sensors, condition, 1.0 / (every * rate), len(t),
+            [_generator(seed, "noise", i) for i in range(runs)], [_generator(seed, "sensing", i) for i in range(runs)],
+            _generator(seed, "law", 2),
+        )  # fmt: skip
+        voltage = _battery(model, t, [_generator(seed, "voltage", i) for i in range(runs)])
+    task = PlantTask(
+        model.vehicle, model.actuation, {str(e.name): e.values() for e in hiding.members}, strangers, hiding,
+        plan.eta0, plan.nu0, t, plan.command, plan.fins, plan.controller, plan.under_way, voltage, bottom, max_step,
+        drawn_laws(around, model.vehicle, model.actuation, _generator(seed, "law", 0)),
+    )  # fmt: skip
+    wandering: dict[str, Any] = {}
+    if around.disturbance.share > 0.0:
+        bare = make_plant(model, {}, factors)
+        known = replace(
+            task, effects={str(e.name): e.values() for e in bare.members}, strangers={}, model=bare
+        )
+        # A controller keeps a memory, so the trial is flown by one of its own.
+        own = manner.plan(model, t, [_generator(seed, "excitation", i) for i in range(runs)])
+        forces = [_generator(seed, "force", i) for i in range(runs)]
+        known, wandering = disturbed(
+            around, maker, replace(known, controller=own.controller), _generator(seed, "law", 1), forces
+        )
+        task = replace(task, laws=known.laws)
+    motion = maker.move(task, sensing.look)
+    logged = condition.accelerations if accelerations is None else accelerations
+    altitude = None
+    if bottom is not None:
+        size = condition.standard_deviation.get("altitude", 0.0)
+        streams = [_generator(seed, "altitude", i) for i in range(runs)]
+        noisy = np.stack([size * g.standard_normal(len(t)) for g in streams])
+        altitude = bottom - motion.eta[..., 2] + noisy
+    made = _runs(t, motion, voltage, sensing, model.actuation, altitude, logged, every)
+    log = Log.from_runs(made, name=f"{model.vehicle.name}-{manner.name}-{seed}")
+    truth = {
+        "schema": "auvnn/truth/1",
+        "hidden": {e.name: e.values() for e in hiding.members if e.name in truth_hidden} | strangers,
+        "noise": condition.name,
+        "seed": int(seed),
+        "model": model.vehicle.name,
+        "coefficients": factors,
+        "conditions": {
+            "excitation": {"name": manner.name, **vars(manner)},
+            "noise": condition.to_dict(),
+            "actuation": model.actuation,
+            "accelerations": logged,
+            "runs": runs,
+            "duration": float(duration),
+            "rate": float(rate),
+            "max_step": float(max_step),
+            "bottom": bottom,
+            "plant": maker.name,
+        },
+        "notes": list(plan.notes),
+    }
+    if world is not None:
+        truth["world"] = _told(around, task, sensing, wandering)
+    return Simulation(log, truth, hiding, {n: points[:, ::every] for n, points in plan.set_points.items()})
+
+
+def _told(world: World, task: PlantTask, sensing: Sensing, wandering: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a world and what was drawn of it, as plain data."""
+    laws = task.laws
+    return {
+        **world.to_dict(),
+        "true_names": list(world.true_names),
+        "drawn": {
+            "exponent": None if laws.exponent is None else laws.exponent.tolist(),
+            "speed": None if laws.speed is None else laws.speed.tolist(),
+            "thrust_phase": None if laws.phase is None or laws.thrust == 0.0 else laws.phase.tolist(),
+            "tilt": sensing.tilt.tolist(),
+            "force": dict(wandering) or None,
+        },
+    }
+
+
+def bottom_below(
+    model: GreyBox, excitation: str | Mapping[str, Any], seed: int, *, runs: int, duration: float, rate: float
+) -> float:
+    """Return the depth, m, of a bottom that the nominal model comes close to: 1.3 of its radii below.
+
+    The radius is that of the sphere of the vehicle's volume.
+    """
+    nominal = simulate(
+        model, excitation, "none", None, seed, runs=runs, duration=duration, rate=rate, max_step=0.025
+    )
+    deepest = max(float(run.eta[:, 2].max()) for run in nominal.log.runs)
+    return deepest + 1.3 * radius(model.vehicle)
+
+
+def _can_be_hidden(model: GreyBox, name: str) -> None:
+    lacking = EFFECTS.get(name).lacks(model.vehicle, model.actuation)
+    if lacking:
+        raise ConfigError(
+            f"{name} cannot be hidden in a log of {model.vehicle.name}: its model file states no "
+            f"{lacking[0]}; state it, or choose another vehicle"
+        )
+
+
+def _check(seed: int, runs: int, duration: float, rate: float, coefficients: str, max_step: float) -> None:
+    for name, value, good in (
+        ("seed", seed, isinstance(seed, (int, np.integer)) and seed >= 0),
+        ("runs", runs, isinstance(runs, (int, np.integer)) and 1 <= runs <= 10_000),
+        ("rate", rate, 0 < rate <= 10_000),
+        ("max_step", max_step, 0 < max_step <= 1.0),
+    ):
+        if not good or isinstance(value, bool):
+            raise ConfigError(f"{name} = {value!r} is out of range: a positive number is needed")
+    if not 2.0 / rate <= duration <= 1e6 / rate:
+        raise ConfigError(f"duration = {duration}: choose {2 / rate:g} to {1e6 / rate:g} s at {rate:g} Hz")
+    if coefficients not in COEFFICIENTS:
+        raise ConfigError(f"coefficients = {coefficients!r}: choose from {', '.join(COEFFICIENTS)}")
+
+
+def _generator(seed: int, stream: str, index: int) -> np.random.Generator:
+    key = (STREAMS.index(stream), index)
+    return np.random.default_rng(np.random.SeedSequence(int(seed), spawn_key=key))
+
+
+def _actuated(model: GreyBox, actuation: str | None) -> GreyBox:
+    if actuation is None or actuation == model.actuation:
+        return model
+    effects = [type(e).build(model.vehicle, actuation, e.values()) for e in model.copied_effects()]
+    return GreyBox(model.vehicle, effects, model.damping, actuation)
+
+
+def _battery(model: GreyBox, t: Array, generators: Sequence[np.random.Generator]) -> Array | None:
+    """Return the voltage of a battery that falls by a tenth in ten minutes, (R, T), or None."""
+    reference = model.vehicle.reference_voltage
+    if reference is None:
+        return None
+    first = np.array([g.uniform(0.94, 1.04) for g in generators])
+    return reference * (first[:, None] - 0.1 * t / 600.0)
+
+
+def _runs(
+    t: Array,
+    motion: Motion,
+    battery: Array | None,
+    sensing: Sensing,
+    actuation: str,
+    altitude: Array | None,
+    rates: bool,
+    every: int,
+) -> list[Run]:
+    draws, thin = sensing.recorded, slice(None, None, every)
+    position, quaternion, nu = (
+        x[:, thin] for x in sensing.record(motion.position, motion.quaternion, motion.velocity)
+    )
+    rate = draws.added("du", motion.rate)[:, thin] if rates else None
+    voltage = None
+    if battery is not None:
+        voltage = draws.added("voltage", battery[..., None])[:, thin, 0]
+    command, stamps = motion.command[:, thin], sensing.stamps(t)[:, thin]
+    return [
+        Run(
+            number=i, t=stamps[i], quaternion=quaternion[i], nu=nu[i], nu_dot=None if rate is None else rate[i],
+            position=position[i], fins=None if motion.fins is None else motion.fins[i, thin],
+            wrench=command[i] if actuation == "wrench" else None,
+            thrusters=command[i] if actuation == "thrusters" else None,
+            voltage=None if voltage is None else voltage[i],
+            altitude=None if altitude is None else altitude[i, thin],
+        )
+        for i in range(len(nu))
+    ]  # fmt: skip

@@ -1,0 +1,5 @@
+"""What damping subnetworks have learned beside damping.
+
+`confounded_effects` asks which effects can account for the learned wrench; `network_posterior` says how well the
+log determined it.
+"""

@@ -1,0 +1,76 @@
+"""An unstable vehicle with coefficients that are off: free running leaves the motion, and is brought back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import auvnn
+from auvnn.diagnosis.hypotheses import outlier_restart as strays
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.layout import lay_out, priors
+from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
+from auvnn.estimation.prediction_error import fit
+from auvnn.estimation.priors import Priors
+
+# What the sensors of the condition "realistic" add to velocities and rates, m/s and rad/s.
+NOISE = np.repeat([0.006, 0.003], 3)
+
+
+def logged(seed):
+    """Return the model as stated, windows of a log of one whose coefficients are off, their groups, and what is known."""
+    model = auvnn.load("remus100")
+    layout = lay_out(model, [])
+    groups = [n for n in layout.names if n != "inertia"]
+    random = np.random.default_rng(seed)
+    off = {
+        n: {
+            p.name: float(max(mean + random.normal() * spread, p.low + 0.3))
+            for p, mean, spread in zip(layout.described(n), layout.means[n], layout.spreads[n], strict=True)
+        }
+        for n in groups
+    }
+    made = auvnn.simulate(
+        model, "multisine", hidden=off, duration=30.0, rate=10.0, runs=2, seed=seed, noise="realistic"
+    )
+    return layout.model, windows_for(model, made.log), groups, priors(layout, groups)
+
+
+@pytest.mark.parametrize("seed", [19, 59])
+def test_windows_that_went_astray_are_brought_back_by_the_others(seed):
+    model, windows, groups, known = logged(seed)
+    plain = fit(model, windows, groups, known, iterations=15)
+    assert plain.sigma[6] > 3 * NOISE[0], "some windows go astray, or this says nothing"
+    found = fit_with_outlier_restart(model, windows, groups, known, iterations=15)
+    np.testing.assert_allclose(found.sigma[6:12], NOISE, rtol=0.1)
+
+
+def test_where_none_goes_astray_it_is_the_plain_fit():
+    model, windows, groups, known = logged(67)
+    plain = fit(model, windows, groups, known, iterations=15)
+    found = fit_with_outlier_restart(model, windows, groups, known, iterations=15)
+    np.testing.assert_array_equal(found.theta, plain.theta)
+    np.testing.assert_allclose(plain.sigma[6:12], NOISE, rtol=0.1)
+
+
+def test_the_last_fit_begins_with_each_stray_already_brought_back(monkeypatch):
+    model, windows, groups, known = logged(59)
+    seen = []
+
+    def watched(at, some, names, held, **how):
+        seen.append((at, some, names, how))
+        return fit(at, some, names, held, **how)
+
+    monkeypatch.setattr(strays, "fit", watched)
+    found = fit_with_outlier_restart(model, windows, groups, known, iterations=15)
+    at, some, names, how = seen[-1]
+    assert len(some) == len(windows) and names == groups
+    nothing = Priors(np.zeros(0), np.zeros(0))
+
+    def errors(**begun):
+        return fit(at, windows, (), nothing, sigma=found.sigma, iterations=0, **begun).statistics.cost
+
+    assert errors().max() > 100 * np.median(errors()), (
+        "from the measured states some go astray, or this says nothing"
+    )
+    assert errors(initial=how["initial"]).max() < 2 * np.median(errors())

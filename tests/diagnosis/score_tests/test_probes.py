@@ -1,0 +1,209 @@
+"""Stand-ins for effects with a shape: each is the effect at that shape, and the choice among them is paid for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
+from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.score_tests.null_tests import NullTests
+from auvnn.diagnosis.score_tests.probes import extent_of, probed
+from auvnn.diagnosis.score_tests.score import Score, score
+from auvnn.diagnosis.score_tests.shape_search import ShapeSearch, search_shapes
+from auvnn.effects import EFFECTS, Extent
+from auvnn.estimation.normal_equations import linearise, normal_equations
+from auvnn.estimation.priors import set_parameters
+from auvnn.estimation.sensitivity import respond
+from auvnn.metrics.free_run import initial_states
+from auvnn.models import GreyBox, load
+from auvnn.simulation import simulate
+
+SHAPED = [
+    n
+    for n in EFFECTS.names()
+    if any(p.shape for p in EFFECTS.get(n).describe(load("rov95").vehicle, "wrench"))
+]
+SIGMA = np.array([0.05, 0.05, 0.01, 0.003, 0.003, 0.008, *[0.006] * 3, *[0.003] * 3, *[np.inf] * 6])
+
+
+@pytest.fixture(scope="module")
+def model():
+    return load("rov95")
+
+
+@pytest.fixture(scope="module")
+def windows(model):
+    made = simulate(
+        model, "multisine", "realistic", runs=2, duration=6.0, rate=10.0, max_step=0.05, bottom=9.5
+    )
+    return windows_for(model, made.log)
+
+
+def test_all_that_begin_swing_or_go_slack_have_a_shape():
+    assert {"payload", "waves", "tether", "bottom_proximity"} <= set(SHAPED)
+
+
+@pytest.mark.parametrize("name", SHAPED)
+def test_each_stand_in_is_the_effect_at_that_shape(model, windows, name):
+    asked = probed(lay_out(model, [name]), [name], extent_of(windows))
+    first = windows.pick(slice(0, 1))
+    initial = initial_states(model, first)
+    whole = asked.layout.model
+    together = respond(whole, first, initial, whole.effect_names).parameters
+    kind = EFFECTS.get(name)
+    labels = list(asked.starts[name])
+    for label in {labels[0], labels[len(labels) // 2], labels[-1]}:
+        alone = GreyBox(model.vehicle, [kind.build(model.vehicle, "thrusters", asked.starts[name][label])])
+        live = [i for i, p in enumerate(alone.members[0].parameters_of) if not p.shape]
+        expected = respond(alone, first, initial, [name]).parameters[..., live]
+        found = together[..., torch.as_tensor(asked.layout.columns[label])]
+        torch.testing.assert_close(found, expected, rtol=1e-8, atol=1e-10)
+
+
+def test_the_best_of_several_is_paid_for(model, windows):
+    asked = probed(lay_out(model, ["payload"]), ["payload"], extent_of(windows))
+    whole = asked.layout.model
+    sums, _, _ = normal_equations(
+        windows, linearise(whole, windows, initial_states(whole, windows), whole.effect_names), SIGMA
+    )
+    each = [score(sums, asked.layout, [], label) for label in asked.starts["payload"]]
+    best, label = asked.score(sums, [], "payload", ())
+    seen = [s for s in each if s.degrees]
+    assert len(seen) > 1
+    assert best.p_value == pytest.approx(min(1.0, len(seen) * min(s.p_value for s in seen)))
+    assert best.evidence <= max(s.evidence for s in seen)
+    described = EFFECTS.get("payload").describe(model.vehicle, "thrusters")
+    values = dict(zip([p.name for p in described], best.estimate, strict=True))
+    assert values["time"] == asked.starts["payload"][label]["time"]
+    assert np.isnan(best.std[[p.shape for p in described]]).all()
+
+
+def test_a_hidden_load_is_found_at_the_time_nearest_to_its_own(model):
+    hidden = {"payload": {"time": 9.0, "mass": 2.0, "buoyancy": 0.0}}
+    made = simulate(model, "multisine", "realistic", hidden, runs=1, duration=16.0, rate=10.0, max_step=0.05)
+    windows = windows_for(model, made.log)
+    asked = probed(lay_out(model, ["payload"]), ["payload"], extent_of(windows))
+    whole = asked.layout.model
+    initial = initial_states(whole, windows)
+    sums, _, _ = normal_equations(windows, linearise(whole, windows, initial, whole.effect_names), SIGMA)
+    _, label = asked.score(sums, [], "payload", ())
+    times = [s["time"] for s in asked.starts["payload"].values()]
+    assert asked.starts["payload"][label]["time"] == min(times, key=lambda t: abs(t - 9.0))
+
+
+def test_the_extent_is_that_of_the_log(windows):
+    extent = extent_of(windows)
+    assert isinstance(extent, Extent)
+    assert (
+        extent.begin == 0.0 and extent.duration == pytest.approx(6.0) and extent.longest == pytest.approx(6.0)
+    )
+    away = torch.linalg.vector_norm(windows.eta[..., :3], dim=-1)
+    assert extent.distance[1] == pytest.approx(float(away.max()))
+
+
+def test_what_is_absent_is_left_out_and_predicts_the_same(model, windows):
+    effects = {
+        "ocean_current": {"v_north": 0.2},
+        "payload": {"time": 3.0},
+        "velocity_scale": None,
+        "waves": None,
+    }
+    whole = model.with_effects(effects)
+    lean = whole.without_absent(["waves"])
+    assert lean.effect_names == ["ocean_current", "waves"] and not lean.time_varying
+    assert lean.members[0] is whole.effect("ocean_current")
+    initial = initial_states(whole, windows)
+    names = ["ocean_current", "waves"]
+    a, b = (respond(m, windows.pick(slice(0, 1)), initial[:1], names) for m in (whole, lean))
+    torch.testing.assert_close(a.error, b.error, rtol=1e-12, atol=1e-13)
+    torch.testing.assert_close(a.parameters, b.parameters, rtol=1e-9, atol=1e-11)
+    set_parameters(whole, ["velocity_scale"], np.array([1.01]))
+    assert "velocity_scale" in whole.without_absent().effect_names
+
+
+def test_a_load_off_the_centre_is_seen_at_the_places_around_it(model):
+    """What it turns is no slope at the centre, and as noise it hid what it lifts; the choice is paid for."""
+    load_ = {"time": 8.0, "mass": 0.0, "x": 0.15, "y": -0.2, "z": 0.0, "buoyancy": -0.6}
+    made = simulate(
+        model,
+        "multisine",
+        "realistic",
+        {"payload": load_},
+        seed=3,
+        runs=4,
+        duration=20.0,
+        rate=10.0,
+        max_step=0.05,
+    )
+    windows, layout = windows_for(model, made.log), lay_out(model, ["payload"])
+    base = list(layout.nuisance)
+    fit = fit_hypothesis(layout, windows, base, ())
+
+    def found(asked):
+        names = asked.layout.model.effect_names
+        sums, _, _ = normal_equations(
+            windows, linearise(asked.layout.model, windows, fit.fitted.initial, names), fit.fitted.sigma
+        )
+        return *asked.score(sums, base, "payload", []), asked, sums
+
+    extent = extent_of(windows)
+    far = found(probed(layout, ["payload"], extent))[0]
+    looks = [found(asked) for asked in ShapeSearch(layout, windows, fit, base, [], extent).nearer("payload")]
+    near, label, asked, sums = max(looks, key=lambda look: look[0].gain)
+    assert near.gain > 2.0 * far.gain and near.evidence > far.evidence + 20.0 and near.p_value < far.p_value
+    names = [p.name for p in layout.model.effect("payload").parameters_of]
+    place = dict(zip(names, near.estimate, strict=True))
+    # Twice the load at half of the arm is the same moment: what counts are the signs. Weight and buoyancy are one.
+    assert 9.81 * place["mass"] - place["buoyancy"] > 0 and place["y"] < 0 < place["x"]
+    assert abs(place["time"] - 8.0) < 1.0
+    # Eight places at each of eight times.
+    assert sum(len(look[2].starts["payload"]) for look in looks) == 64
+    assert near.p_value == pytest.approx(64 * score(sums, asked.layout, base, label, []).p_value)
+    assert ShapeSearch(lay_out(model, ["waves"]), windows, fit, [], [], extent).nearer("waves") == []
+    # A search looks there as well, where the first look promises more than chance.
+    asked_for = NullTests(layout, windows, lambda words: None)(fit, ["payload"], base, [])
+    assert asked_for.scores["payload"].gain > 2.0 * far.gain
+    # Whoever asks for a load starts from there.
+    values = search_shapes(layout, windows, fit, base).start("payload").model.effect("payload").values()
+    shape = ("x", "y", "z")
+    assert [values[n] for n in shape] == pytest.approx([place[n] for n in shape]) and values["mass"] != 0
+    # At that place other times have been looked at.
+    assert abs(values["time"] - 8.0) < 0.3
+
+
+def test_what_leads_by_evidence_is_looked_at_as_well_as_what_promises_most(model, windows, monkeypatch):
+    """An effect of rough errors may promise more than the one that the test is surer of."""
+    layout = lay_out(model, ["payload", "constant_force", "waves"])
+    tests = NullTests(layout, windows, lambda words: None)
+
+    def score_of(effect, p_value, gain, evidence):
+        return Score(effect, p_value, gain, 8, 1.0, np.zeros(8), np.ones(8), evidence, gain)
+
+    looked = []
+    monkeypatch.setattr(ShapeSearch, "look", lambda self, name: looked.append(name))
+    scores = {
+        "payload": score_of("payload", 1e-9, 200.0, 50.0),
+        "constant_force": score_of("constant_force", 1e-6, 240.0, 5.0),
+    }
+    assert tests._closer(None, layout, [], [], scores) == {} and looked == ["payload"]
+    # Where it neither promises most nor leads, it is not.
+    looked.clear()
+    scores["payload"] = score_of("payload", 1e-9, 200.0, 4.0)
+    assert tests._closer(None, layout, [], [], scores) == {} and looked == []
+
+
+def test_an_onset_is_looked_for_until_a_fit_would_find_it(model):
+    """In a log of ten minutes the first times asked for are 75 s apart."""
+    kind = EFFECTS.get("payload")
+    described = kind.describe(model.vehicle, "thrusters")
+    extent = Extent(0.0, 600.0, 600.0, (0.0, 0.0))
+    for true in (3.0, 217.3, 301.0, 599.0):
+        near = min(kind.starts(described, extent), key=lambda s: abs(s["time"] - true))
+        level = 0
+        while around := kind.closest(described, extent, {**near, "x": 0.3}, level):
+            assert all(s["x"] == 0.3 and 0.0 <= s["time"] <= 600.0 for s in around)
+            near, level = min(around, key=lambda s: abs(s["time"] - true)), level + 1
+        assert abs(near["time"] - true) < 0.6 and level == 3

@@ -1,0 +1,141 @@
+"""What was taken first must still be needed once more is there: stand-ins go, causes stay."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis, log_evidence
+from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.score_tests.score import Score
+from auvnn.diagnosis.selection.choose import Chooser
+from auvnn.diagnosis.selection.model_comparison import ModelComparison
+from auvnn.models import GreyBox
+from tests.small_logs import make_log, small_vehicle
+
+LIGHT, PUSH = {"net_buoyancy": {"force": 6.0}}, {"constant_force": {"Y": 5.0}}
+NAMES = ["constant_force", "net_buoyancy"]
+
+
+@pytest.fixture(scope="module")
+def model():
+    return GreyBox(small_vehicle())
+
+
+def logged(model, hidden):
+    return make_log(model.with_effects(hidden), runs=3, duration=8.0, noise=1.0)
+
+
+@pytest.fixture(scope="module")
+def two(model):
+    return logged(model, {**LIGHT, **PUSH})
+
+
+def asked(model, log):
+    """Return who asks, and the explanation with both effects in it, the stand-in first."""
+    layout, windows = lay_out(model, NAMES), windows_for(model, log)
+    base = [n for n in layout.names if n not in NAMES]
+    return Chooser(layout, windows, lambda words: None), base, fit_hypothesis(layout, windows, base, NAMES)
+
+
+def test_an_effect_that_is_not_there_is_withdrawn_once_the_cause_is_in_the_model(model):
+    chooser, base, both = asked(model, logged(model, LIGHT))
+    left, gone = chooser.withdrawn(both, base)
+    assert gone == ["constant_force"] and left.effects == ("net_buoyancy",)
+    assert left.fitted.model.effect("net_buoyancy").theta.item() == pytest.approx(6.0, abs=0.2)
+
+
+def test_two_effects_that_are_there_both_stay(model, two):
+    chooser, base, both = asked(model, two)
+    left, gone = chooser.withdrawn(both, base)
+    assert gone == [] and left is both
+
+
+def test_a_withdrawn_effect_is_told_and_not_counted_as_missing(model, two, monkeypatch):
+    plain = diagnose(model, two, NAMES)
+    assert set(plain.missing) == set(NAMES)
+
+    def all_gone(self, taken, base):
+        return fit_hypothesis(self.layout, self.windows, base, taken.effects[1:]), [taken.effects[0]]
+
+    monkeypatch.setattr(Chooser, "withdrawn", all_gone)
+    # What is left without the one that was taken away is no stand-in here, but the purpose.
+    monkeypatch.setattr("auvnn.diagnosis.search.PARTIAL", 2.0)
+    found = diagnose(model, two, NAMES)
+    assert found.missing == [plain.missing[1]]
+    assert [s["verdict"] for s in found.steps][:3] == ["named", "named", "withdrawn"]
+    assert any(line.startswith(f"Withdrawn: {plain.missing[0]}") for line in found.story)
+    assert not any(line.startswith(f"Missing: {plain.missing[0]}") for line in found.story)
+
+
+def test_the_values_told_are_those_of_the_fit_with_all_that_was_found(model, two):
+    found = diagnose(model, two, NAMES)
+    assert [s["verdict"] for s in found.steps][:2] == ["named", "named"], (
+        "one after the other, or this says nothing"
+    )
+    told = {c["effect"]: c["parameters"] for c in found.candidates}
+    final = found.explanation.fitted.model
+    for name in NAMES:
+        for p, value in final.effect(name).values().items():
+            assert told[name][p]["value"] == pytest.approx(value, rel=1e-12)
+    for name, p, truth in (("net_buoyancy", "force", 6.0), ("constant_force", "Y", 5.0)):
+        assert abs(told[name][p]["value"] - truth) < 4 * told[name][p]["std"] < 0.5
+
+
+def test_two_effects_that_do_as_badly_alone_are_named_together(model, two, monkeypatch):
+    """As if neither were ahead of the other; alone they leave what both together explain."""
+    monkeypatch.setattr(ModelComparison, "told_apart", lambda self, best, other: False)
+    found = diagnose(model, two, NAMES)
+    assert found.steps[0]["verdict"] == "named" and set(found.steps[0]["effects"]) == set(NAMES)
+    assert set(found.missing) == set(NAMES)
+
+
+# Six forces of which none alone is much, so that what they might have been counts against them.
+SPREAD = {"X": 2.7, "Y": -2.7, "Z": 5.4, "K": 0.27, "M": -0.27, "N": 0.54}
+
+
+def standing(model, log):
+    """Return who asks, all explanations by falling evidence, the one to take, and those that it does not refute."""
+    layout, windows = lay_out(model, NAMES), windows_for(model, log)
+    base = [n for n in layout.names if n not in NAMES]
+    chooser = Chooser(layout, windows, lambda words: None)
+    each = [log_evidence(layout, fit_hypothesis(layout, windows, base, [n]), 1.0) for n in NAMES]
+    each.sort(key=lambda e: -e.evidence)
+    return each, *chooser.rivals.standing(each, layout, base, 1.0)
+
+
+def test_evidence_gives_no_name_to_what_the_data_refute(model):
+    log = logged(model, {"constant_force": SPREAD})
+    each, best, others = standing(model, log)
+    assert each[0].effects == ("net_buoyancy",), "the plainer one leads by evidence, or this says nothing"
+    assert best.effects == ("constant_force",) and others == []
+    assert diagnose(model, log, NAMES).missing == ["constant_force"]
+
+
+def test_a_better_fit_by_more_parameters_refutes_nothing_that_is_needed_beside_it(model, two):
+    each, best, others = standing(model, two)
+    assert best is each[0] and len(others) == 1
+    each, best, others = standing(model, logged(model, LIGHT))
+    assert best.effects == ("net_buoyancy",) and [e.effects for e in others] == [("constant_force",)]
+
+
+def scored(name, gain, degrees):
+    nothing = np.zeros(degrees)
+    return Score(name, 1e-4, gain, degrees, 1.0, nothing, nothing, -20.0, gain)
+
+
+def test_what_might_fit_better_than_the_one_in_the_lead_is_tried_however_many_parameters_it_has():
+    leader = scored("net_buoyancy", 14.0, 1)
+    clear, chance, more = (
+        scored("thruster_gain", 44.0, 8),
+        scored("constant_force", 28.0, 6),
+        scored("payload", 42.0, 8),
+    )
+    promising = Chooser._promising
+    assert promising([leader, clear, chance, more], [leader]) == [clear]
+    assert promising([leader, chance], [leader]) == [], (
+        "14 more by six parameters are chance in three of a hundred"
+    )
+    assert promising([leader, clear], [leader, clear]) == [] == promising([clear], [])

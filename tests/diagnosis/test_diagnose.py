@@ -1,0 +1,432 @@
+"""diagnose() on small logs: named, several, adequate, unknown, ambiguous; what it lists and what it may look at."""
+
+from __future__ import annotations
+
+import inspect
+import json
+
+import numpy as np
+import pytest
+
+from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
+from auvnn.diagnosis.residuals.additive_force import AdditiveForce
+from auvnn.diagnosis.residuals.input_forces import InputForces
+from auvnn.diagnosis.selection.choose import Chooser
+from auvnn.effects import EFFECTS, effect_class
+from auvnn.errors import ConfigError, InputError
+from auvnn.logs import Log, Run
+from auvnn.models import GreyBox
+from auvnn.testing import plain_vehicle
+from tests.diagnosis.strange_effects import BottomPull, ClockForce, HeadingForce, HeavePush, listed
+from tests.small_logs import make_log, sines, small_vehicle
+
+CURRENT = {"v_north": 0.15, "v_east": -0.10}
+AXES = "XYZKMN"
+KEYS = {"effect", "p_value", "explained", "cv_before", "cv_after", "parameters", "confusable_with", "needs"}
+
+
+@pytest.fixture(scope="module")
+def model():
+    return GreyBox(small_vehicle())
+
+
+def by_name(found):
+    return {c["effect"]: c for c in found.candidates}
+
+
+@pytest.fixture(scope="module")
+def current(model):
+    """A hidden current, three runs of a quarter of a minute, and what was said while it was looked for."""
+    log = make_log(model.with_effects({"ocean_current": CURRENT}), runs=3, duration=12.0, noise=1.0)
+    told: list[str] = []
+    return log, diagnose(model, log, progress=told.append), told
+
+
+def test_a_hidden_current_is_named_first_and_alone(current):
+    _, found, told = current
+    assert (found.verdict, found.missing) == ("named", ["ocean_current"])
+    assert [(s["verdict"], s["effects"]) for s in found.steps] == [
+        ("named", ["ocean_current"]),
+        ("adequate", []),
+    ]
+    assert found.global_p_value < 1e-6 and found.candidates[0]["effect"] == "ocean_current"
+    assert any("fitting ocean_current" in t for t in told)
+
+
+def test_its_parameters_are_found_within_their_standard_errors(current):
+    _, found, _ = current
+    for name, value in {**CURRENT, "v_down": 0.0}.items():
+        p = found.candidates[0]["parameters"][name]
+        assert p["unit"] == "m/s" and 0 < p["std"] < 0.02
+        assert abs(p["value"] - value) < 4 * p["std"]
+
+
+def test_the_answer_has_the_contracts_keys_and_the_whole_catalogue(current):
+    log, found, _ = current
+    answer = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert (
+        answer["schema"] == "auvnn/diagnosis/1" and answer["model"] == "small" and answer["log"] == log.name
+    )
+    assert {
+        "derivative",
+        "verdict",
+        "missing",
+        "steps",
+        "candidates",
+        "unexplained",
+        "depends_on",
+        "next_experiment",
+        "warnings",
+    } <= set(answer)
+    assert {c["effect"] for c in answer["candidates"]} == set(EFFECTS.names())
+    for c in answer["candidates"]:
+        assert set(c) == KEYS
+        if c["needs"]:
+            assert c["p_value"] is None and c["explained"] is None and c["parameters"] == {}
+            continue
+        assert (
+            0 <= c["p_value"] <= 1 and 0 <= c["explained"] <= 1 and c["cv_before"] > 0 and c["cv_after"] > 0
+        )
+        assert all(set(p) == {"value", "std", "unit"} for p in c["parameters"].values())
+        assert all(
+            set(x) == {"effect", "similarity"} and 0.5 <= x["similarity"] <= 1 for x in c["confusable_with"]
+        )
+    needs = {c["effect"]: c["needs"] for c in answer["candidates"] if c["needs"]}
+    assert needs["bottom_proximity"] == ["altitude"] and needs["accelerometer_tilt"] == ["du", "dv", "dw"]
+    assert "reference_voltage" in needs["voltage_droop"] and "fins" in needs["fin_stall"]
+    first = answer["candidates"][0]
+    # In the weights of the fit without it, which take what is missing for noise.
+    assert first["cv_before"] > 1.2 * first["cv_after"] and 0.9 < first["cv_before"] < 1.2
+    assert first["explained"] > 0.8 and answer["unexplained"] < 0.1
+    assert answer["depends_on"] == {} and found.story[0].startswith("Missing: ocean_current (")
+    names, matrix = found.similarity
+    asked = [c["effect"] for c in answer["candidates"] if not c["needs"]]
+    assert (
+        sorted(names) == sorted(asked) and matrix.shape == (len(asked),) * 2 and (np.diag(matrix) == 1).all()
+    )
+
+
+def test_it_cannot_be_shown_a_test_log():
+    assert not any("test" in name for name in inspect.signature(diagnose).parameters)
+
+
+def test_two_effects_are_found_one_after_the_other(model):
+    truth = model.with_effects({"ocean_current": CURRENT, "net_buoyancy": {"force": 5.0}})
+    log = make_log(truth, runs=3, duration=12.0, noise=1.0)
+    names = ["ocean_current", "net_buoyancy", "cg_offset"]
+    found = diagnose(model, log, names, advice=False, whiteness=False)
+    assert found.verdict == "named" and set(found.missing) == {"ocean_current", "net_buoyancy"}
+    assert [len(s["effects"]) for s in found.steps] == [1, 1, 0] and found.steps[-1]["verdict"] == "adequate"
+    assert [c["effect"] for c in found.candidates[:2]] == found.missing
+    assert {c["effect"] for c in found.candidates} == set(names)
+
+
+def test_nothing_hidden_is_adequate(model):
+    found = diagnose(model, make_log(model, runs=3, duration=12.0, noise=1.0))
+    assert (found.verdict, found.missing, found.unexplained) == ("adequate", [], 0.0)
+    assert [s["verdict"] for s in found.steps] == ["adequate"] and found.global_p_value > 0.05
+    assert sorted(c["effect"] for c in found.candidates) == sorted(EFFECTS.names())
+    assert found.story[0].startswith("Nothing is missing that this log can show")
+
+
+def test_coefficients_that_are_off_by_their_stated_amounts_are_nothing_missing(model):
+    """Drawn with the stated ten per cent; for a vehicle that claims one in a hundred the same log lacks something."""
+    random = np.random.default_rng(2)
+    drawn = {
+        g: dict(zip(AXES, 1 + 0.1 * random.normal(size=6), strict=True))
+        for g in ("added_mass", "linear_damping", "quadratic_damping")
+    }
+    drawn["inertia"] = dict(zip("KMN", 1 + 0.1 * random.normal(size=3), strict=True))
+    log = make_log(model.with_effects(drawn), runs=3, duration=12.0, noise=1.0)
+    assert diagnose(model, log).verdict == "adequate"
+    sure = diagnose(
+        GreyBox(small_vehicle(uncertainty=0.005)),
+        log,
+        ["added_mass", "linear_damping", "net_buoyancy"],
+        advice=False,
+        whiteness=False,
+    )
+    assert sure.verdict in ("named", "ambiguous") and set(sure.missing) <= {"added_mass", "linear_damping"}
+
+
+def test_a_force_that_nobody_can_name_is_unknown_and_its_cause_is_traced(model):
+    log = make_log(
+        model.rebuilt([HeadingForce.build(model.vehicle, "thrusters", {"force": 8.0})]),
+        runs=3,
+        duration=20.0,
+        noise=1.0,
+    )
+    found = diagnose(model, log)
+    assert (found.verdict, found.missing) == ("unknown", []) and found.steps[0]["effects"] == []
+    assert found.unexplained > 0.5
+    sway = found.depends_on["Y"]
+    assert next(iter(sway)) == "psi" and sway["psi"] > 0.8
+    for axis in "XZKMN":
+        assert sum(found.depends_on[axis].values()) < 0.05, axis
+    assert "Something is missing that no effect of the catalogue explains." in found.story
+    assert any("Y on psi" in line for line in found.story)
+    json.dumps(found.to_dict(), allow_nan=False)
+
+
+def test_a_force_that_depends_on_nothing_measured_is_unknown_and_not_blamed_on_anything(model):
+    log = make_log(
+        model.rebuilt([ClockForce.build(model.vehicle, "thrusters", {"force": 8.0})]),
+        runs=3,
+        duration=12.0,
+        noise=1.0,
+    )
+    found = diagnose(model, log)
+    assert (found.verdict, found.missing) == ("unknown", [])
+    # It beats with the clock, and the clock may be told.
+    told = [s for shares in found.depends_on.values() for name, s in shares.items() if name != "t"]
+    assert max(told, default=0.0) < 0.1
+
+
+@pytest.fixture
+def level(monkeypatch):
+    """A vehicle that stays level, pushed up by 6 N, and a second name for that in the catalogue."""
+    listed(monkeypatch, HeavePush)
+    vehicle = plain_vehicle(
+        linear_damping=[25, 35, 40, 4, 5, 5],
+        quadratic_damping=[40, 60, 80, 4, 5, 6],
+        uncertainty=dict.fromkeys(("added_mass", "linear_damping", "quadratic_damping", "inertia"), 0.1),
+    )
+    model = GreyBox(vehicle, actuation="wrench")
+    t = np.arange(0, 10.05, 0.1)
+    command = sines(t, 6, 3) * [0, 0, 15.0, 0, 0, 3.0]
+    return model, make_log(
+        model.with_effects({"net_buoyancy": {"force": 6.0}}),
+        runs=3,
+        duration=10.0,
+        noise=1.0,
+        command=command,
+        stir=0.0,
+    )
+
+
+def test_two_names_for_the_same_thing_are_given_as_a_group(level):
+    model, log = level
+    found = diagnose(model, log, ["net_buoyancy", "heave_push", "thruster_lag"], advice=False)
+    assert found.verdict == "ambiguous" and set(found.missing) == {"net_buoyancy", "heave_push"}
+    assert [(s["verdict"], set(s["effects"])) for s in found.steps] == [
+        ("ambiguous", {"net_buoyancy", "heave_push"}),
+        ("adequate", set()),
+    ]
+    twins = by_name(found)
+    for a, b in (("net_buoyancy", "heave_push"), ("heave_push", "net_buoyancy")):
+        assert {"effect": b, "similarity": pytest.approx(1, abs=0.01)} in twins[a]["confusable_with"]
+    assert twins["net_buoyancy"]["parameters"]["force"]["value"] == pytest.approx(6.0, rel=0.1)
+    assert twins["heave_push"]["parameters"]["force"]["value"] == pytest.approx(-6.0, rel=0.1)
+    assert any("cannot tell which" in line for line in found.story)
+
+
+@pytest.mark.parametrize("lift", [3.0, 9.0])
+def test_a_group_does_not_end_the_search_and_is_looked_at_again_beside_what_came_after(
+    level, monkeypatch, lift
+):
+    """Once the second effect is in the model, 9 N tell the vertical of the body from that of the world; 3 N do not."""
+    model, _ = level
+    listed(monkeypatch, HeavePush, HeadingForce)
+    t = np.arange(0, 10.05, 0.1)
+    truth = [
+        effect_class(n).build(model.vehicle, "wrench", {"force": f})
+        for n, f in (("net_buoyancy", lift), ("heading_force", 1.5))
+    ]
+    log = make_log(
+        model.rebuilt(truth),
+        runs=3,
+        duration=10.0,
+        noise=1.0,
+        command=sines(t, 6, 3) * [0, 0, 15.0, 0, 0, 6.0],
+        stir=0.0,
+    )
+    group, verdict = {"net_buoyancy", "heave_push"}, "named" if lift > 5.0 else "ambiguous"
+    if verdict == "named":
+        group.discard("heave_push")
+    found = diagnose(
+        model, log, ["net_buoyancy", "heave_push", "heading_force"], advice=False, whiteness=False
+    )
+    assert [(s["verdict"], set(s["effects"])) for s in found.steps] == [
+        (verdict, group),
+        ("named", {"heading_force"}),
+        ("adequate", set()),
+    ]
+    # The contract: of a leading group the members, of names all of them.
+    assert found.verdict == verdict and set(found.missing) == group | (
+        {"heading_force"} if lift > 5.0 else set()
+    )
+    assert any(line.startswith("Missing: heading_force") for line in found.story)
+    told = {n: c["parameters"]["force"] for n, c in by_name(found).items() if n in {*group, "heading_force"}}
+    for name, force in (("net_buoyancy", lift), ("heading_force", 1.5)):
+        assert abs(told[name]["value"] - force) < 4 * told[name]["std"] < 1.0
+    if verdict == "ambiguous":
+        assert abs(told["heave_push"]["value"] + lift) < 0.3
+
+
+def test_a_group_that_had_stood_in_is_withdrawn_with_all_its_members(level, monkeypatch):
+    """As if the group were not needed once the second effect is there: what leads then is that effect."""
+    model, _ = level
+    listed(monkeypatch, HeavePush, HeadingForce)
+    t = np.arange(0, 10.05, 0.1)
+    truth = [
+        effect_class(n).build(model.vehicle, "wrench", {"force": f})
+        for n, f in (("net_buoyancy", 9.0), ("heading_force", 3.0))
+    ]
+    log = make_log(
+        model.rebuilt(truth),
+        runs=3,
+        duration=10.0,
+        noise=1.0,
+        command=sines(t, 6, 3) * [0, 0, 15.0, 0, 0, 6.0],
+        stir=0.0,
+    )
+
+    def gone(self, taken, base):
+        return fit_hypothesis(self.layout, self.windows, base, taken.effects[1:]), [taken.effects[0]]
+
+    monkeypatch.setattr(Chooser, "withdrawn", gone)
+    # What is left without the group is no stand-in here, but the purpose.
+    monkeypatch.setattr("auvnn.diagnosis.search.PARTIAL", 2.0)
+    monkeypatch.setattr(
+        "auvnn.diagnosis.search.additive_force_test", lambda *_: AdditiveForce("X", "u", 1.0, ())
+    )
+    names = ["net_buoyancy", "heave_push", "heading_force"]
+    found = diagnose(model, log, names, advice=False, whiteness=False)
+    assert [s["verdict"] for s in found.steps][:3] == ["ambiguous", "named", "withdrawn"]
+    assert set(found.steps[2]["effects"]) == {"net_buoyancy", "heave_push"}
+    assert (found.verdict, found.missing) == ("named", ["heading_force"])
+    assert found.explanation.effects == ("heading_force",)
+
+
+def test_the_same_two_names_are_told_apart_once_the_vehicle_tilts(monkeypatch, model):
+    listed(monkeypatch, HeavePush)
+    log = make_log(
+        model.with_effects({"net_buoyancy": {"force": 12.0}}), runs=3, duration=10.0, noise=1.0, size=1.5
+    )
+    found = diagnose(model, log, ["net_buoyancy", "heave_push"], whiteness=False)
+    assert (found.verdict, found.missing) == ("named", ["net_buoyancy"])
+
+
+def test_effects_that_lack_a_channel_are_listed_with_what_they_need(monkeypatch, model):
+    listed(monkeypatch, BottomPull)
+    log = make_log(model, runs=2, duration=10.0, noise=1.0)
+    found = by_name(diagnose(model, log, ["bottom_pull", "net_buoyancy"]))
+    assert found["bottom_pull"]["needs"] == ["altitude", "voltage"] and found["net_buoyancy"]["needs"] == []
+    assert found["bottom_pull"]["p_value"] is None and found["bottom_pull"]["parameters"] == {}
+    with_both = Log.from_runs(
+        [
+            Run(
+                r.number,
+                r.t,
+                r.quaternion,
+                r.nu,
+                position=r.position,
+                thrusters=r.thrusters,
+                altitude=2 + 0 * r.t,
+                voltage=16 + 0 * r.t,
+            )
+            for r in log.runs
+        ]
+    )
+    found = by_name(diagnose(model, with_both, ["bottom_pull"]))
+    assert found["bottom_pull"]["needs"] == [] and found["bottom_pull"]["p_value"] is not None
+
+
+def test_effects_that_the_model_has_already_are_listed_and_not_tried(current, model):
+    log, _, _ = current
+    found = diagnose(model.with_effects({"ocean_current": CURRENT}), log, ["ocean_current", "net_buoyancy"])
+    assert found.verdict == "adequate"
+    assert by_name(found)["ocean_current"]["p_value"] is None
+
+
+def test_thrusters_at_neutral_say_nothing_about_thrusters_and_no_number_pretends_they_do(model):
+    log = make_log(model, runs=2, duration=10.0, noise=1.0, command=np.zeros((101, 8)))
+    found = diagnose(model, log, ["thruster_gain", "thruster_lag", "net_buoyancy"])
+    candidates = {
+        c["effect"]: c for c in json.loads(json.dumps(found.to_dict(), allow_nan=False))["candidates"]
+    }
+    for name in ("thruster_gain", "thruster_lag"):
+        assert candidates[name]["p_value"] == 1.0
+        assert all(p["std"] is None for p in candidates[name]["parameters"].values())
+    assert candidates["net_buoyancy"]["parameters"]["force"]["std"] > 0
+    assert any("says nothing about thruster_gain, thruster_lag" in w for w in found.warnings)
+
+
+def test_one_thruster_at_neutral_has_no_gain_while_the_others_have(model):
+    t = np.arange(0, 10.05, 0.1)
+    command = 0.4 * sines(t, 8, 5)
+    command[:, 2] = 0.0
+    log = make_log(model, runs=2, duration=10.0, noise=1.0, command=command)
+    gains = by_name(diagnose(model, log, ["thruster_gain"]))["thruster_gain"]["parameters"]
+    assert np.isnan(gains["thruster_3"]["std"]) and gains["thruster_3"]["value"] == 1.0
+    assert all(0 < p["std"] < 0.1 for n, p in gains.items() if n != "thruster_3")
+
+
+def test_names_are_checked_and_the_same_question_has_the_same_answer(current, model):
+    log, _, _ = current
+    with pytest.raises(ConfigError, match=r"no effect called 'ocean_curent'. Did you mean 'ocean_current'\?"):
+        diagnose(model, log, ["ocean_curent"])
+    with pytest.raises(ConfigError, match="max_effects=0 must be at least 1"):
+        diagnose(model, log, max_effects=0)
+    log = log.select([0, 1])
+    found = diagnose(model, log, "ocean_current", max_effects=1)
+    assert found.missing == ["ocean_current"] and len(found.candidates) == 1 and len(found.steps) == 2
+    again = diagnose(model, log, ["ocean_current", "ocean_current"], max_effects=1)
+    assert json.dumps(again.to_dict()) == json.dumps(found.to_dict())
+
+
+def test_a_log_too_short_to_cross_validate_is_refused(model):
+    with pytest.raises(InputError, match="gives only 2 windows of free running: record a longer log"):
+        diagnose(model, make_log(model, runs=1, duration=2.4))
+
+
+def test_windows_are_five_seconds_or_shorter_where_the_log_is_short(model):
+    t = np.arange(0, 100.05, 0.1)
+
+    def still(duration):
+        part = t[t <= duration + 1e-9]
+        return Log.from_runs(
+            [
+                Run(
+                    0,
+                    part,
+                    np.tile([1.0, 0, 0, 0], (len(part), 1)),
+                    np.zeros((len(part), 6)),
+                    thrusters=np.zeros((len(part), 8)),
+                )
+            ]
+        )
+
+    assert np.median(windows_for(model, still(100.0)).length) == 51
+    assert np.median(windows_for(model, still(24.0)).length) == 21
+    assert np.median(windows_for(model, still(6.0)).length) == 11
+
+
+def test_one_run_is_said_to_be_one_run(current, model):
+    """And a model without a single doubt is diagnosed like any other, with a warning."""
+    log, _, _ = current
+    sure = GreyBox(small_vehicle(uncertainty=0.0))
+    found = diagnose(sure, log.select([0]), ["ocean_current"], max_effects=1)
+    assert found.missing == ["ocean_current"]
+    assert any("holds one run" in w for w in found.warnings)
+    assert any("no coefficient of the model is uncertain" in w for w in found.warnings)
+
+
+def test_a_dependence_is_looked_for_among_all_that_is_measured(current, model):
+    log, _, _ = current
+    probe = InputForces(model, windows_for(model, log))
+    assert set(probe.inputs) == {
+        *"uvwpqr",
+        "phi",
+        "theta",
+        "psi",
+        *(f"thruster_{i}" for i in range(1, 9)),
+        *"xyz",
+        "t",
+    }
+    each = np.concatenate([probe.columns(i, n) for i in range(6) for n in probe.inputs])
+    assert sorted(each) == list(range(len(probe.parameters_of)))
+    names = [probe.parameters_of[k].name for k in probe.columns(4, "thruster_2")]
+    assert names == ["M_thruster_2_1", "M_thruster_2_2", "M_thruster_2_3"]

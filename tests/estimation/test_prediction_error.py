@@ -1,0 +1,358 @@
+"""Multiple shooting against dense least squares, scipy, closed forms, and hidden values."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from scipy.optimize import least_squares, lsq_linear
+
+from auvnn.estimation.normal_equations import LOOSE, Statistics, normal_equations, residual_std
+from auvnn.estimation.prediction_error import Fitted, fit
+from auvnn.estimation.priors import Priors, bounded_step, parameters_of, set_parameters
+from auvnn.estimation.sensitivity import Response
+from auvnn.estimation.simulated_windows import output_error
+from auvnn.logs import Log, Run
+from auvnn.metrics.free_run import initial_states, moved
+from auvnn.metrics.windows import cut_windows
+from auvnn.models import GreyBox
+from auvnn.testing import plain_vehicle
+from tests.small_logs import NOISE, make_log, small_vehicle
+
+HIDDEN = {
+    "ocean_current": {"v_north": 0.12, "v_east": -0.08, "v_down": 0.03},
+    "net_buoyancy": {"force": 6.0},
+    "thruster_lag": {"time_constant": 0.15},
+    "linear_damping": {"X": 1.3, "Y": 0.8, "Z": 1.2, "K": 0.7, "M": 1.4, "N": 0.9},
+}
+
+
+def free_priors(model, names, precision=1e-9):
+    count = sum(len(model.effect(n).parameters_of) for n in names)
+    return Priors(np.zeros(count), np.full(count, precision))
+
+
+@pytest.fixture(scope="module")
+def some_windows():
+    """Three windows, the last one shorter, of a log that only lends its shape."""
+    log = make_log(GreyBox(small_vehicle()), runs=1, duration=2.6, rate=10.0, accelerations=True)
+    return cut_windows(log, 1.0, partial=True)
+
+
+@pytest.fixture(scope="module")
+def made_up(some_windows):
+    """Windows with random masks, and random answers in two chunks: nothing of them comes from a model."""
+    make = torch.Generator().manual_seed(3)
+
+    def draw(*shape):
+        return torch.randn(*shape, generator=make, dtype=torch.float64)
+
+    count, length = some_windows.mask.shape[:2]
+    mask = some_windows.mask * (torch.rand(count, length, 18, generator=make) < 0.8)
+    size = 10.0 ** draw(18)
+    whole = Response(
+        draw(count, length, 18) * size * mask,
+        draw(count, length, 18, 12) * mask[..., None],
+        draw(count, length, 18, 4) * size[:, None] * mask[..., None],
+    )
+    parts = [Response(whole.error[a:b], whole.state[a:b], whole.parameters[a:b]) for a, b in ((0, 2), (2, 3))]
+    sigma = size.numpy() * np.linspace(0.5, 2.0, 18)
+    sigma[4] = np.inf
+    return replace(some_windows, mask=mask), whole, parts, sigma
+
+
+def test_reduce_equals_a_dense_projection(made_up):
+    windows, whole, parts, sigma = made_up
+    found, a, slopes = normal_equations(windows, parts, sigma)
+    weight = np.where(np.isfinite(sigma), 1 / sigma, 0.0)
+    for b in range(len(windows)):
+        e = (whole.error[b].numpy() * weight).ravel()
+        state = (whole.state[b].numpy() * weight[:, None]).reshape(-1, 12)
+        j = (whole.parameters[b].numpy() * weight[:, None]).reshape(-1, 4)
+        # The pull of the initial state is twelve more rows.
+        tall = np.concatenate([state, np.diag(1 / LOOSE)])
+
+        def out(y, tall=tall):
+            y = np.concatenate([y, np.zeros((12, *y.shape[1:]))])
+            best = np.linalg.lstsq(tall, y, rcond=None)[0]
+            return y - tall @ best, best
+
+        left_e, best_e = out(e)
+        left_j, best_j = out(j)
+        np.testing.assert_allclose(found.cost[b], left_e @ left_e, rtol=1e-9)
+        np.testing.assert_allclose(found.slope[b], left_j.T @ left_e, rtol=1e-8, atol=1e-9)
+        np.testing.assert_allclose(found.hessian[b], left_j.T @ left_j, rtol=1e-8, atol=1e-9)
+        np.testing.assert_allclose(a[b], best_e, rtol=1e-7, atol=1e-10)
+        np.testing.assert_allclose(slopes[b], best_j, rtol=1e-7, atol=1e-10)
+
+
+def test_reduce_counts_errors_samples_and_jumps_by_channel(made_up):
+    windows, whole, parts, sigma = made_up
+    found, a, _ = normal_equations(windows, parts, sigma)
+    for b in range(len(windows)):
+        for channel in range(18):
+            on = (windows.mask[b, :, channel].numpy() > 0) & np.isfinite(sigma[channel])
+            e = whole.error[b, :, channel].numpy() - whole.state[b, :, channel].numpy() @ a[b]
+            assert found.count[b, channel] == on.sum()
+            assert found.channel[b, channel] == pytest.approx(np.sum(e[on] ** 2), rel=1e-9, abs=1e-12)
+            both = on[1:] & on[:-1]
+            assert found.pairs[b, channel] == both.sum()
+            assert found.rough[b, channel] == pytest.approx(
+                np.sum(np.diff(e)[both] ** 2), rel=1e-9, abs=1e-12
+            )
+    np.testing.assert_array_equal(found.run, windows.run)
+    np.testing.assert_array_equal(found.first, windows.first)
+    some = found.columns([2, 0])
+    np.testing.assert_array_equal(some.hessian[:, 0, 1], found.hessian[:, 2, 0])
+    np.testing.assert_array_equal(some.slope[:, 1], found.slope[:, 0])
+
+
+def bare_statistics(channel, count, rough, pairs, hessian=None) -> Statistics:
+    b = len(channel)
+    hessian = np.zeros((b, 1, 1)) if hessian is None else hessian
+    return Statistics(
+        hessian,
+        np.zeros(hessian.shape[:2]),
+        np.zeros(b),
+        channel,
+        count,
+        rough,
+        pairs,
+        np.zeros(b, dtype=np.int64),
+        np.arange(b),
+    )
+
+
+def test_white_noise_is_told_from_a_slow_error_by_its_jumps():
+    random = np.random.default_rng(0)
+    slow = np.sin(np.linspace(0, 6, 500))[:, None]
+    e = random.normal(size=(40, 500, 18)) * 0.02 + 0.3 * slow
+    jumps = np.diff(e, axis=1)
+    count = np.full((40, 18), 500.0)
+    count[:, 3] = 0.0
+    seen = count > 0
+    sums = bare_statistics(np.sum(e**2, 1) * seen, count, np.sum(jumps**2, 1) * seen, 499.0 * seen)
+    np.testing.assert_allclose(np.delete(sums.noise(), 3), 0.02, rtol=0.03)
+    assert np.isnan(sums.noise()[3])
+    sigma = residual_std(sums, np.zeros(18), parameters=0)
+    assert np.isinf(sigma[3])
+    np.testing.assert_allclose(np.delete(sigma, 3), np.sqrt(0.3**2 * np.mean(slow**2) + 0.02**2), rtol=0.05)
+    assert residual_std(sums, np.full(18, 7.0), 0)[0] == 7.0
+
+
+def test_the_spread_allows_for_the_states_and_parameters_that_were_fitted():
+    """Eighteen channels of pure noise, from which each window has fitted its twelve initial numbers."""
+    random = np.random.default_rng(1)
+    windows, length = 200, 12
+    e = random.normal(size=(windows, length * 18))
+    basis = np.linalg.qr(random.normal(size=(windows, length * 18, 12)))[0]
+    left = e - np.einsum("bij,bkj,bk->bi", basis, basis, e)
+    sums = bare_statistics(
+        np.sum(left.reshape(windows, length, 18) ** 2, 1),
+        np.full((windows, 18), float(length)),
+        np.zeros((windows, 18)),
+        np.ones((windows, 18)),
+    )
+    assert np.mean(residual_std(sums, np.zeros(18), 0) ** 2) == pytest.approx(1.0, rel=0.02)
+    assert np.mean(np.sum(sums.channel, 0) / sums.count.sum(0)) < 0.96
+
+
+def test_hidden_values_are_found_to_a_thousandth_without_noise():
+    truth = GreyBox(small_vehicle()).with_effects(HIDDEN)
+    windows = cut_windows(make_log(truth, runs=2, duration=12.0, rate=20.0), 2.0, warmup=1.0)
+    model = GreyBox(small_vehicle()).with_effects(list(HIDDEN))
+    found = fit(model, windows, list(HIDDEN), free_priors(model, HIDDEN))
+    expected = parameters_of(truth, list(HIDDEN))
+    scale = np.abs(expected - parameters_of(model, list(HIDDEN)))
+    assert found.converged
+    assert (np.abs(found.theta - expected) <= 1e-3 * np.maximum(scale, np.abs(expected))).all()
+    np.testing.assert_array_equal(parameters_of(found.model, list(HIDDEN)), found.theta)
+    assert not parameters_of(model, ["ocean_current", "net_buoyancy", "thruster_lag"]).any(), (
+        "the model was changed"
+    )
+
+
+@pytest.fixture(scope="module")
+def noisy():
+    """A truth with noise, and what was found in it."""
+    hidden = {n: HIDDEN[n] for n in ("ocean_current", "net_buoyancy", "linear_damping")}
+    truth = GreyBox(small_vehicle()).with_effects(hidden)
+    windows = cut_windows(make_log(truth, runs=2, duration=20.0, rate=10.0, noise=1.0), 2.5)
+    model = GreyBox(small_vehicle()).with_effects(list(hidden))
+    return truth, windows, fit(model, windows, list(hidden), free_priors(model, hidden))
+
+
+def test_hidden_values_are_found_within_their_standard_errors(noisy):
+    truth, _, found = noisy
+    std = np.sqrt(np.diag(found.covariance()))
+    z = (found.theta - parameters_of(truth, found.names)) / std
+    assert (np.abs(z) < 4).all() and 0.3 < np.sqrt(np.mean(z**2)) < 2.0
+    assert (std[:4] < [0.02, 0.02, 0.02, 1.0]).all()
+
+
+def test_the_weights_come_out_as_the_noise_of_each_channel(noisy):
+    _, _, found = noisy
+    expected = np.array([NOISE["position"]] * 3 + [NOISE["attitude"]] * 3 + [NOISE["nu"]] * 6)
+    np.testing.assert_allclose(found.sigma[:12], expected, rtol=0.2)
+    assert np.isinf(found.sigma[12:]).all()
+    np.testing.assert_allclose(found.statistics.noise()[:12], expected, rtol=0.2)
+
+
+def test_a_fit_equals_scipys_over_parameters_and_initial_states():
+    names = ["net_buoyancy", "ocean_current"]
+    truth = GreyBox(small_vehicle()).with_effects(
+        {"net_buoyancy": {"force": 8.0}, "ocean_current": {"v_east": 0.1}}
+    )
+    windows = cut_windows(make_log(truth, runs=1, duration=1.7, rate=20.0, noise=3.0), 0.8)
+    model = GreyBox(small_vehicle()).with_effects(names)
+    sigma = np.where(np.arange(18) < 12, np.linspace(0.01, 0.03, 18), np.inf)
+    held = Priors(np.array([5.0, 0, 0, 0]), np.array([1 / 4.0, 30.0, 30.0, 30.0]))
+    found = fit(model, windows, names, held, sigma=sigma, iterations=25)
+    start, other = initial_states(model, windows), model.rebuilt(model.copied_effects())
+    assert len(windows) == 2
+
+    def residuals(x):
+        return many(x[None])[0]
+
+    def many(x):
+        """Return residuals of several points with the same parameters, in one free run."""
+        set_parameters(other, names, x[0, :4])
+        state = moved(start.repeat(len(x), 1), torch.tensor(x[:, 4:].reshape(-1, 12)))
+        e = output_error(other, windows.pick(np.tile([0, 1], len(x))), state).numpy()[..., :12] / sigma[:12]
+        prior = np.tile(np.sqrt(held.precision) * (x[0, :4] - held.mean), (len(x), 1))
+        return np.concatenate([e.reshape(len(x), -1), prior], axis=1)
+
+    def slopes(x):
+        ahead, back = many(x + 1e-5 * np.eye(28)[4:]), many(x - 1e-5 * np.eye(28)[4:])
+        steps = np.diag([1e-3, 1e-4, 1e-4, 1e-4])
+        first = [
+            (residuals(x + np.pad(h, (0, 24))) - residuals(x - np.pad(h, (0, 24)))) / (2 * h.sum())
+            for h in steps
+        ]
+        return np.concatenate([np.array(first), (ahead - back) / 2e-5]).T
+
+    best = least_squares(
+        residuals,
+        np.zeros(28),
+        slopes,
+        xtol=1e-10,
+        ftol=1e-12,
+        x_scale=np.concatenate([[5, 0.1, 0.1, 0.1], np.full(24, 0.02)]),
+    )
+    std = np.sqrt(np.diag(found.covariance()))
+    assert (np.abs(found.theta - best.x[:4]) < 0.1 * std).all()
+    assert found.cost == pytest.approx(2 * best.cost, rel=1e-4)
+    states = moved(start, torch.tensor(best.x[4:].reshape(2, 12)))
+    np.testing.assert_allclose(found.initial, states, atol=1e-3)
+    dense = np.linalg.inv(best.jac.T @ best.jac)[:4, :4]
+    np.testing.assert_allclose(np.sqrt(np.diag(dense)), std, rtol=0.02)
+
+
+@pytest.mark.parametrize("precision", [0.0, 0.04, 4.0])
+def test_a_prior_pulls_as_the_conjugate_formula_says(precision):
+    """A constant push on 70 kg without drag: u = u_0 + X t / m, linear in what is fitted."""
+    t, random, sigma = np.arange(0, 2.01, 0.1), np.random.default_rng(4), 0.05
+    nu = np.zeros((len(t), 6))
+    nu[:, 0] = 0.2 + 3.0 * t / 70.0 + sigma * random.normal(size=len(t))
+    log = Log.from_runs([Run(0, t, np.tile([1.0, 0, 0, 0], (len(t), 1)), nu, wrench=np.zeros((len(t), 6)))])
+    model = GreyBox(plain_vehicle(), actuation="wrench").with_effects(["constant_force"])
+    windows = cut_windows(log, 1.0)
+    assert len(windows) == 2
+    weights = np.full(18, np.inf)
+    weights[3:12] = sigma
+    mean = np.zeros(6)
+    mean[0] = 8.0
+    tight = np.full(6, 1e6)
+    tight[0] = precision
+    found = fit(model, windows, ["constant_force"], Priors(mean, tight), sigma=weights, iterations=30)
+    top, bottom = precision * 8.0, precision
+    for part in (slice(0, 11), slice(10, 21)):
+        x = (t[part] - t[part].mean()) / 70.0
+        top += x @ nu[part, 0] / sigma**2
+        bottom += x @ x / sigma**2
+    assert found.theta[0] == pytest.approx(top / bottom, rel=2e-3)
+    assert found.covariance()[0, 0] == pytest.approx(1 / bottom, rel=2e-2)
+
+
+def test_what_is_hardly_known_does_not_pass_for_well_known_beside_what_is():
+    hessian = np.diag([1e16, 0.0])[None]
+    sums = bare_statistics(*np.zeros((4, 1, 18)), hessian=hessian)
+    model = GreyBox(small_vehicle())
+    found = Fitted(
+        model,
+        (),
+        np.zeros(2),
+        torch.zeros(1, 13),
+        np.ones(18),
+        sums,
+        Priors(np.zeros(2), np.array([1e-4, 1e-4])),
+        0.0,
+        True,
+        1,
+    )
+    np.testing.assert_allclose(np.diag(found.covariance()), [1e-16, 1e4], rtol=1e-6)
+
+
+def test_parameters_are_joined_by_name_and_kept_within_bounds():
+    model = GreyBox(small_vehicle()).with_effects(["ocean_current", "thruster_lag"])
+    set_parameters(model, ["thruster_lag", "ocean_current"], np.array([-0.3, 0.1, 9.0, -0.2]))
+    np.testing.assert_array_equal(
+        parameters_of(model, ["ocean_current", "thruster_lag"]), [0.1, 5.0, -0.2, 0.0]
+    )
+    assert parameters_of(model, []).shape == (0,)
+
+
+def test_a_lag_that_would_be_negative_ends_at_zero():
+    truth = GreyBox(small_vehicle())
+    log = make_log(truth, runs=1, duration=8.0, rate=10.0, noise=1.0)
+    run = log.runs[0]
+    early = np.concatenate([run.thrusters[1:], run.thrusters[-1:]])
+    # Commands written down one sample late: a lag would have to run backwards.
+    late = Log.from_runs(
+        [
+            Run(
+                0,
+                run.t,
+                run.quaternion,
+                run.nu,
+                position=run.position,
+                thrusters=np.concatenate([run.thrusters[:1], run.thrusters[:-1]]),
+            )
+        ]
+    )
+    ahead = Log.from_runs([Run(0, run.t, run.quaternion, run.nu, position=run.position, thrusters=early)])
+    model = truth.with_effects(["thruster_lag"])
+    told: list[str] = []
+    found = [
+        fit(
+            model,
+            cut_windows(x, 2.0, warmup=1.0),
+            ["thruster_lag"],
+            free_priors(model, ["thruster_lag"]),
+            progress=told.append,
+        ).theta[0]
+        for x in (late, ahead)
+    ]
+    assert found[0] == 0.0 and found[1] == pytest.approx(0.1, abs=0.03)
+    assert told and told[0].startswith("step 1: error ")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_bounded_step_is_the_constrained_minimum(seed):
+    """Against scipy's bounded least squares, whose algorithm is another one."""
+    random = np.random.default_rng(seed)
+    a, b = random.normal(size=(12, 5)), random.normal(size=12)
+    low, high = -random.uniform(0.01, 0.3, 5), random.uniform(0.01, 0.3, 5)
+    step = bounded_step(a.T @ a, a.T @ b, low, high)
+    best = lsq_linear(a, b, (low, high))
+    assert (
+        (step >= low).all()
+        and (step <= high).all()
+        and (np.isclose(step, low) | np.isclose(step, high)).any()
+    )
+    # Putting offenders at their ends once and for all is not always the optimum, but hardly ever far from it.
+    assert np.sum((a @ step - b) ** 2) <= 2 * best.cost * 1.02
+    wide = bounded_step(a.T @ a, a.T @ b, np.full(5, -9.0), np.full(5, 9.0))
+    assert wide == pytest.approx(np.linalg.lstsq(a, b, rcond=None)[0])
