@@ -2,7 +2,6 @@
 
 import os
 import tempfile
-from pathlib import Path
 
 # AUVNN_CHECK_SHAPES=1 checks every shape in every call of the physics, at five times the cost of a call.
 # tests/physics/test_properties.py checks the shapes of each function once, always.
@@ -17,10 +16,9 @@ os.environ.setdefault("AUVNN_ENGINE", "torch")
 if "AUVNN_CACHE" not in os.environ:
     KERNELS = tempfile.TemporaryDirectory(prefix="auvnn-kernels-")
     os.environ["AUVNN_CACHE"] = KERNELS.name
-COMPILED = ("cli", "diagnosis", "simulate", "studies")
 
-import pytest  # noqa: E402
-import torch  # noqa: E402
+import pytest
+import torch
 
 torch.set_num_threads(1)
 
@@ -38,13 +36,22 @@ def unsettled(figure):
     return figure
 
 
-@pytest.hookimpl(hookwrapper=True)
-def pytest_runtest_protocol(item):
-    """Run what runs free a thousand times as users do, compiled; lay figures out where tests are about them."""
-    before, folder = os.environ["AUVNN_ENGINE"], Path(item.fspath).parent.name
-    if before == "torch" and folder in COMPILED:
+@pytest.fixture(scope="module")
+def compiled_engine():
+    """Run models as users do, compiled: for tests that run the same model freely a thousand times."""
+    before = os.environ["AUVNN_ENGINE"]
+    if before == "torch":
         os.environ["AUVNN_ENGINE"] = "auto"
-    plots = folder == "report" and not Path(item.fspath).stem.startswith("test_report_page")
-    style.settle = LAID_OUT if plots else unsettled
     yield
     os.environ["AUVNN_ENGINE"] = before
+
+
+@pytest.fixture(scope="module")
+def laid_out_figures():
+    """Lay figures out as they are for users, instead of leaving their parts where they are first put."""
+    style.settle = LAID_OUT
+    yield
+    style.settle = unsettled
+
+
+style.settle = unsettled

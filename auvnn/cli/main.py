@@ -10,28 +10,9 @@ import warnings
 from collections.abc import Sequence
 from typing import Any
 
-from auvnn.catalogue import Catalogue
 from auvnn.cli.faults import INTERRUPTED, OK, TERMINATED, Terminated, outcome
 from auvnn.cli.speech import complain
-
-VERBS = Catalogue(
-    "verb",
-    {
-        "check": "auvnn.cli.check:VERB",
-        "simulate": "auvnn.cli.simulate:VERB",
-        "train": "auvnn.cli.train:VERB",
-        "compare": "auvnn.cli.compare:VERB",
-        "diagnose": "auvnn.cli.diagnose:VERB",
-        "add": "auvnn.cli.add:VERB",
-        "remove": "auvnn.cli.remove:VERB",
-        "adapt": "auvnn.cli.adapt:VERB",
-        "fleet": "auvnn.cli.fleet:VERB",
-        "demo": "auvnn.cli.demo:VERB",
-        "study": "auvnn.cli.study:VERB",
-        "benchmark": "auvnn.cli.benchmark:VERB",
-    },
-    "auvnn.verbs",
-)
+from auvnn.cli.verbs import VERBS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -78,3 +59,6 @@ def _prepare() -> None:
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
             reconfigure(errors="replace")
+
+
+__all__ = ["VERBS", "main"]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from auvnn import __version__
+from auvnn.cli.verbs import VERBS
 from auvnn.config import config_dir
 
 
 def overview() -> str:
     """Return the overview as text."""
-    from auvnn.cli.main import VERBS
     from auvnn.effects import EFFECTS
 
     verbs = "\n".join(f"  {name:<10} {VERBS.get(name).summary}" for name in VERBS.names())

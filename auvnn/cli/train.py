@@ -24,10 +24,7 @@ def _run(job: Job) -> Answering:
     job.warn([warning for warning in data["warnings"] if warning not in training.model.vehicle.warnings])
     job.say(f"trained   {data['metrics']['iterations']} iterations: {data['stopped']}")
     for when in ("before", "after"):
-        scores = {
-            name: data["metrics"][f"held_out_r2_{name}_{when}"]
-            for name in ["du", "dv", "dw", "dp", "dq", "dr"]
-        }
+        scores = {n: data["metrics"][f"held_out_r2_{n}_{when}"] for n in ("du", "dv", "dw", "dp", "dq", "dr")}
         shown = ", ".join(f"{n} {'unknown' if v is None else format(v, '.3f')}" for n, v in scores.items())
         job.say(f"result    held-out one-step R2 {when}: {shown}")
     free = [data["metrics"].get(f"held_out_rollout_5_s_total_{when}") for when in ("one_step", "after")]
@@ -71,12 +68,7 @@ def _options(job: Job) -> dict[str, Any]:
     if job["overwrite"] and not job["resume"]:
         shutil.rmtree(job.checkpoint, ignore_errors=True)
     same = {key: job[key] for key in ("scheme", "damping", "objective", "seed", "derivative", "force")}
-    return {
-        **same,
-        "checkpoint": job.checkpoint,
-        "resume": job["resume"] or False,
-        "progress": job.say.progress,
-    }
+    return {**same, "checkpoint": job.checkpoint, "resume": bool(job["resume"]), "progress": job.say.progress}
 
 
 VERB = Verb(

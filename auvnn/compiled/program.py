@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from torch.func import functional_call
 
 from auvnn.compiled.recorder import CannotCompile, Recorder
+from auvnn.compiled.rules import apply
 from auvnn.compiled.scalars import Scalars
 
 LARGEST = 40_000
@@ -119,7 +120,7 @@ def trace(
         CannotCompile: the module does something that is not covered.
     """
     scalars = Scalars()
-    recorder = Recorder(scalars)
+    recorder = Recorder(scalars, apply)
     values, place, fixed = {}, 0, numbers.fixed()
     for name, tensor in zip(numbers.names, numbers.tensors, strict=True):
         leaf = tensor.detach().clone(memory_format=torch.contiguous_format)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import torch
@@ -26,11 +26,13 @@ class Recorder(TorchDispatchMode):
 
     Args:
         scalars: graph to write to.
+        apply: what to do about each operation: (recorder, function, arguments, keywords) to its result.
     """
 
-    def __init__(self, scalars: Scalars) -> None:
+    def __init__(self, scalars: Scalars, apply: Callable[[Recorder, Any, tuple, dict], Any]) -> None:
         """Start without tensors."""
         super().__init__()
+        self.apply = apply
         self.scalars = scalars
         self._nodes: dict[int, Tensor] = {}
         self._given: set[int] = set()
@@ -98,9 +100,7 @@ class Recorder(TorchDispatchMode):
 
     def __torch_dispatch__(self, func: Any, types: Any, args: tuple = (), kwargs: dict | None = None) -> Any:
         """Run an operation and note what it did to the tracked elements."""
-        from auvnn.compiled.rules import apply
-
-        return apply(self, func, args, kwargs or {})
+        return self.apply(self, func, args, kwargs or {})
 
 
 def tensors(values: Any) -> list[Tensor]:

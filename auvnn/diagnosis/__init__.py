@@ -1,26 +1,13 @@
-"""Where a model fails, which effect is missing, and how much better it gets with it."""
+"""Which physical effect is missing? Hypotheses are tested, fitted, compared and accepted, and what they leave is tested.
 
-from auvnn.checks.actuators import ActuatorCheck, check_actuators
-from auvnn.comparison.compare import Comparison, compare
+`diagnose` prepares model and log (`hypotheses`). `search` goes from the fit of the null through `score_tests` and
+`selection` to tests of the `residuals`, until nothing more is accepted; `answers` states the result, `advise` what to
+drive next. `one_step` ranks the catalogue by accelerations instead, `full_data` serves logs larger than memory.
+"""
+
 from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.diagnose import diagnose
 from auvnn.diagnosis.full_data.large_logs import diagnose_files
 from auvnn.diagnosis.one_step.rank import Ranked, rank_one_step
-from auvnn.improvement.add import Improvement, add
-from auvnn.improvement.fleet import Fleet, fleet
 
-__all__ = [
-    "ActuatorCheck",
-    "Comparison",
-    "Diagnosis",
-    "Fleet",
-    "Improvement",
-    "Ranked",
-    "add",
-    "check_actuators",
-    "compare",
-    "diagnose",
-    "diagnose_files",
-    "fleet",
-    "rank_one_step",
-]
+__all__ = ["Diagnosis", "Ranked", "diagnose", "diagnose_files", "rank_one_step"]

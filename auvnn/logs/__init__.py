@@ -1,9 +1,10 @@
 """Logs: reading, writing, judging and differentiating what was measured."""
 
+from auvnn.logs.check import check
 from auvnn.logs.leakage import leakage
 from auvnn.logs.log import Log
 from auvnn.logs.quality.findings import Finding
-from auvnn.logs.quality.quality import Quality, check
+from auvnn.logs.quality.quality import Quality
 from auvnn.logs.readers import READERS
 from auvnn.logs.reading.repair import Repair
 from auvnn.logs.run import Run

@@ -2,8 +2,9 @@
 
 from auvnn.models.grey_box import GreyBox, Prepared
 from auvnn.models.inputs import Inputs
+from auvnn.models.loading import from_vehicle, load, remove
 from auvnn.models.rollout import Divergence, Trajectory, rollout
-from auvnn.models.saving import from_vehicle, load, remove, save
+from auvnn.models.saving import save
 
 __all__ = [
     "Divergence",

@@ -28,6 +28,7 @@ from auvnn.errors import ConfigError
 from auvnn.models.identity import Identity, has_hooks
 from auvnn.models.inputs import Inputs
 from auvnn.models.rate import SIZE, state_rate, unit_attitude
+from auvnn.models.tableaus import TABLEAUS
 
 if TYPE_CHECKING:
     from auvnn.models.actuators import Drive
@@ -117,8 +118,6 @@ def why_not(
         gradient: with gradients in the parameters that ask for one.
         solver: one of the own solvers.
     """
-    from auvnn.models.rollout import TABLEAUS
-
     inputs = inputs or Inputs(torch.zeros(1, model.actuators.size, dtype=torch.float64))
     try:
         made = _made(model, inputs, gradient, TABLEAUS[solver])

@@ -17,6 +17,7 @@ from auvnn.effects import HOOKS, Body, Effect, Moment, Sensed, effect_class
 from auvnn.errors import ConfigError
 from auvnn.models.actuators import Actuators
 from auvnn.models.inputs import Inputs
+from auvnn.models.saving import REGION, SUBNETWORKS, save
 from auvnn.physics.attitude import quat_to_matrix
 from auvnn.physics.coriolis import coriolis_force
 from auvnn.physics.current import water_velocity
@@ -428,8 +429,15 @@ class GreyBox(nn.Module):
 
         return rollout(self, eta0, nu0, commands, times, **options)
 
+    def learned_parts(self) -> tuple[dict[str, Any], dict[str, Tensor] | None]:
+        """Return how what was learned is built again, as entries of a model file, and its weights; None without any."""
+        if self.damping is None:
+            return {}, None
+        described: dict[str, Any] = {SUBNETWORKS: self.damping.describe()}
+        if self.damping.region is not None:
+            described[REGION] = self.damping.region.to_dict()
+        return described, self.damping.state_dict()
+
     def save(self, folder: str | Path, *, overwrite: bool = False) -> Path:
         """Write the model as a folder: see `auvnn.models.saving.save`."""
-        from auvnn.models.saving import save
-
         return save(self, folder, overwrite=overwrite)

@@ -19,6 +19,7 @@ from auvnn.models.limits import LIMIT
 from auvnn.models.rate import state_rate, unit_attitude
 from auvnn.models.stiffness import MAX_STEPS, MOST_CUT, UNSTABLE, fastest_rate, followed
 from auvnn.models.stiffness import words as stiff_words
+from auvnn.models.tableaus import TABLEAUS
 from auvnn.physics.attitude import quat_to_matrix
 from auvnn.physics.kinematics import eta6_to_eta7
 
@@ -255,14 +256,6 @@ def _leading_shape(
     except RuntimeError:
         words = ", ".join(f"{name} {tuple(shape)}" for name, shape in leading.items())
         raise ConfigError(f"leading shapes do not fit together: {words}") from None
-
-
-# Explicit schemes whose stages each need the one before only: (stage times, weights).
-TABLEAUS = {
-    "rk4": ((0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
-    "midpoint": ((0.0, 0.5), (0.0, 1.0)),
-    "euler": ((0.0,), (1.0,)),
-}
 
 
 def _fixed(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import time as clocks
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,11 @@ from torch import Tensor
 from auvnn.damping.bank import DampingBank, Description
 from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
+from auvnn.online import state
 from auvnn.online.bounds import Bounds, known_drag
 from auvnn.online.change import Change, Monitor
 from auvnn.online.consistency import Consistency
+from auvnn.online.counts import Counts
 from auvnn.online.guards import REASONS, Guards, build_guards
 from auvnn.online.intake import refusal, sample_of
 from auvnn.online.noise import Gate, NoiseLevel
@@ -66,20 +68,6 @@ class Update:
     validated: bool = False
     proven: int = 0
     believed: bool = False
-
-
-@dataclass
-class Counts:
-    """How often what happened."""
-
-    samples: int = 0
-    adapted: int = 0
-    shortened: int = 0
-    reverted: int = 0
-    validated: int = 0
-    believed: int = 0
-    proven: int = 0
-    skipped: dict[str, int] = field(default_factory=lambda: dict.fromkeys(REASONS, 0))
 
 
 class Adapter:
@@ -395,16 +383,12 @@ class Adapter:
 
     def save(self, folder: str | Path) -> Path:
         """Write all of the adapter's state into a folder, whole or not at all; see `auvnn.online.state`."""
-        from auvnn.online.state import save
-
-        return save(self, folder)
+        return state.save(self, folder)
 
     @classmethod
     def restore(cls, folder: str | Path, *, validated: bool = False) -> Adapter:
         """Return the adapter that `save` wrote; it goes on bit for bit, or from its last validated weights."""
-        from auvnn.online.state import restore
-
-        return restore(folder, validated=validated)
+        return state.restore(cls, folder, validated=validated)
 
 
 def with_subnetworks(model: GreyBox, damping: Description) -> GreyBox:

@@ -18,8 +18,10 @@ import torch
 from torch import Tensor
 
 from auvnn.errors import ModelError
-from auvnn.models.saving import MODEL, contents, from_contents
+from auvnn.models.loading import from_contents
+from auvnn.models.saving import MODEL, contents
 from auvnn.online.change import Monitor
+from auvnn.online.counts import Counts
 from auvnn.online.guards import Guards
 from auvnn.online.residual import Sample
 from auvnn.storage import read_folder, tensors_from_bytes, tensors_to_bytes, write_folder
@@ -41,10 +43,11 @@ def save(adapter: Adapter, folder: str | Path) -> Path:
     return write_folder(path, files, overwrite=True, schema=SCHEMA)
 
 
-def restore(folder: str | Path, *, validated: bool = False) -> Adapter:
+def restore(kind: type[Adapter], folder: str | Path, *, validated: bool = False) -> Adapter:
     """Return the adapter that `save` wrote.
 
     Args:
+        kind: the class to build.
         folder: where it is.
         validated: begin from the last validated weights, which drops updates that were still being judged.
 
@@ -52,8 +55,6 @@ def restore(folder: str | Path, *, validated: bool = False) -> Adapter:
         InputError: there is no such folder.
         ModelError: it is damaged, incomplete, or of another kind.
     """
-    from auvnn.online.adapter import Adapter, Counts
-
     path = Path(folder)
     files = read_folder(path, schema=SCHEMA)
     missing = [name for name in (PLAIN, TENSORS, MODEL) if name not in files]
@@ -65,7 +66,7 @@ def restore(folder: str | Path, *, validated: bool = False) -> Adapter:
     try:
         plain = json.loads(files[PLAIN])
         watched = plain["monitor"]
-        adapter = Adapter(
+        adapter = kind(
             from_contents(files, path),
             plain["scheme"],
             guards=Guards(**plain["guards"]),

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from auvnn.vehicle.vehicle import Vehicle
+if TYPE_CHECKING:
+    from auvnn.vehicle.vehicle import Vehicle
 
 
 def doubts(vehicle: Vehicle) -> list[str]:

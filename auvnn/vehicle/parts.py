@@ -10,6 +10,17 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# Relative standard deviations of the coefficient groups where the file states none.
+DEFAULT_UNCERTAINTY = {
+    "added_mass": 0.1,
+    "linear_damping": 0.2,
+    "quadratic_damping": 0.2,
+    "inertia": 0.05,
+    "mass": 0.0,
+    "buoyancy": 0.0,
+    "thrust": 0.0,
+}
+
 
 def frozen(values: Any) -> Array:
     """Return a read-only float64 copy of an array."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -11,9 +11,11 @@ from auvnn.errors import ModelError
 from auvnn.vehicle import checks
 from auvnn.vehicle.doubts import doubts
 from auvnn.vehicle.fields import Fields, number, shown
-from auvnn.vehicle.parts import Array, DampingElement
+from auvnn.vehicle.parts import DEFAULT_UNCERTAINTY, Array, DampingElement
 from auvnn.vehicle.reading_parts import read_element, read_fin, read_thruster, turned
-from auvnn.vehicle.vehicle import DEFAULT_UNCERTAINTY, Vehicle
+
+if TYPE_CHECKING:
+    from auvnn.vehicle.vehicle import Vehicle
 
 Part = TypeVar("Part")
 
@@ -44,8 +46,10 @@ _FRD: Array = np.eye(3)
 _FLU: Array = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
 
 
-def vehicle_from_dict(data: Mapping[str, Any], where: str, also: frozenset[str]) -> Vehicle:
-    """Return the validated vehicle of a model file's mapping; see `Vehicle.from_dict`."""
+def vehicle_from_dict(
+    kind: type[Vehicle], data: Mapping[str, Any], where: str, also: frozenset[str]
+) -> Vehicle:
+    """Return the validated vehicle, of class `kind`, of a model file's mapping; see `Vehicle.from_dict`."""
     fields = Fields(data, where, "vehicle", KEYS, also)
     warnings: list[str] = []
     turn = _frame(fields)
@@ -77,7 +81,7 @@ def vehicle_from_dict(data: Mapping[str, Any], where: str, also: frozenset[str])
     thrusters = _parts(fields, "thrusters", read_thruster, turn)
     fins = _parts(fields, "fins", read_fin, turn)
     groups = _groups(damping, elements)
-    vehicle = Vehicle(
+    vehicle = kind(
         name=_name(fields),
         gravity=gravity,
         water_density=water_density,

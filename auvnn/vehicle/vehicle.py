@@ -9,18 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from auvnn.vehicle.parts import Array, DampingElement, Fin, Thruster, freeze
-
-# Relative standard deviations of the coefficient groups where the file states none.
-DEFAULT_UNCERTAINTY = {
-    "added_mass": 0.1,
-    "linear_damping": 0.2,
-    "quadratic_damping": 0.2,
-    "inertia": 0.05,
-    "mass": 0.0,
-    "buoyancy": 0.0,
-    "thrust": 0.0,
-}
+from auvnn.vehicle.parts import DEFAULT_UNCERTAINTY, Array, DampingElement, Fin, Thruster, freeze
+from auvnn.vehicle.reading import vehicle_from_dict
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,10 +84,7 @@ class Vehicle:
             ModelError: a key is unknown or missing, or a value is not physical; the message
                 names the file, the field, the value and the cure.
         """
-        # Here, because reading makes vehicles: the two know one another.
-        from auvnn.vehicle.reading import vehicle_from_dict
-
-        return vehicle_from_dict(data, where, frozenset(also))
+        return vehicle_from_dict(cls, data, where, frozenset(also))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the vehicle as plain data with the keys of a model file; `from_dict` gives it back."""

@@ -26,8 +26,7 @@ from run import FILTER, FITTED, SECONDS, WINDOW, first, lively, read
 from auvnn.answers import plain
 from auvnn.diagnosis import diagnose, rank_one_step
 from auvnn.logs import Log
-from auvnn.models import GreyBox, load
-from auvnn.models.saving import remove
+from auvnn.models import GreyBox, load, remove
 
 MOST = 2  # names one after the other: the first decides, the second tells whether it comes back at all
 SHOWN = 6  # of the ranking

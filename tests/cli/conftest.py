@@ -28,3 +28,8 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[Calla
 
     put(write_two)
     return put
+
+
+@pytest.fixture(scope="module", autouse=True)
+def engine(compiled_engine: None) -> None:
+    """Use the compiled engine in every module of this folder, as users do."""

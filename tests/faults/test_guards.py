@@ -19,8 +19,7 @@ from auvnn.errors import ConfigError, InputError, ModelError
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.metrics.windows import cut_windows
-from auvnn.models import GreyBox, load
-from auvnn.models.saving import from_vehicle, save
+from auvnn.models import GreyBox, from_vehicle, load, save
 from auvnn.physics.products import matvec
 from auvnn.simulation import simulate
 from auvnn.testing import plain_vehicle

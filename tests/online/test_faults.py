@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from auvnn.errors import ConfigError, ModelError
-from auvnn.models.saving import from_vehicle
+from auvnn.models import from_vehicle
 from auvnn.online import Adapter, Guards
 from auvnn.online.bounds import known_drag
 from auvnn.online.schemes.base import Lesson, OnlineScheme

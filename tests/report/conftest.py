@@ -7,10 +7,8 @@ from filelock import FileLock
 from markupsafe import Markup
 
 from auvnn.report import style
+from tests.conftest import LAID_OUT
 from tests.report.report_fakes import KINDS, drawer, make
-
-# As it is for users; while tests of pages run, figures are not laid out (tests/conftest.py).
-LAID_OUT = style.settle
 
 
 @pytest.fixture
@@ -36,3 +34,8 @@ def pages(tmp_path_factory, worker_id) -> dict[str, str]:
         if not place.exists():
             place.write_text(json.dumps(drawn()), encoding="utf-8")
     return json.loads(place.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def layout(laid_out_figures):
+    """Lay figures out: where their parts lie is what these tests ask."""

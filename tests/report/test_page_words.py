@@ -7,6 +7,11 @@ from tests.report.html_reading import PageText
 from tests.report.report_fakes import comparison, diagnosis, drawer, improvement, make, quality, training
 
 
+@pytest.fixture(scope="module", autouse=True)
+def layout():
+    """Leave the parts of figures where they are: these tests ask about words."""
+
+
 def test_comparison_says_how_far_off_and_where(unseen):
     text = PageText(drawer("comparison").page(comparison(60))).text
     assert "Running free for 5 s, the model's error is 26 % of the spread" in text

@@ -26,6 +26,12 @@ from tests.report.report_fakes import (
     training,
 )
 
+
+@pytest.fixture(scope="module", autouse=True)
+def layout():
+    """Leave the parts of figures where they are: these tests ask about pages."""
+
+
 ELEMENTS = {
     "html", "head", "meta", "title", "style", "body", "main", "header", "h1", "h2", "h3", "p", "section", "nav",
     "ul", "ol", "li", "a", "figure", "figcaption", "b", "div", "img", "details", "summary", "table", "thead",

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from auvnn.answers import Answer, plain
 from auvnn.errors import InputError
-from auvnn.logs.log import Log
 from auvnn.logs.quality import channel_quality, excitation, findings, kinematics, vertical
 from auvnn.logs.quality.channel_quality import Channel
 from auvnn.logs.quality.excitation import Excitation
@@ -19,7 +17,7 @@ from auvnn.logs.quality.kinematics import Agreement
 from auvnn.logs.reading.repair import LEVELS, Level
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from auvnn.logs.log import Log
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,8 +183,3 @@ def _assess(log: Log) -> Quality:
     depth = vertical.check_vertical(log)
     found = findings.collect(log, channels, agreement, directions, order, clocks, depth)
     return Quality(log, channels, found, agreement, directions, condition, runs)
-
-
-def check(log: Log | str | Path | Sequence[str | Path], mapping: Any = None) -> Quality:
-    """Return the quality report of a log, given as such or as what `Log.read` reads."""
-    return (log if isinstance(log, Log) else Log.read(log, mapping)).quality()

@@ -7,10 +7,11 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from torch import nn
+from torch import Tensor, nn
 
 from auvnn.effects import Effect
 from auvnn.models.grey_box import GreyBox
+from auvnn.models.saving import STRUCTURE
 from auvnn.vehicle import Vehicle
 
 
@@ -42,6 +43,10 @@ class Structure(GreyBox):
     def structure_options(self) -> dict[str, Any]:
         """Return the options that build this structure again, as plain data."""
         raise TypeError(f"model structure '{type(self).__name__}' does not state its options")
+
+    def learned_parts(self) -> tuple[dict[str, Any], dict[str, Tensor] | None]:
+        """Return the structure's name and options as an entry of a model file, and the weights of what it learns."""
+        return {STRUCTURE: {"name": self.structure, **self.structure_options()}}, self.learned.state_dict()
 
     def rebuilt(self, effects: Iterable[Effect], vehicle: Vehicle | None = None) -> GreyBox:
         """Return the same structure, its learned parts copied, with other effects or other numbers."""

@@ -7,7 +7,7 @@ import pytest
 
 from auvnn.diagnosis import rank_one_step
 from auvnn.errors import ConfigError
-from auvnn.models.saving import from_vehicle
+from auvnn.models import from_vehicle
 from tests.small_logs import make_log, sines, small_vehicle
 
 MODEL = from_vehicle(small_vehicle())

@@ -11,7 +11,7 @@ from auvnn.diagnosis.one_step.refit import OneStepRefit
 from auvnn.diagnosis.one_step.slopes import AccelerationSlopes, extent_of_log
 from auvnn.diagnosis.one_step.weighted_fit import FIFTHS, left_out, parts, solve, weights
 from auvnn.metrics.one_step import Derivative, accelerations, choose_derivative
-from auvnn.models.saving import from_vehicle
+from auvnn.models import from_vehicle
 from tests.small_logs import make_log, small_vehicle
 
 MODEL = from_vehicle(small_vehicle())
