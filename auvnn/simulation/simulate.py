@@ -44,12 +44,16 @@ class Simulation:
         plant: the model with everything hidden in it that the catalogue of effects knows, as a torch model,
             whichever plant made the motion.
         set_points: what a controller was told to follow, by name, (runs, samples) each; empty in open loop.
+        task: what the plant was given.
+        motion: what it made of it, at every row at which commands change.
     """
 
     log: Log
     truth: dict[str, Any]
     plant: GreyBox
     set_points: dict[str, Array] = field(default_factory=dict)
+    task: PlantTask | None = None
+    motion: Motion | None = None
 
 
 def simulate(
@@ -202,7 +206,8 @@ def simulate(
     }
     if world is not None:
         truth["world"] = _told(around, task, sensing, wandering)
-    return Simulation(log, truth, hiding, {n: points[:, ::every] for n, points in plan.set_points.items()})
+    thinned = {n: points[:, ::every] for n, points in plan.set_points.items()}
+    return Simulation(log, truth, hiding, thinned, task, motion)
 
 
 def _told(world: World, task: PlantTask, sensing: Sensing, wandering: Mapping[str, Any]) -> dict[str, Any]:

@@ -111,7 +111,7 @@ class Equations:
         x = cross_matrix(first)
         return np.block([[mass * np.eye(3), -x], [x, inertia]])
 
-    def _matrix(self, t: float, grown: Array) -> Array:
+    def matrix(self, t: float, grown: Array) -> Array:
         """Return it for body and water at a time, (6, 6) or (R, 6, 6)."""
         rigid = self.start
         for lump, _, matrix in self.parts:
@@ -264,7 +264,7 @@ class Equations:
             total += part
         if self.inverse is not None:
             return total @ self.inverse.T
-        matrix = self._matrix(t, near.grown)
+        matrix = self.matrix(t, near.grown)
         inverse: Array = np.linalg.inv(matrix).astype(np.float64)
         return times(inverse, total) if self.walls else total @ inverse.T
 

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from auvnn.simulation.worlds import World, make_world
-from auvnn.simulation.worlds.law import commanded_wrench, ornstein_uhlenbeck
-from auvnn.simulation.worlds.sensing import Sensing
-from auvnn.simulation.worlds.world import Sensors, world_names
 
 from auvnn.errors import ConfigError
 from auvnn.models import load
 from auvnn.simulation import simulate
 from auvnn.simulation.noise import make_noise
+from auvnn.simulation.worlds import World, make_world
+from auvnn.simulation.worlds.law import commanded_wrench, ornstein_uhlenbeck
+from auvnn.simulation.worlds.sensing import Sensing
+from auvnn.simulation.worlds.world import Sensors, world_names
 
 SHORT = {"runs": 1, "duration": 4.0, "plant": "numpy", "max_step": 0.025}
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from auvnn.simulation.worlds.world import World
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
@@ -15,6 +14,7 @@ from auvnn.plants import Motion, Plant, PlantTask
 from auvnn.plants.independent.fins import Fins
 from auvnn.plants.independent.thrust import Actuators
 from auvnn.plants.laws import Laws, Wander
+from auvnn.simulation.worlds.world import World
 from auvnn.vehicle import Vehicle
 
 Array = NDArray[np.float64]

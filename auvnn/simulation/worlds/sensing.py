@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from auvnn.simulation.worlds.world import Sensors
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from auvnn.logs.channels import ACCELERATION, EULER, POSITION, VELOCITY
 from auvnn.logs.signals.rotation import multiply
 from auvnn.simulation.noise import CHANNELS, Draws, Noise
+from auvnn.simulation.worlds.world import Sensors
 
 Array = NDArray[np.float64]
 
