@@ -9,7 +9,7 @@ from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.hypotheses.candidates import candidates_for, windows_for
 from auvnn.diagnosis.hypotheses.layout import lay_out
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
-from auvnn.diagnosis.noise_law_answer import beside_what_is_left
+from auvnn.diagnosis.noise_law.answer import beside_what_is_left
 from auvnn.diagnosis.search import Search
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log

@@ -15,12 +15,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from auvnn.estimation.force_columns import pushed
+from auvnn.estimation.force_sums import LOOSE, beside_force, cost_beside_force
 from auvnn.estimation.sensitivity import Response, respond_by
 from auvnn.estimation.simulated_windows import simulate_windows
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.training.force_columns import pushed
-from auvnn.training.force_sums import LOOSE, beside_force, cost_beside_force
 
 Array = NDArray[np.float64]
 

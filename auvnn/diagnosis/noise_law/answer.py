@@ -12,10 +12,10 @@ import numpy as np
 
 from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.answers.table import values
-from auvnn.diagnosis.command_holding import Holding, between, holding
-from auvnn.diagnosis.foretold import foretold
-from auvnn.diagnosis.noise_law import ALPHA_BOUNDARY, left
-from auvnn.diagnosis.noise_law_search import BesideForce, ForceSearch
+from auvnn.diagnosis.noise_law.command_holding import Holding, between, holding
+from auvnn.diagnosis.noise_law.foretold import foretold
+from auvnn.diagnosis.noise_law.law import ALPHA_BOUNDARY, left
+from auvnn.diagnosis.noise_law.search import BesideForce, ForceSearch
 from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
 from auvnn.diagnosis.score_tests.null_tests import NullTests
 from auvnn.diagnosis.search import Search

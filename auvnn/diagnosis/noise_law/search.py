@@ -21,9 +21,10 @@ from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.layout import Layout, initial_guess, scales, shapes
-from auvnn.diagnosis.noise_law import Estimate, estimate, force_sums
+from auvnn.diagnosis.noise_law.law import Estimate, estimate, force_sums
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.score_tests.score import Score
+from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS
 from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
 from auvnn.effects import effect_class
@@ -203,6 +204,9 @@ class ForceSearch:
             self.say(f"testing {len(remaining)} effects beside the force")
             base = [*self.base, *[c for c in chosen if c not in self.base]]
             tested = NullTests(self.layout, under, self.say)(current.explanation, remaining, base, chosen)
+            # Beside what was found the variance is no longer inflated by it: the tests say whether to go on.
+            if chosen and tested.p_value >= ALPHA:
+                break
             fitted = self._fitted(tested, under, current, base, chosen, leading if not chosen else ())
             if not chosen:
                 tried = fitted
