@@ -31,6 +31,7 @@ def diagnose(
     window: float | None = None,
     advice: bool = True,
     whiteness: bool = True,
+    stochastic: bool = False,
     force: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
@@ -48,6 +49,8 @@ def diagnose(
         window: length of the windows of free running that are fitted, s; by default 5.
         advice: for an ambiguous answer, also work out which manoeuvre would tell the candidates apart.
         whiteness: also test what is left for correlations, before and after; no verdict depends on these tests.
+        stochastic: where a force is left, also ask how commands go between samples, and for effects beside a stochastic
+            force whose law is estimated; takes as long again or longer.
         force: go on with a log that contradicts itself: signs, units, axes.
         progress: told in words what is being done.
 
@@ -63,6 +66,7 @@ def diagnose(
         window=window,
         advice=advice,
         whiteness=whiteness,
+        stochastic=stochastic,
         force=force,
         progress=progress,
     )[0]
@@ -77,6 +81,7 @@ def searched(
     window: float | None = None,
     advice: bool = True,
     whiteness: bool = True,
+    stochastic: bool = False,
     force: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[Diagnosis, Search]:
@@ -95,7 +100,8 @@ def searched(
     layout = lay_out(known, usable, spread)
     search = Search(layout, windows, usable, say, advice, whiteness)
     found = search.run(model, log, needs, max_effects)
-    found, search = beside_what_is_left(found, search, model, log, needs, max_effects)
+    if stochastic:
+        found, search = beside_what_is_left(found, search, model, log, needs, max_effects)
     if spread is not None:
         found.warnings.append(LEARNED)
     found.absorbed = confounded_effects(model, log)

@@ -17,17 +17,17 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout, initial_guess, scales, shapes
-from auvnn.diagnosis.noise_law.law import Estimate, estimate, force_sums
+from auvnn.diagnosis.hypotheses.layout import Layout, initial_guess, shapes
+from auvnn.diagnosis.noise_law.hypothesis import Hypothesis, judged, p_value_of, tied
+from auvnn.diagnosis.noise_law.law import Estimate, estimate
+from auvnn.diagnosis.noise_law.sums import CELL, force_sums
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.choose import ALPHA
-from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS
+from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
-from auvnn.effects import effect_class
 from auvnn.estimation.normal_equations import linearise, normal_equations, residual_std
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.metrics.force_law import ForceLaw, cell_for
@@ -42,28 +42,6 @@ LEADERS, WITHOUT, JUDGED = 4, 2, 3
 # Members of a group that the log cannot tell apart, at most.
 GROUP = 3
 STEPS = 4
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """An explanation with the law of the force that is most likely with it.
-
-    Attributes:
-        explanation: fitted under the law of the explanation before it.
-        estimate: its own law, and its likelihood there.
-        misfit: minus twice the log marginal likelihood, departure of the parameters in it, their volume aside.
-        evidence: logarithm of the marginal likelihood, up to what all hypotheses of a log share.
-    """
-
-    explanation: FittedHypothesis
-    estimate: Estimate
-    misfit: float
-    evidence: float
-
-    @property
-    def name(self) -> str:
-        """The effect that came last."""
-        return self.explanation.effects[-1] if self.explanation.effects else ""
 
 
 @dataclass(frozen=True)
@@ -123,7 +101,7 @@ class ForceSearch:
         self.layout, self.windows, self.usable, self.base = layout, windows, list(usable), list(base)
         self.floor, self.say = floor, say
         self.sigma = np.full(18, np.inf)
-        self.cell = 0.5
+        self.cell = CELL
 
     def begin(self, first: FittedHypothesis, sigma: Array) -> Hypothesis | None:
         """Return the explanation without any name under the law of the force; None where no variance is above zero.
@@ -162,23 +140,9 @@ class ForceSearch:
 
     def judged(self, explanation: FittedHypothesis, law: ForceLaw) -> Hypothesis:
         """Return an explanation with the law that is most likely with it, and what they are worth."""
-        sums = force_sums(explanation, self.windows, self.sigma, law.cell)
-        found = estimate(sums, law, law.axes)
-        size, mean, shape = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=bool)]
-        for name in explanation.names:
-            stated = name in self.layout.spreads and name not in explanation.effects
-            own = self.layout.spreads[name] if stated else scales(self.layout, name)
-            size.append(np.broadcast_to(own, self.layout.means[name].shape))
-            mean.append(self.layout.means[name])
-            shape.append(shapes(self.layout, name))
-        sizes, means, fixed = np.concatenate(size), np.concatenate(mean), np.concatenate(shape)
-        theta, priors = explanation.fitted.theta + found.step, explanation.fitted.priors
-        data = found.value - float(priors.precision @ (theta - priors.mean) ** 2)
-        away = np.where(fixed, 0.0, (theta - means) / sizes)
-        information = found.information * sizes[:, None] * sizes
-        volume = float(np.linalg.slogdet(information + np.eye(len(sizes)))[1])
-        misfit = data + float(away @ away)
-        return Hypothesis(explanation, found, misfit, -0.5 * (misfit + volume))
+        return judged(
+            self.layout, explanation, force_sums(explanation, self.windows, self.sigma, law.cell), law
+        )
 
     def run(self, null: Hypothesis, leading: Sequence[str], most: int) -> BesideForce:
         """Search for one effect after the other.
@@ -212,7 +176,7 @@ class ForceSearch:
                 tried = fitted
             found = [self.judged(e, law) for e in fitted[:JUDGED]]
             found.sort(key=lambda h: -h.evidence)
-            sure = {h.name: min(1.0, len(remaining) * self._p_value(h, current)) for h in found}
+            sure = {h.name: min(1.0, len(remaining) * p_value_of(self.layout, h, current)) for h in found}
             if not chosen:
                 whole = min([tested.p_value, *sure.values()], default=1.0)
             good = [
@@ -224,7 +188,7 @@ class ForceSearch:
             ]
             if not good:
                 break
-            best, group = good[0], self._tied(good)
+            best, group = good[0], tied(self.layout, good)
             if len(group) > GROUP:
                 break
             names = [h.name for h in group]
@@ -253,10 +217,6 @@ class ForceSearch:
             null.explanation,
             null.estimate.law,
         )
-
-    def _p_value(self, after: Hypothesis, before: Hypothesis) -> float:
-        degrees = len(self.layout.columns[after.name])
-        return float(chi2.sf(max(before.misfit - after.misfit, 0.0), degrees))
 
     def _fitted(
         self,
@@ -313,20 +273,6 @@ class ForceSearch:
             self.layout, under, [n for n in self.base if n != after.name], after.explanation.effects[:-1],
             start=fitted, sigma=self.sigma, iterations=STEPS,
         )  # fmt: skip
-
-    def _tied(self, good: list[Hypothesis]) -> list[Hypothesis]:
-        """Return the best and those that the log cannot tell from it, the plainer one first."""
-        best = good[0]
-        for other in good[1:]:
-            # Evidence weighs how large parameters might have been, which is a guess: it must not outvote the fit.
-            extra = len(self.layout.columns[other.name])
-            if best.misfit - other.misfit > chi2.isf(ALPHA_REFUTED, extra):
-                best = other
-        rest = [h for h in good if h is not best and best.evidence - h.evidence < ODDS]
-        mine = len(self.layout.columns[best.name])
-        rest = [h for h in rest if h.misfit - best.misfit < chi2.isf(ALPHA_REFUTED, mine)]
-        plainer = effect_class(best.name).plainer
-        return sorted([best, *rest], key=lambda h: h.name not in plainer)
 
     def _taken(self, best: Hypothesis) -> Hypothesis:
         """Return a hypothesis fitted under its own law."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from auvnn.diagnosis.noise_law.law import ForceSums, Likelihood, boundary_p_value, estimate
+from auvnn.diagnosis.noise_law.law import Likelihood, boundary_p_value, estimate
+from auvnn.diagnosis.noise_law.sums import ForceSums
 from auvnn.estimation.normal_equations import Statistics
 from auvnn.metrics.force_law import correlation
 

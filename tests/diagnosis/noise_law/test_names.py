@@ -18,7 +18,7 @@ def said(hidden, seed=1, rms=RMS):
     model = GreyBox(small_vehicle())
     plant = model.with_effects(hidden) if hidden else model
     log = wandering_log(plant, rms, TIME, runs=2, duration=40.0, seed=seed)
-    return diagnose(model, log, CANDIDATES, advice=False, whiteness=False, max_effects=1)
+    return diagnose(model, log, CANDIDATES, advice=False, whiteness=False, stochastic=True, max_effects=1)
 
 
 @pytest.mark.long

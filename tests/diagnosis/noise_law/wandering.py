@@ -27,7 +27,7 @@ def path(rms, time, duration: float, seed, step: float = STEP) -> np.ndarray:
 
 
 class Wander(Effect):
-    """A wrench along a path, on straight lines between its points."""
+    """A wrench along a path (T, 6), or along one for each of many windows alike (T, B, 6), on straight lines."""
 
     name = "wander"
     cause = "made up for a test"
@@ -44,6 +44,9 @@ class Wander(Effect):
     def wrench(self, moment: Moment, body: Body) -> Tensor:
         values = self.kept("path")
         at = (torch.as_tensor(moment.time) / self.step).clamp(0, len(values) - 1.001)
+        if values.ndim == 3:
+            # The windows are alike: so are their times.
+            at = at.flatten()[0]
         k = at.floor().long()
         share = (at - k).unsqueeze(-1)
         force = (1 - share) * values[k] + share * values[k + 1]
