@@ -2,6 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+
+if sys.orig_argv[1:3] == ["-m", "auvnn"] and not sys.flags.safe_path:
+    # Python put the folder where the user stands before everything else: what lies there is not to be run.
+    import os
+
+    if sys.path[:1] == [os.getcwd()] and not os.path.samefile(sys.path[0], os.path.dirname(__path__[0])):
+        del sys.path[0]
+
 import importlib
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +26,10 @@ __all__ = [
     "compare",
     "diagnose",
     "diagnose_files",
+    "export",
     "fleet",
+    "import_model",
+    "improve",
     "load",
     "remove",
     "simulate",
@@ -28,7 +40,9 @@ __all__ = [
 if TYPE_CHECKING:
     from auvnn.comparison import compare
     from auvnn.diagnosis import diagnose, diagnose_files
-    from auvnn.improvement import add, fleet
+    from auvnn.exports import export
+    from auvnn.imports import import_model
+    from auvnn.improvement import add, fleet, improve
     from auvnn.logs import Log, check
     from auvnn.models import GreyBox, load, remove
     from auvnn.online import adapt
@@ -47,7 +61,10 @@ _WHERE = {
     "compare": "auvnn.comparison",
     "diagnose": "auvnn.diagnosis",
     "diagnose_files": "auvnn.diagnosis",
+    "export": "auvnn.exports",
     "fleet": "auvnn.improvement",
+    "import_model": "auvnn.imports",
+    "improve": "auvnn.improvement",
     "load": "auvnn.models",
     "remove": "auvnn.models",
     "simulate": "auvnn.simulation",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import stat
 import tempfile
 from pathlib import Path
 from typing import Any, ClassVar
@@ -22,6 +23,7 @@ DRAWERS = Catalogue(
         "comparison": "auvnn.report.pages.comparison:PAGE",
         "diagnosis": "auvnn.report.pages.diagnosis:PAGE",
         "improvement": "auvnn.report.pages.improvement:PAGE",
+        "improve": "auvnn.report.pages.improve:PAGE",
         "adaptation": "auvnn.report.pages.adaptation:PAGE",
         "fleet": "auvnn.report.pages.fleet:PAGE",
         "training": "auvnn.report.pages.training:PAGE",
@@ -67,8 +69,14 @@ def read_start(path: Path, most: int, folder: str) -> bytes:
         InputError: it is not there, is a folder, or cannot be read.
     """
     try:
+        kind = path.stat().st_mode
+        if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):
+            # Opening a pipe would wait for somebody to write.
+            raise InputError(f"{path}: is a pipe or a device, not a file; save what it gives as a file")
         with path.open("rb") as stream:
             return stream.read(most)
+    except InputError:
+        raise
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file; check the path") from None
     except IsADirectoryError:
@@ -83,7 +91,8 @@ def write_text(path: Path, text: str) -> Path:
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
+            # A file name that is not UTF-8 stands in Python's strings as lone surrogates, which no file can hold.
+            stream.write(text.encode("utf-8", "replace").decode("utf-8"))
             stream.flush()
             os.fsync(stream.fileno())
         # mkstemp makes files private; a report is meant to be read by whoever may read its folder.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from auvnn.cli.dry import foreseen
 from auvnn.cli.job import Answering, Job, Verb
 
 
@@ -40,4 +41,5 @@ VERB = Verb(
     reads=("log", "mapping", "model"),
     writes=("adaptation.json", "model/", "state/", "report.html", "figures/"),
     run=_run,
+    foresee=foreseen,
 )

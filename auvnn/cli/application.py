@@ -24,10 +24,12 @@ from auvnn.answers import write_text
 from auvnn.cli.compose import Composer, mended, quoted
 from auvnn.cli.faults import OK, outcome
 from auvnn.cli.folder import created, locked, refuse_taken, written
+from auvnn.cli.foreign import read_configs, write_configs
 from auvnn.cli.job import Job, Verb, files
 from auvnn.cli.speech import Speaker, complain
 from auvnn.cli.sweep import jobs_of, note, run_jobs, statuses
 from auvnn.cli.words import Words
+from auvnn.cli.working import WORK, refuse_links, take_away
 from auvnn.config import config_dir
 from auvnn.errors import AuvnnError, ConfigError, one_line
 
@@ -39,16 +41,37 @@ def run_verb(name: str, verb: Verb, arguments: list[str]) -> int:
         AuvnnError: the arguments are wrong; nothing has been touched.
     """
     words = Words.split(arguments)
-    composer = Composer(name, words.config_dir)
+    with contextlib.ExitStack() as stack:
+        configs, copied = _configs(words.config_dir, stack)
+        composer = Composer(name, copied, f"--config-dir {words.config_dir}")
+        return _run_verb(name, verb, words, composer, configs)
+
+
+def _configs(given: str | None, stack: contextlib.ExitStack) -> tuple[dict[str, str] | None, Path | None]:
+    """Return what a user's folder of configs holds, and our own copy of it, which goes with the stack."""
+    if given is None:
+        return None, None
+    if not Path(given).is_dir():
+        raise ConfigError(f"--config-dir {given}: there is no such folder")
+    configs = read_configs(Path(given))
+    place = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="auvnn-configs-")))
+    return configs, write_configs(configs, place)
+
+
+def _run_verb(name: str, verb: Verb, words: Words, composer: Composer, configs: dict[str, str] | None) -> int:
+    folder = [] if composer.folder is None else ["--config-dir", str(composer.folder)]
     overrides = composer.checked([mended(w) for w in words.overrides], sweep=words.multirun)
     config = composer.compose(overrides)
     if words.shows:
-        _hydra(name, [*words.flags, *overrides], lambda _: None)
+        _hydra(name, [*words.flags, *folder, *overrides], lambda _: None)
         return OK
     out = _dated(name) if config.out is None else Path(str(config.out)).expanduser()
     overrides.append(f"out={quoted(out)}")
     refuse_taken(out, overwrite=config.overwrite is True)
+    if words.multirun:
+        refuse_links(out, out, "multirun.yaml")  # Hydra writes it
     jobs = jobs_of(overrides) if words.multirun else [overrides]
+    composer.judge_jobs(jobs)
     with contextlib.ExitStack() as stack:
         if config.dry_run:
             # Hydra makes its folders whatever we do; these go away again.
@@ -61,20 +84,28 @@ def run_verb(name: str, verb: Verb, arguments: list[str]) -> int:
                 stack.enter_context(locked(out))
         if words.jobs:
             flags = [f for f in words.flags if f not in ("-m", "--multirun")]
+            # Each job reads and judges the user's own folder.
+            flags += [] if words.config_dir is None else ["--config-dir", words.config_dir]
             ended = run_jobs(name, flags, overrides, out, words.jobs)
         elif words.multirun:
             # A launcher may run jobs in other processes, on other machines: how they ended comes back by files.
             tally = Path(
                 stack.enter_context(tempfile.TemporaryDirectory()) if config.dry_run else out
             ).absolute()
-            arguments = [*words.flags, *overrides, *places]
+            if configs is not None and not config.dry_run:
+                # Where the launcher's processes see it too, on whatever machine.
+                take_away(tally / WORK / "configs")
+                shared = write_configs(configs, tally / WORK / "configs")
+                stack.callback(take_away, shared)
+                folder = ["--config-dir", str(shared)]
+            arguments = [*words.flags, *folder, *overrides, *places]
             with statuses(tally, len(jobs)) as ended:
                 _launched(name, arguments, partial(_counted, name, verb, composer, tally))
         else:
             ended = []
             _hydra(
                 name,
-                [*words.flags, *overrides, *places],
+                [*words.flags, *folder, *overrides, *places],
                 lambda job: ended.append(_job(name, verb, composer, job)),
             )
     failed = [number for number, status in enumerate(ended) if status != OK]
@@ -105,7 +136,12 @@ def _job(name: str, verb: Verb, composer: Composer, config: DictConfig) -> int:
     root = own.run.dir if number is None else own.sweep.dir
     out = Path(str(config.out)) / os.path.relpath(own.runtime.output_dir, str(root))
     label = f"auvnn {name}" if number is None else f"auvnn {name} (job {number})"
-    status = outcome(label, lambda: _run(verb, composer, config, out), None if config.dry_run else out)
+
+    def run() -> None:
+        refuse_links(Path(str(config.out)), out)
+        _run(verb, composer, config, out)
+
+    status = outcome(label, run, None if config.dry_run else out)
     with contextlib.suppress(OSError):
         out.rmdir()  # made by Hydra; taken away if nothing came into it
     return status
@@ -113,17 +149,24 @@ def _job(name: str, verb: Verb, composer: Composer, config: DictConfig) -> int:
 
 def _run(verb: Verb, composer: Composer, config: DictConfig, out: Path) -> None:
     options = composer.options(config)
-    say = Speaker(only_json=options["json"])
+    say = Speaker(only_json=options["json"], verbose=options["verbose"])
     for key in verb.reads:
         # A model may also be a name, which is not ours to judge.
         if options[key] is not None and (key != "model" or _is_path(options[key])):
             files(options, key)
     if options["dry_run"]:
         refuse_taken(out, overwrite=options["overwrite"])
+        if verb.foresee is not None:
+            verb.foresee(Job(options, out, out, say))
         for key in verb.reads:
             if options[key] is not None:
                 say(f"would read   {key}={options[key]}")
-        say(f"would write  {', '.join(verb.writes)} in {out}")
+        if verb.writes:
+            say(f"would write  {', '.join(verb.writes)} in {out}")
+        return
+    if not verb.writes:
+        # It writes what its user asks for while it runs, and nothing of its own.
+        say.answer(verb.run(Job(options, out, out, say)).to_dict())
         return
     with written(out, overwrite=options["overwrite"]) as folder:
         answer = verb.run(Job(options, out, folder, say))

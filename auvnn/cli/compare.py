@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from auvnn.cli.dry import foreseen
 from auvnn.cli.job import Answering, Job, Verb
 from auvnn.cli.results import horizons
 
 
 def _run(job: Job) -> Answering:
     from auvnn.comparison import compare
+    from auvnn.comparison.beside import words
 
     log = job.log()
     comparison = compare(job.model(log), log, horizons=job["horizons"], derivative=job["derivative"])
@@ -15,6 +17,8 @@ def _run(job: Job) -> Answering:
     data = comparison.to_dict()
     job.say(f"assumed   accelerations: {data['derivative']['method']}")
     job.warn(data["warnings"])
+    for line in words(comparison.baseline):
+        job.say(f"baseline  {line}")
     for line in horizons(data["rollout"]):
         job.say(f"result    {line}")
     for failure in data["failures"][:3]:
@@ -28,4 +32,5 @@ VERB = Verb(
     reads=("log", "mapping", "model"),
     writes=("comparison.json", "predictions.parquet", "report.html", "figures/"),
     run=_run,
+    foresee=foreseen,
 )

@@ -16,11 +16,11 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from auvnn.catalogue import unknown_name
-from auvnn.config import MAX_BYTES, config_dir
+from auvnn.cli.foreign import judge_hydra
+from auvnn.config import config_dir
 from auvnn.errors import ConfigError, one_line
 
 _KEYED = re.compile(r"([A-Za-z_][\w./@]*)=(.*)", re.DOTALL)
-_RESOLVER = re.compile(r"\$\{\s*([A-Za-z_][\w.]*)\s*:")
 # Hydra's own parts are objects named in its configuration; nobody else's may be.
 _CODE_KEYS = {"_target_", "_args_", "_partial_", "()", "class"}
 _RESERVED = ("hydra.mode", "hydra.searchpath", "hydra.output_subdir", "hydra.run.dir", "hydra.sweep.dir")
@@ -66,18 +66,14 @@ class Composer:
 
     Args:
         verb: name of the verb and of its primary config.
-        folder: further folder of configs, as given with --config-dir.
+        folder: further folder of configs: our own copy of what `read_configs` read.
+        theirs: the folder that it was made from, for messages.
     """
 
-    def __init__(self, verb: str, folder: str | None = None) -> None:
+    def __init__(self, verb: str, folder: str | Path | None = None, theirs: str = "--config-dir") -> None:
         """Compose the verb's defaults, against which overrides are judged."""
-        self.verb = verb
+        self.verb, self.theirs = verb, theirs
         self.folder = Path(folder).absolute() if folder else None
-        if self.folder is not None:
-            if not self.folder.is_dir():
-                raise ConfigError(f"--config-dir {folder}: there is no such folder")
-            for path in sorted(self.folder.rglob("*.yaml")):
-                _refuse_bomb(path)
         self.defaults = self._hydra([])
         self.known = {str(key) for key in self.defaults} - {"hydra"}
         choices = {str(g): c for g, c in self.defaults.hydra.runtime.choices.items()}
@@ -125,20 +121,55 @@ class Composer:
         except (HydraException, OmegaConfBaseException, ValueError, RecursionError) as error:
             raise ConfigError(one_line(error)) from None
         self._judge(config)
+        self._judge_hydra(config, checked)
         return config
+
+    def judge_jobs(self, jobs: list[list[str]]) -> None:
+        """Compose the jobs of a sweep that choose other configs of a user's folder, before the first of them starts.
+
+        What words say themselves was judged as they were read, all values of a sweep among them.
+
+        Raises:
+            ConfigError: as `compose`.
+        """
+        seen: set[tuple[str, ...]] = set()
+        for words in jobs if self.folder is not None else ():
+            chosen = tuple(w for w in words if w.startswith("+") or re.split(r"[=@]", w)[0] in self.groups)
+            if chosen not in seen:
+                seen.add(chosen)
+                self.compose(words)
+
+    def _judge_hydra(self, config: DictConfig, words: list[str]) -> None:
+        """Refuse what a user's folder makes of Hydra's own settings."""
+        if self.folder is None:
+            return
+        said = [word for word in words if re.match(r"\+{0,2}hydra[./]", word)]
+        named = {re.split(r"[=@]", word)[0].lstrip("+") for word in said}
+        for group in ("hydra/launcher", "hydra/sweeper"):
+            choice = config.hydra.runtime.choices.get(group)
+            if choice and group not in named and choice != self.defaults.hydra.runtime.choices.get(group):
+                said.append(f"{group}={quoted(choice)}")
+        try:
+            base = _own(self.verb, tuple(said))
+        except (HydraException, OmegaConfBaseException) as error:
+            raise ConfigError(one_line(error)) from None
+        theirs, ours = (OmegaConf.to_container(c.hydra, resolve=False) for c in (config, base))
+        judge_hydra(theirs, ours, self.theirs)
 
     def _parse(self, text: str) -> Override:
         word = one_line(text, 80)
         if word.startswith("~"):
             raise ConfigError(f"{word}: an option cannot be taken away; set it to null instead")
-        for name in _RESOLVER.findall(text):
-            raise ConfigError(f"{word}: ${{{name}:...}} is refused; write the value itself")
+        if found := resolver_in(text):
+            raise ConfigError(f"{word}: ${{{found}:...}} is refused; write the value itself")
         if any(key in text for key in ("_target_", "_args_", "_partial_")):
             raise ConfigError(f"{word}: options name members of catalogues, never Python code")
+        key, _, value = text.partition("=")
+        if ".." in key or (key.startswith("+") and ".." in re.split(r"[/'\"]", value)):
+            raise ConfigError(f"{word}: leads out of the folder of configs; name one that is in it")
         if "=" not in text:
             near = f"log={word}" if "log" in self.known else "key=value"
             raise ConfigError(f"'{word}' is not of the form key=value; did you mean {near}?")
-        key = text.partition("=")[0]
         if key in _RESERVED:
             raise ConfigError(f"{key} cannot be set; use out=, --multirun and --config-dir")
         try:
@@ -187,8 +218,8 @@ class Composer:
         for path, value in _leaves(OmegaConf.to_container(config, resolve=False)):
             if path[-1] in _CODE_KEYS and not str(value).startswith(_HYDRAS_OWN):
                 raise ConfigError(f"{'.'.join(path)}: options name members of catalogues, never Python code")
-            for name in _RESOLVER.findall(str(value)):
-                raise ConfigError(f"{'.'.join(path)}: ${{{name}:...}} is refused; write the value itself")
+            if found := resolver_in(str(value)):
+                raise ConfigError(f"{'.'.join(path)}: ${{{found}:...}} is refused; write the value itself")
 
     def options(self, config: DictConfig) -> dict[str, Any]:
         """Return a composed job's options as plain data, of the kinds that the defaults show.
@@ -226,6 +257,21 @@ def _wrong_kind(value: Any, default: Any) -> str | None:
     return None
 
 
+def resolver_in(text: str) -> str | None:
+    """Return the name of a resolver in a text, `oc.env` of `${oc.env:HOME}`; None where there is none.
+
+    A name may itself be put together, as in `${oc.${x}:HOME}`: what stands inside is taken out first.
+    """
+    while True:
+        match = re.search(r"\$\{\s*([\w.\s]*):", text)
+        if match:
+            return match[1].strip()
+        inner = re.sub(r"\$\{[^{}:]*\}", "x", text)
+        if inner == text:
+            return None
+        text = inner
+
+
 def _first(override: Override) -> str:
     if override.is_sweep_override():
         return f"{override.get_key_element()}={next(iter(override.sweep_string_iterator()))}"
@@ -235,15 +281,6 @@ def _first(override: Override) -> str:
 def _heads(key: str) -> Iterator[str]:
     parts = key.split(".")
     return (".".join(parts[: n + 1]) for n in range(len(parts)))
-
-
-def _refuse_bomb(path: Path) -> None:
-    """Refuse a config that could exhaust the machine while it is parsed: Hydra sets no limit."""
-    text = path.read_bytes()
-    if len(text) > MAX_BYTES:
-        raise ConfigError(f"{path}: is larger than {MAX_BYTES} bytes; a config holds a few kilobytes")
-    if re.search(rb"(^|[\s\[{,:-])\*\w", re.sub(rb"#.*", b"", text)):
-        raise ConfigError(f"{path}: YAML aliases are refused; write the value out")
 
 
 def _paths(config: DictConfig, head: str = "") -> Iterator[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from auvnn.cli.dry import foreseen
 from auvnn.cli.job import Answering, Job, Verb, files
 from auvnn.errors import ConfigError
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
 
 
 def _run(job: Job) -> Answering:
+    from auvnn.comparison.beside import words
     from auvnn.logs.reading.portions import is_large
 
     parted = job["stream"]
@@ -21,6 +23,8 @@ def _run(job: Job) -> Answering:
     diagnosis.write(job.folder)
     data = diagnosis.to_dict()
     job.warn(data["warnings"])
+    for line in words(diagnosis.baseline):
+        job.say(f"baseline  {line}")
     for line in data["story"]:
         job.say(f"result    {line}")
     return diagnosis
@@ -35,14 +39,14 @@ def _in_memory(job: Job) -> Diagnosis:
 
 def _in_parts(job: Job) -> Diagnosis:
     from auvnn.diagnosis.full_data.large_logs import diagnose_files
-    from auvnn.logs.reading.portions import kind_of
+    from auvnn.logs.reading.portions import kinds_of
 
     if job["max_duration"] is not None:
         raise ConfigError("max_duration= reads the beginning of each file: leave it out, or say stream=false")
     paths, mapping = files(job.options, "log"), job.mapping()
     job.say(f"log       {len(paths)} files, read in parts by {job['workers']} workers")
     return diagnose_files(
-        job.model(kind=kind_of(paths, mapping)), paths, _effects(job),
+        job.model(kinds=kinds_of(paths, mapping)), paths, _effects(job),
         mapping=mapping, progress=job.say.progress, **_options(job), **_shares(job),
     )  # fmt: skip
 
@@ -52,7 +56,7 @@ def _effects(job: Job) -> list[str] | None:
 
 
 def _options(job: Job) -> dict[str, Any]:
-    return {key: job[key] for key in ("max_effects", "window", "force")}
+    return {key: job[key] for key in ("max_effects", "window", "force", "tolerance", "costs")}
 
 
 def _shares(job: Job) -> dict[str, Any]:
@@ -68,4 +72,5 @@ VERB = Verb(
     reads=("log", "mapping", "model"),
     writes=("diagnosis.json", "report.html", "figures/"),
     run=_run,
+    foresee=foreseen,
 )

@@ -11,15 +11,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 from auvnn.answers import write_text
-from auvnn.cli.folder import WORK
 from auvnn.cli.speech import complain
-from auvnn.errors import AuvnnError, one_line
+from auvnn.cli.working import WORK, marked
+from auvnn.errors import AuvnnError, ConfigError, one_line
 
 OK, FAULT, BAD_INPUT, INTERRUPTED, UNHEARD, TERMINATED = 0, 1, 2, 130, 141, 143
 
 # What the user's own disk or path can do to us; any other OSError is ours to mend.
 _USERS = {
-    errno.EACCES, errno.EDQUOT, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG,
+    errno.EACCES, errno.EDQUOT, errno.EEXIST, errno.EFBIG, errno.EIO, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG,
     errno.ENOENT, errno.ENOSPC, errno.ENOTDIR, errno.EPERM, errno.EROFS,
 }  # fmt: skip
 
@@ -72,8 +72,10 @@ def _trace_if_asked() -> bool:
 
 
 def _keep_trace(out: Path | None) -> Path:
-    folder = Path(tempfile.mkdtemp(prefix="auvnn-")) if out is None else out / WORK
     try:
-        return write_text(folder / "fault.txt", traceback.format_exc())
-    except OSError:
+        if out is None:
+            raise ConfigError("nothing is to be written")
+        marked(out)
+        return write_text(out / WORK / "fault.txt", traceback.format_exc())
+    except (OSError, ConfigError):
         return write_text(Path(tempfile.mkdtemp(prefix="auvnn-")) / "fault.txt", traceback.format_exc())

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from auvnn.cli.dry import foreseen
 from auvnn.cli.job import Answering, Job, Verb, files
 
 
 def _run(job: Job) -> Answering:
     from auvnn.improvement import fleet
-    from auvnn.logs.reading.portions import kind_of
+    from auvnn.logs.reading.portions import kinds_of
 
     paths, mapping = files(job.options, "log"), job.mapping()
     job.say(f"log       {len(paths)} dives")
     found = fleet(
-        job.model(kind=kind_of(paths, mapping)), paths, job.names("effects"),
+        job.model(kinds=kinds_of(paths, mapping)), paths, job.names("effects"),
         mapping=mapping, progress=job.say.progress,
         **{key: job[key] for key in ("window", "windows", "force", "workers", "executor", "address")},
     )  # fmt: skip
@@ -30,4 +31,5 @@ VERB = Verb(
     reads=("log", "mapping", "model"),
     writes=("fleet.json", "report.html", "figures/"),
     run=_run,
+    foresee=foreseen,
 )

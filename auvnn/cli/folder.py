@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
+from auvnn.cli.working import LOCK, WORK, cleared, is_marked, let_go, marked, refuse_foreign, take_away
 from auvnn.errors import ConfigError
 
-LOCK = "lock"
-WORK = ".auvnn"  # what a run needs while it runs: lock, unfinished files, the trace of a fault
 OURS = {WORK, ".hydra"}
 
 
@@ -36,6 +34,7 @@ def refuse_taken(path: Path, *, overwrite: bool) -> None:
             break
     if is_taken(path) and not overwrite:
         raise ConfigError(f"out={path}: is not empty; choose a new folder, or say overwrite=true")
+    refuse_foreign(path)
 
 
 @contextlib.contextmanager
@@ -53,19 +52,21 @@ def created(path: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def locked(path: Path) -> Iterator[None]:
-    """Hold a folder's lock; it falls with the process, however that ends.
+def locked(path: Path) -> Iterator[str]:
+    """Hold a folder's lock, and give the id in the mark of its working folder; it falls with the process.
 
     Raises:
-        ConfigError: another run holds it.
+        ConfigError: another run holds it, or the working folder is not one of this program.
     """
+    refuse_foreign(path)
     lock = path / WORK / LOCK
     stream = _hold(lock)
     if stream is None:
         raise ConfigError(f"out={path}: another run is writing there; wait for it or choose another folder")
     try:
-        yield
+        yield marked(path)
     finally:
+        let_go(path)
         # Unlinked before it is let go: whoever waits for it finds another file there and tries again.
         with contextlib.suppress(OSError):
             lock.unlink()
@@ -106,36 +107,38 @@ def written(path: Path, *, overwrite: bool) -> Iterator[Path]:
 
     Until then whatever `path` held stays as it is, and if the run fails it stays for good.
     """
-    with created(path), locked(path):
+    with created(path), locked(path) as mark:
         refuse_taken(path, overwrite=overwrite)
         new, old = path / WORK / "new", path / WORK / "old"
         _restore(old, path)
-        shutil.rmtree(new, ignore_errors=True)
+        take_away(new)
         new.mkdir()
         try:
             yield new
+            if not is_marked(path, mark):
+                raise ConfigError(
+                    f"out={path}: {path / WORK} was exchanged during the run; run again elsewhere"
+                )
             old.mkdir()
             for entry in sorted(new.iterdir()):
                 target = path / entry.name
                 if os.path.lexists(target) and (target.is_dir() or entry.is_dir()):
                     target.rename(old / entry.name)  # only files can be replaced in one step
                 entry.replace(target)
-            for entry in (path / WORK).iterdir():
-                if entry.is_dir():  # also what an interrupted run would have gone on from
-                    shutil.rmtree(entry)
-                elif entry.name != LOCK:
-                    entry.unlink()
+            cleared(path, mark)  # also what an interrupted run would have gone on from
         except BaseException:
-            _restore(old, path)
+            if is_marked(path, mark):
+                _restore(old, path)
             raise
         finally:
-            shutil.rmtree(new, ignore_errors=True)
+            if is_marked(path, mark):
+                take_away(new)
 
 
 def _restore(old: Path, path: Path) -> None:
     """Put back the folders that an ended run had moved aside and not replaced."""
     if old.is_dir():
         for entry in old.iterdir():
-            if not (path / entry.name).exists():
+            if not os.path.lexists(path / entry.name):
                 entry.rename(path / entry.name)
-        shutil.rmtree(old, ignore_errors=True)
+        take_away(old)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -38,12 +38,14 @@ class Verb:
         reads: options that name a model, a log or another file, in the order in which they are read.
         writes: files and folders that it leaves in `out`.
         run: does it.
+        foresee: refuses, in a dry run, what `run` would refuse.
     """
 
     summary: str
     reads: tuple[str, ...]
     writes: tuple[str, ...]
     run: Callable[[Job], Answering]
+    foresee: Callable[[Job], None] | None = None
 
 
 @dataclass
@@ -66,12 +68,24 @@ class Job:
         """Return an option."""
         return self.options[key]
 
-    def model(self, log: Log | None = None, kind: str | None = None) -> GreyBox:
-        """Load the model of `model=`, driven by what the log has, thruster commands or a wrench, or by `kind`."""
+    def model(self, log: Log | None = None, kinds: Sequence[str] = ()) -> GreyBox:
+        """Load the model of `model=`, driven by what the log has, thruster commands or a wrench.
+
+        A log that has both drives the model by what the model was saved with.
+
+        Args:
+            log: the log.
+            kinds: what commands it has, where it is not in memory, that which is taken by default first.
+        """
         from auvnn.models import load
 
+        source = os.path.expanduser(str(self["model"]))
+        model = load(source)
+        if log is not None:
+            kinds = (log.kind, *(k for k in ("thrusters", "wrench") if log.drives(k) and k != log.kind))
+        if kinds and model.actuation not in kinds:
+            model = load(source, actuation=kinds[0])
         source = str(self["model"])
-        model = load(os.path.expanduser(source), actuation=log.kind if log is not None else kind)
         effects = ", ".join(model.effect_names) or "none"
         learned = "none" if model.damping is None else "six subnetworks"
         name = source if source == model.vehicle.name else f"{source}: {model.vehicle.name}"
@@ -80,8 +94,14 @@ class Job:
             self.say(f"assumed   {warning}", style="yellow")
         return model
 
-    def log(self, key: str = "log", *, repairs: bool = True) -> Log:
-        """Read the log of `log=`, or of another option, and say what was mended in it."""
+    def log(self, key: str = "log", *, repairs: bool = True, partial: bool = False) -> Log:
+        """Read the log of `log=`, or of another option, and say what was mended in it.
+
+        Args:
+            key: the option.
+            repairs: whether to say what was mended.
+            partial: whether it may lack attitude or velocities altogether.
+        """
         from auvnn.logs import Log
 
         paths = files(self.options, key)
@@ -97,8 +117,12 @@ class Job:
         names = ", ".join(map(str, paths[:5])) + (f" and {len(paths) - 5} more" if len(paths) > 5 else "")
         extent = f"{runs}, {log.samples} samples over {log.duration:.4g} s, driven by {log.kind}"
         self.say(f"{key:<9} {names}: {extent}")
+        if "force" in self.options:  # whoever fits refuses what `check` calls an error
+            log.quality().refuse_errors(bool(self["force"]))
         for repair in log.repairs if repairs else ():
             self.say(f"{repair.level:<9} {repair}", style="yellow")
+        if not partial:
+            log.refuse_unmeasured()
         return log
 
     def mapping(self) -> Path | None:

@@ -11,8 +11,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from auvnn.cli.faults import INTERRUPTED, OK, TERMINATED, Terminated, outcome
+from auvnn.cli.pages import PAGES
 from auvnn.cli.speech import complain
 from auvnn.cli.verbs import VERBS
+from auvnn.executors.safe_path import keep_safe
+from auvnn.threads import sleep_when_idle
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -38,6 +41,9 @@ def _dispatch(verb: str, rest: list[str]) -> int:
 
         print(f"auvnn {__version__}" if verb == "--version" else overview())
         return OK
+    if verb in PAGES:
+        print(PAGES[verb](rest))
+        return OK
     found = VERBS.get(verb)
     from auvnn.cli.application import run_verb
 
@@ -45,7 +51,9 @@ def _dispatch(verb: str, rest: list[str]) -> int:
 
 
 def _prepare() -> None:
-    """Let SIGTERM end a run as Ctrl-C does, let no character be unprintable, and keep libraries quiet."""
+    """Let SIGTERM end a run as Ctrl-C does, import nothing from here, print every character, keep libraries quiet."""
+    keep_safe()
+    sleep_when_idle()
 
     def end(_signal: int, _frame: Any) -> None:
         raise Terminated

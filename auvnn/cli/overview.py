@@ -25,6 +25,8 @@ effects     that diagnose looks for, and add, remove and simulate take
 vehicles    for model=, beside your own YAML file or model folder
 {_wrapped(vehicles)}
 
+pages       auvnn effects [NAME], an effect's equation and parameters; auvnn docs [PAGE], the documentation
+
 Start with: auvnn demo"""
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from auvnn.cli.dry import foreseen
 from auvnn.cli.job import Answering, Job, Verb
 
 
@@ -29,4 +30,10 @@ def _run(job: Job) -> Answering:
     return _Removal(str(job["model"]), names, left)
 
 
-VERB = Verb(summary="a model without some of its effects", reads=("model",), writes=("model/",), run=_run)
+VERB = Verb(
+    summary="a model without some of its effects",
+    reads=("model",),
+    writes=("model/",),
+    run=_run,
+    foresee=foreseen,
+)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from auvnn.answers import plain, write_text
+from auvnn.cli.dry import foreseen
 from auvnn.cli.job import Answering, Job, Verb
 
 
@@ -67,4 +68,5 @@ VERB = Verb(
     reads=("model",),
     writes=("log.parquet", "truth.json"),
     run=_run,
+    foresee=foreseen,
 )

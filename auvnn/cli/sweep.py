@@ -7,8 +7,6 @@ launchers put jobs into other processes, each leaves its exit status in a small 
 from __future__ import annotations
 
 import contextlib
-import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -20,10 +18,11 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 
 from auvnn.answers import write_text
 from auvnn.cli.compose import quoted
-from auvnn.cli.faults import FAULT
-from auvnn.cli.folder import WORK
+from auvnn.cli.faults import BAD_INPUT, FAULT
 from auvnn.cli.speech import complain
+from auvnn.cli.working import WORK, refuse_links, take_away
 from auvnn.errors import ConfigError
+from auvnn.executors.safe_path import environment, python
 
 _ENDED = "ended"
 
@@ -43,7 +42,7 @@ def note(out: Path, number: int, status: int) -> None:
 def statuses(out: Path, count: int) -> Iterator[list[int]]:
     """Give a list that holds, at the end, the exit status of each job; one that left none has failed."""
     place = out / WORK / _ENDED
-    shutil.rmtree(place, ignore_errors=True)
+    take_away(place)
     found: list[int] = []
     yield found
     for number in range(count):
@@ -51,7 +50,7 @@ def statuses(out: Path, count: int) -> Iterator[list[int]]:
             found.append(int((place / str(number)).read_text()))
         except (OSError, ValueError):
             found.append(FAULT)
-    shutil.rmtree(place, ignore_errors=True)
+    take_away(place)
 
 
 def run_jobs(verb: str, flags: Sequence[str], overrides: Sequence[str], out: Path, workers: int) -> list[int]:
@@ -77,15 +76,18 @@ def run_jobs(verb: str, flags: Sequence[str], overrides: Sequence[str], out: Pat
 
 
 def _run_job(verb: str, number: int, words: Sequence[str], out: Path) -> int:
+    try:
+        refuse_links(out, out / str(number))
+    except ConfigError as error:
+        complain(f"auvnn {verb} (job {number}): {error}")
+        return BAD_INPUT
     mine = [word for word in words if word.partition("=")[0] != "out"]
-    environment = {"OMP_NUM_THREADS": "1", **os.environ}
-    environment["PYTHONPATH"] = os.pathsep.join(p or os.getcwd() for p in sys.path)
     done = subprocess.run(
-        [sys.executable, "-m", "auvnn", verb, *mine, f"out={quoted(out / str(number))}"],
+        python("auvnn", verb, *mine, f"out={quoted(out / str(number))}"),
         capture_output=True,
         text=True,
         errors="replace",
-        env=environment,
+        env={"OMP_NUM_THREADS": "1", **environment()},
         stdin=subprocess.DEVNULL,
     )
     label = f"auvnn {verb} (job {number})"

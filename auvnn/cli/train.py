@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 from typing import Any
 
+from auvnn.cli.dry import foreseen
 from auvnn.cli.folder import WORK
 from auvnn.cli.job import Answering, Job, Verb, files
+from auvnn.cli.working import take_away
 from auvnn.errors import ConfigError
 
 
@@ -20,7 +21,8 @@ def _run(job: Job) -> Answering:
     training.model.save(job.folder / "model")
     training.write(job.folder)
     data = training.to_dict()
-    job.say(f"assumed   {data['derivative']['held_out']}")
+    said = "assumed" if job["test"] is None else "test"
+    job.say(f"{said:<9} {data['derivative']['held_out']}")
     job.warn([warning for warning in data["warnings"] if warning not in training.model.vehicle.warnings])
     job.say(f"trained   {data['metrics']['iterations']} iterations: {data['stopped']}")
     for when in ("before", "after"):
@@ -51,7 +53,7 @@ def _in_memory(job: Job) -> Any:
 
 
 def _in_parts(job: Job) -> Any:
-    from auvnn.logs.reading.portions import kind_of
+    from auvnn.logs.reading.portions import kinds_of
     from auvnn.training import train_files
 
     if job["max_duration"] is not None:
@@ -60,13 +62,13 @@ def _in_parts(job: Job) -> Any:
     test = None if job["test"] is None else files(job.options, "test")
     job.say(f"log       {len(paths)} files, read in parts by {job['workers']} workers")
     shared = {key: job[key] for key in ("workers", "executor", "address")}
-    return train_files(job.model(kind=kind_of(paths, mapping)), paths, test=test, mapping=mapping,
+    return train_files(job.model(kinds=kinds_of(paths, mapping)), paths, test=test, mapping=mapping,
                        scratch=job.out / WORK / "samples", **shared, **_options(job))  # fmt: skip
 
 
 def _options(job: Job) -> dict[str, Any]:
     if job["overwrite"] and not job["resume"]:
-        shutil.rmtree(job.checkpoint, ignore_errors=True)
+        take_away(job.checkpoint)
     same = {key: job[key] for key in ("scheme", "damping", "objective", "seed", "derivative", "force")}
     return {**same, "checkpoint": job.checkpoint, "resume": bool(job["resume"]), "progress": job.say.progress}
 
@@ -76,4 +78,5 @@ VERB = Verb(
     reads=("log", "mapping", "model", "test"),
     writes=("training.json", "model/", "report.html", "figures/"),
     run=_run,
+    foresee=foreseen,
 )

@@ -10,6 +10,7 @@ from auvnn.errors import ConfigError
 _SHOW = ("--help", "-h", "--hydra-help", "--cfg", "-c")
 _PLAIN = ("--help", "-h", "--hydra-help", "--resolve", "--multirun", "-m", "--run", "-r")
 _JOBS = ("--jobs", "-j")
+_FOLDER = ("--config-dir", "-cd")
 _VALUED = ("--cfg", "-c", "--package", "-p", "--config-dir", "-cd")
 
 
@@ -18,7 +19,7 @@ class Words:
     """The command line of one verb.
 
     Attributes:
-        flags: what Hydra is given as it stands.
+        flags: what Hydra is given as it stands; the folder of configs is not among them.
         overrides: words of the form key=value.
         shows: whether something is only to be shown.
         multirun: whether to run once for each value.
@@ -60,8 +61,12 @@ class Words:
                 value = value if glued else next(words, "")
                 if not value:
                     raise ConfigError(f"{flag} needs a value, such as --cfg job")
+                if flag in _FOLDER:
+                    if set(values) & set(_FOLDER):
+                        raise ConfigError(f"{flag}: one folder of configs can be named, not two")
+                else:
+                    flags += [flag, value]
                 values[flag] = value
-                flags += [flag, value]
             elif word in _PLAIN:
                 flags.append(word)
             else:

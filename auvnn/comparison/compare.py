@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 
 from auvnn.answers import Answer, plain
 from auvnn.checks.doubts import doubts
+from auvnn.comparison.beside import beside
 from auvnn.comparison.locate import AXES, failures, locate
 from auvnn.errors import ConfigError
 from auvnn.logs import Log
-from auvnn.metrics.one_step import OneStep, choose_derivative, one_step, scores
+from auvnn.metrics.derivative import choose_derivative
+from auvnn.metrics.one_step import OneStep, one_step, scores
 from auvnn.metrics.rollouts import HORIZONS, NAMES, Rolled, rollout_table, scale_of
 from auvnn.models import GreyBox
 from auvnn.models.excursions import region_of, words_of
+from auvnn.threads import on_one_thread
 
 Array = NDArray[np.float64]
 
@@ -42,6 +45,7 @@ class Comparison(Answer):
     regimes: dict[str, dict[str, Any]] = field(default_factory=dict)
     noise_floor: Array = field(default_factory=lambda: np.zeros(6))
     quality: Any = None
+    baseline: dict[str, Any] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
@@ -56,6 +60,7 @@ class Comparison(Answer):
             "residual_wrench",
             "failures",
             "warnings",
+            "baseline",
         )
         return plain({"schema": "auvnn/comparison/1", **{n: getattr(self, n) for n in names}})
 
@@ -66,6 +71,7 @@ class Comparison(Answer):
         return path
 
 
+@on_one_thread
 def compare(
     model: GreyBox,
     log: Log,
@@ -86,6 +92,7 @@ def compare(
         ConfigError: a horizon that is no positive number.
     """
     wanted = tuple(_horizon(h) for h in horizons)
+    log.refuse_unmeasured()
     how = choose_derivative(log, derivative)
     parts = one_step(model, log, how)
     scale = scale_of(log)
@@ -119,6 +126,7 @@ def compare(
         located,
         noise,
         None,
+        beside(rolled, model.actuation, scale, log, how),
     )
 
 

@@ -67,7 +67,7 @@ def locate(log: Log, parts: list[OneStep]) -> dict[str, dict[str, Any]]:
             edges = np.unique(np.quantile(x[good], np.linspace(0, 1, BINS + 1)))
         if len(edges) < 3:
             continue
-        index = np.clip(np.digitize(x[good], edges[1:-1]), 0, len(edges) - 2)
+        index = _bins(x[good], edges)
         count = np.bincount(index, minlength=len(edges) - 1)
         total = np.stack(
             [np.bincount(index, weights=wrench[good, k] ** 2, minlength=len(edges) - 1) for k in range(6)]
@@ -80,6 +80,27 @@ def locate(log: Log, parts: list[OneStep]) -> dict[str, dict[str, Any]]:
                 "count": count,
             }
     return found
+
+
+def members(run: Run, located: dict[str, Any], name: str, number: int) -> NDArray[np.bool_]:
+    """Return which samples of a run lie in one bin of one regime, (N,).
+
+    Args:
+        run: the run.
+        located: what `locate` returned, for the edges.
+        name: of the regime.
+        number: of the bin, from 0.
+    """
+    x = regimes(run)[name]
+    good = np.isfinite(x)
+    inside = np.zeros(len(x), dtype=bool)
+    inside[good] = _bins(x[good], np.asarray(located[name]["edges"], dtype=float)) == number
+    return inside
+
+
+def _bins(x: Array, edges: Array) -> NDArray[np.intp]:
+    """Return the number of each value's bin; what lies outside all counts to the nearest."""
+    return np.clip(np.digitize(x, edges[1:-1]), 0, len(edges) - 2)
 
 
 def failures(

@@ -8,7 +8,8 @@ import torch
 from torch import Tensor
 from torch._decomp import decomposition_table
 
-from auvnn.compiled.operations import RULES, aten
+from auvnn.compiled.elementwise import aten
+from auvnn.compiled.operations import RULES
 from auvnn.compiled.recorder import CannotCompile, Recorder, tensors
 
 # Move elements without computing: done by torch itself on the nodes' numbers; what they fill in is zero, node 0.

@@ -15,11 +15,14 @@ import tempfile
 import time
 from pathlib import Path
 
+from auvnn.compiled import kept
 from auvnn.compiled.recorder import CannotCompile
 
 FLAGS = ("-O2", "-std=gnu11", "-march=native", "-fPIC", "-shared", "-fno-math-errno", "-fno-trapping-math")
 MOST = 256
 """Kernels that are kept; the ones that were not used for longest make room."""
+LEFT = 86400.0
+"""Seconds after which what a killed process left in the folder goes."""
 TIMEOUT = 180.0
 """Seconds after which a compiler is given up."""
 
@@ -30,11 +33,13 @@ def compiler() -> str | None:
     AUVNN_CC=none says to do without.
     """
     named = os.environ.get("AUVNN_CC") or os.environ.get("CC")
-    for name in [named] if named else ["cc", "gcc", "clang"]:
-        found = shutil.which(name)
-        if found:
-            return found
-    return None
+    if named:
+        return shutil.which(named)
+    # A relative folder in PATH would be one of whoever gave us the current folder.
+    path = os.pathsep.join(
+        p for p in os.environ.get("PATH", os.defpath).split(os.pathsep) if os.path.isabs(p)
+    )
+    return next((found for name in ("cc", "gcc", "clang") if (found := shutil.which(name, path=path))), None)
 
 
 def cache_folder() -> Path:
@@ -75,7 +80,7 @@ def key(source: str, lanes: int) -> str:
 
 def is_kept(source: str, lanes: int) -> bool:
     """Return whether the code of a source is there already."""
-    return (cache_folder() / f"{key(source, lanes)}.so").is_file()
+    return kept.looks_sound(cache_folder() / f"{key(source, lanes)}.so")
 
 
 def build(source: str, lanes: int) -> tuple[ctypes.CDLL, float]:
@@ -88,37 +93,35 @@ def build(source: str, lanes: int) -> tuple[ctypes.CDLL, float]:
     command = compiler()
     assert command is not None
     folder = cache_folder()
-    try:
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        status = folder.stat()
-        if hasattr(os, "getuid") and (status.st_uid != os.getuid() or status.st_mode & 0o022):
-            raise CannotCompile(
-                f"{folder} can be written by others, who could put code there: make it private"
-            )
-    except OSError as error:
-        raise CannotCompile(f"the cache folder {folder} cannot be made: {error.strerror}") from None
+    kept.private(folder)
     target, spent = folder / f"{name}.so", 0.0
-    if not target.is_file():
-        begin = time.perf_counter()
-        _compile(command, source, lanes, target)
-        spent = time.perf_counter() - begin
-        _make_room(folder)
     try:
-        loaded = ctypes.CDLL(str(target))
-        with contextlib.suppress(OSError):
-            os.utime(target)  # when it was used last
-        return loaded, spent
+        loaded = kept.load(target)
+        if loaded is None:
+            begin = time.perf_counter()
+            _compile(command, source, lanes, target)
+            spent = time.perf_counter() - begin
+            _make_room(folder)
+            loaded = kept.load(target)
     except OSError as error:
-        target.unlink(missing_ok=True)
+        kept.forget(target)
         raise CannotCompile(f"compiled code cannot be loaded: {error}") from None
+    if loaded is None:
+        raise CannotCompile(f"{target}: is not what was compiled a moment ago; make {folder} private")
+    with contextlib.suppress(OSError):
+        os.utime(target)  # when it was used last
+    return loaded, spent
 
 
 def _make_room(folder: Path) -> None:
     """Remove what was not used for longest; another process may be at the same."""
     with contextlib.suppress(OSError):
-        kept = sorted(folder.glob("*.so"), key=lambda f: f.stat().st_mtime)
-        for old in kept[:-MOST]:
-            old.unlink(missing_ok=True)
+        there = sorted(folder.glob("*.so"), key=lambda f: f.lstat().st_mtime)
+        for old in there[:-MOST]:
+            kept.forget(old)
+        for left in (*folder.glob(".loading-*"), *folder.glob("making-*")):
+            if time.time() - left.lstat().st_mtime > LEFT:  # of a process that was killed
+                shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
 
 
 def _compile(command: str, source: str, lanes: int, target: Path) -> None:
@@ -137,8 +140,7 @@ def _compile(command: str, source: str, lanes: int, target: Path) -> None:
             if done.returncode:
                 first = next((line for line in done.stderr.splitlines() if "error" in line), "no message")
                 raise CannotCompile(f"{command} failed: {first.strip()[-200:]}")
-            os.chmod(made, 0o700)
-            os.replace(made, target)
+            kept.keep(made, target)
     except subprocess.TimeoutExpired:
         raise CannotCompile(f"{command} took longer than {TIMEOUT:g} s") from None
     except OSError as error:

@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
 
 from auvnn.checks.doubts import doubts
+from auvnn.comparison.beside import stands
 from auvnn.diagnosis.answers.answer import Diagnosis
-from auvnn.diagnosis.hypotheses.candidates import candidates_for, windows_for
+from auvnn.diagnosis.answers.tolerance import Tolerance
+from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.diagnosis.hypotheses.layout import lay_out
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
 from auvnn.diagnosis.noise_law.answer import beside_what_is_left
-from auvnn.diagnosis.search import Search
+from auvnn.diagnosis.search import search
+from auvnn.diagnosis.stages.runaway import windows_that_hold
+from auvnn.diagnosis.stages.state import Searched, Setting
 from auvnn.errors import ConfigError, InputError
+from auvnn.estimation.normal_equations import TRUST, motion
+from auvnn.estimation.prediction_error import SINGULAR
 from auvnn.logs import Log
+from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
+from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
 
 LEARNED = (
@@ -22,6 +34,7 @@ LEARNED = (
 )
 
 
+@on_one_thread
 def diagnose(
     model: GreyBox,
     log: Log,
@@ -33,6 +46,8 @@ def diagnose(
     whiteness: bool = True,
     stochastic: bool = False,
     force: bool = False,
+    tolerance: Any = None,
+    costs: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """Say which physical effects a model lacks, by a log.
@@ -52,6 +67,10 @@ def diagnose(
         stochastic: where a force is left, also ask how commands go between samples, and for effects beside a stochastic
             force whose law is estimated; takes as long again or longer.
         force: go on with a log that contradicts itself: signs, units, axes.
+        tolerance: what does not matter: a number for the cost in free running, with a fifth of it for the force as a
+            share of the actuators', or a mapping with `cost` and `force`; by default 0.1 and 0.02. At 0 everything
+            matters that is there.
+        costs: also work out what each name costs in free running, which takes about as long as naming it.
         progress: told in words what is being done.
 
     Raises:
@@ -68,6 +87,8 @@ def diagnose(
         whiteness=whiteness,
         stochastic=stochastic,
         force=force,
+        tolerance=tolerance,
+        costs=costs,
         progress=progress,
     )[0]
 
@@ -83,29 +104,48 @@ def searched(
     whiteness: bool = True,
     stochastic: bool = False,
     force: bool = False,
+    tolerance: Any = None,
+    costs: bool = True,
     progress: Callable[[str], None] | None = None,
-) -> tuple[Diagnosis, Search]:
+) -> tuple[Diagnosis, Searched]:
     """Return what `diagnose` does, and the search that led to it."""
     say = progress or (lambda words: None)
     if max_effects < 1:
         raise ConfigError(f"max_effects={max_effects} must be at least 1")
     usable, needs = candidates_for(model, log, effects)
     log.quality().refuse_contradictions(force)
-    windows = windows_for(model, log, window)
-    if len(windows) < 4:
-        cure = "record a longer log" if window is None else "choose a shorter window, or record a longer log"
-        raise InputError(f"{log.name} gives only {len(windows)} windows of free running: {cure}")
+    allowed = Tolerance.of(tolerance)
     # What subnetworks have swallowed leaves no residual: only what drag can be is kept of them.
     known, spread = with_drag_only(model, log)
+    windows, notes = windows_that_hold(known, log, window)
     layout = lay_out(known, usable, spread)
-    search = Search(layout, windows, usable, say, advice, whiteness)
-    found = search.run(model, log, needs, max_effects)
-    if stochastic:
-        found, search = beside_what_is_left(found, search, model, log, needs, max_effects)
-    if spread is not None:
-        found.warnings.append(LEARNED)
-    found.absorbed = confounded_effects(model, log)
-    if found.absorbed is not None:
-        found.warnings += found.absorbed.words()
-    found.warnings += doubts(model, log)
-    return found, search
+    absorbed = confounded_effects(model, log)
+    notes += [] if spread is None else [LEARNED]
+    notes += [] if absorbed is None else absorbed.words()
+    asked = Setting(
+        model=model,
+        log=log,
+        layout=layout,
+        usable=tuple(usable),
+        needs=needs,
+        base=tuple(n for n in layout.names if n not in usable or n in layout.nuisance),
+        floor=TRUST * motion(windows) + 1e-9,
+        most=max_effects,
+        tolerance=allowed,
+        costs=costs,
+        advice=advice,
+        whiteness=whiteness,
+        absorbed=absorbed,
+        notes=(*notes, *doubts(model, log)),
+        say=say,
+    )
+    try:
+        found, under_way = search(asked, windows)
+        if stochastic:
+            found, under_way = beside_what_is_left(found, under_way)
+    except (np.linalg.LinAlgError, SINGULAR) as problem:
+        raise InputError(
+            f"{log.name} cannot be diagnosed with {model.vehicle.name}: free running grows without bound, so that the "
+            f"sums of its tests cannot be solved ({problem}); choose shorter windows with window=, and check the model"
+        ) from None
+    return replace(found, baseline=stands(model, log, choose_derivative(log))), under_way

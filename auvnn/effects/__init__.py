@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 from auvnn.catalogue import Catalogue
 
 if TYPE_CHECKING:
-    from auvnn.effects.base import HOOKS, Body, Effect, Extent, Moment, Parameter, Response, Sensed
+    from auvnn.effects.base import HOOKS, Effect
+    from auvnn.effects.hooks import Body, Extent, Moment, Parameter, Response, Sensed
 
 EFFECTS = Catalogue(
     "effect",
@@ -23,6 +24,7 @@ EFFECTS = Catalogue(
         "trapped_water": "auvnn.effects.trapped_water:TrappedWater",
         "linear_damping": "auvnn.effects.linear_damping:LinearDamping",
         "quadratic_damping": "auvnn.effects.quadratic_damping:QuadraticDamping",
+        "drag_curve": "auvnn.effects.drag_curve:DragCurve",
         "coupled_damping": "auvnn.effects.coupled_damping:CoupledDamping",
         "cross_flow_drag": "auvnn.effects.cross_flow_drag:CrossFlowDrag",
         "body_lift": "auvnn.effects.body_lift:BodyLift",
@@ -40,9 +42,13 @@ EFFECTS = Catalogue(
         "tilted_vertical": "auvnn.effects.tilted_vertical:TiltedVertical",
         "actuation_delay": "auvnn.effects.actuation_delay:ActuationDelay",
         "thrust_inflow_loss": "auvnn.effects.thrust_inflow_loss:ThrustInflowLoss",
+        "thrust_advance": "auvnn.effects.thrust_advance:ThrustAdvance",
         "voltage_droop": "auvnn.effects.voltage_droop:VoltageDroop",
         "propeller_torque": "auvnn.effects.propeller_torque:PropellerTorque",
         "fin_stall": "auvnn.effects.fin_stall:FinStall",
+        "fin_gain": "auvnn.effects.fin_gain:FinGain",
+        "fin_offset": "auvnn.effects.fin_offset:FinOffset",
+        "fin_drag": "auvnn.effects.fin_drag:FinDrag",
         "tether": "auvnn.effects.tether:Tether",
         "constant_force": "auvnn.effects.constant_force:ConstantForce",
         "gyro_bias": "auvnn.effects.gyro_bias:GyroBias",

@@ -8,7 +8,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter, Sensed
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Parameter, Sensed
 from auvnn.physics.attitude import euler_to_quat, quat_rotate_inverse
 
 
@@ -24,6 +25,9 @@ class AccelerometerTilt(Effect):
     cause = "the accelerometer is mounted askew"
     symbol = "R_a"
     reference = "Fossen (2011), section 11.5; Titterton and Weston (2004), chapter 12"
+    confused_with = ("constant_force", "cg_offset")
+    manoeuvre = "rotation"
+    told_apart_by = "static angles of roll and pitch"
     channels = ("du", "dv", "dw")
 
     @classmethod

@@ -6,7 +6,8 @@ from typing import Any
 
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Parameter
 
 
 class ActuationDelay(Effect):
@@ -21,6 +22,9 @@ class ActuationDelay(Effect):
     cause = "the thrust comes a fixed time after its command"
     symbol = "T_d"
     reference = "Ljung (1999), System Identification, section 4.2"
+    confused_with = ("thruster_lag", "added_mass")
+    manoeuvre = "chirp"
+    told_apart_by = "steps and swept sines"
     plainer = ("thruster_lag",)
 
     @classmethod

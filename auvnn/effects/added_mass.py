@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from auvnn.effects.base import Body, Moment, axis_scale
+from auvnn.effects.base import axis_scale
 from auvnn.effects.factors import AxisFactors
+from auvnn.effects.hooks import Body, Moment
 
 
 class AddedMass(AxisFactors):
@@ -16,6 +17,11 @@ class AddedMass(AxisFactors):
     cause = "the added mass is not the nominal one"
     symbol = "M_A"
     reference = "Fossen (2011), chapter 6"
+    confused_with = ("trapped_water", "thruster_lag", "actuation_delay", "thruster_gain")
+    manoeuvre = "chirp"
+    told_apart_by = (
+        "swept sines: inertia grows with the square of the frequency, a lag does not depend on the amplitude"
+    )
 
     def body(self, body: Body, moment: Moment | None) -> Body:
         """Scale the added mass."""

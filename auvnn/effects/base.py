@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,163 +10,12 @@ import torch
 from torch import Tensor, nn
 
 from auvnn.catalogue import unknown_name
+from auvnn.effects.hooks import Body, Extent, Moment, Parameter, Response, Sensed
 from auvnn.errors import ConfigError
 
 AXES = ("X", "Y", "Z", "K", "M", "N")
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One physical parameter of an effect.
-
-    Attributes:
-        name: as in the public contract.
-        unit: SI; "1" for a pure number.
-        null: the value at which the effect vanishes exactly (all parameters at their null).
-        scale: a plausible size of the departure from the null: the prior's standard deviation.
-        low: smallest admissible value.
-        high: largest admissible value.
-        probes: values at which to linearise instead, where the slope at the null says nothing.
-        shape: whether it says how the effect acts and not how much (an onset, a frequency, a place): with all
-            others at their nulls the effect vanishes whatever its value, so that nothing tells it there.
-    """
-
-    name: str
-    unit: str
-    null: float
-    scale: float
-    low: float
-    high: float
-    probes: tuple[float, ...] = ()
-    shape: bool = False
-
-
-@dataclass(frozen=True)
-class Extent:
-    """How far a log reaches: what the starting values of shapes depend on.
-
-    Attributes:
-        begin: earliest time, s.
-        duration: from there to the latest time, s.
-        longest: duration of the longest run, s.
-        distance: median and largest distance from the origin of the positions, m; zeros without positions.
-    """
-
-    begin: float
-    duration: float
-    longest: float
-    distance: tuple[float, float] = (0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class Body:
-    """What the body is at one moment; tensors in SI, leading shapes broadcast against the state's.
-
-    Attributes:
-        mass: kg.
-        weight: N.
-        buoyancy: N.
-        cg: centre of gravity from the body origin, m, (..., 3).
-        cb: centre of buoyancy, m, (..., 3).
-        inertia: about the centre of gravity, kg m2, (..., 3, 3).
-        added_mass: (..., 6, 6), positive for ordinary bodies.
-        linear: linear damping, (..., 6, 6), or None.
-        quadratic: quadratic damping, (..., 6, 6), or None.
-        element_linear: linear coefficients of displaced elements, (..., e, 6), or None.
-        element_quadratic: quadratic coefficients of displaced elements, (..., e, 6), or None.
-        weight_centre: where the weight acts, m, (..., 3), where that is not the centre of gravity: mass that weighs
-            nothing in water moves the one and not the other. None is the centre of gravity.
-    """
-
-    mass: Tensor
-    weight: Tensor
-    buoyancy: Tensor
-    cg: Tensor
-    cb: Tensor
-    inertia: Tensor
-    added_mass: Tensor
-    linear: Tensor | None
-    quadratic: Tensor | None
-    element_linear: Tensor | None
-    element_quadratic: Tensor | None
-    weight_centre: Tensor | None = None
-
-    @property
-    def hangs(self) -> Tensor:
-        """Where the weight acts, m, (..., 3)."""
-        return self.cg if self.weight_centre is None else self.weight_centre
-
-    def hung(self, weight: Tensor, at: Tensor) -> Body:
-        """Return the same body with a further weight, N, that acts at a point, m, (..., 3)."""
-        total = self.weight + weight
-        centre = self.hangs + (weight / total).unsqueeze(-1) * (at - self.hangs)
-        return replace(self, weight=total, weight_centre=centre)
-
-    def but(self, **changes: Tensor) -> Body:
-        """Return the same body with some of its properties changed."""
-        return replace(self, **changes)
-
-
-@dataclass(frozen=True)
-class Moment:
-    """What a hook may know of the moment: state and inputs, (..., size) in SI, NED and FRD.
-
-    Attributes:
-        time: s since the start of the run, (...).
-        position: NED, m, (..., 3).
-        rotation: body to NED, (..., 3, 3).
-        nu: velocity of the body origin over ground, (..., 6).
-        nu_r: velocity through the water, (..., 6); equal to `nu` inside `water`.
-        nu_c_dot: acceleration of the water in body axes, (..., 6); zero inside `water`.
-        command: what was commanded over this interval, (..., n).
-        fins: fin angles, rad, (..., m), or None.
-        voltage: V, (...), or None.
-        altitude: m, (...), or None.
-        thrust: what the actuators give, N (or the wrench, where it is commanded), (..., n); in `wrench` only.
-        drag: everything that resists motion through the water, damping subnetworks included, as a wrench on
-            the body, N and N m, (..., 6); in `wrench` only.
-    """
-
-    time: Tensor
-    position: Tensor
-    rotation: Tensor
-    nu: Tensor
-    nu_r: Tensor
-    nu_c_dot: Tensor
-    command: Tensor
-    fins: Tensor | None = None
-    voltage: Tensor | None = None
-    altitude: Tensor | None = None
-    thrust: Tensor | None = None
-    drag: Tensor | None = None
-
-
-@dataclass(frozen=True)
-class Sensed:
-    """What sensors report, (..., size): position NED m, quaternion, velocity, its derivative or None."""
-
-    position: Tensor
-    quaternion: Tensor
-    nu: Tensor
-    nu_dot: Tensor | None = None
-
-
-@dataclass(frozen=True)
-class Response:
-    """An actuator's answer to a constant demand over one step, N, (..., n) each.
-
-    Attributes:
-        end: thrust at the end of the step.
-        mean: its average over the step.
-        slope: rise over the step of the straight line with the same mean and first moment, so that an
-            integrator that sees only this line gets impulse and timing right, however short the lag.
-        start: thrust just after the step began.
-    """
-
-    end: Tensor
-    mean: Tensor
-    slope: Tensor
-    start: Tensor
+# Standard deviation, in scales, of a parameter that is stated to be exact: what is not nought can be divided by.
+EXACT = 1e-6
 
 
 class Effect(nn.Module):
@@ -190,6 +38,9 @@ class Effect(nn.Module):
     `plainer` names effects that explain the same trace more plainly wherever a log does not reach far enough to
     tell them apart: a current that is the same at all depths, where the depth hardly changes. The effect is then
     given as one of a group, never alone.
+
+    `remembers` says that `command` depends on earlier commands through one state per command; `follow` and `advance`
+    then state the same in continuous time and for one held command.
     """
 
     name: ClassVar[str]
@@ -198,10 +49,17 @@ class Effect(nn.Module):
     reference: ClassVar[str]
     channels: ClassVar[tuple[str, ...]] = ()
     excludes: ClassVar[tuple[str, ...]] = ()
+    # For people: effects that leave a similar trace, and the manoeuvre (configs/excitation) that tells them apart.
+    confused_with: ClassVar[tuple[str, ...]] = ()
+    manoeuvre: ClassVar[str] = ""
+    told_apart_by: ClassVar[str] = ""
     plainer: ClassVar[tuple[str, ...]] = ()
     time_varying: ClassVar[bool] = False
+    remembers: ClassVar[bool] = False
 
     theta: nn.Parameter
+    # Standard deviations by parameter, as they were stated or fitted; of what is not in it the default holds.
+    uncertainty: dict[str, float]
 
     def __init__(self, parameters: tuple[Parameter, ...], values: Mapping[str, float] | None = None) -> None:
         """Keep the parameters' descriptions and start them at `values`, the rest at their nulls.
@@ -212,6 +70,7 @@ class Effect(nn.Module):
         super().__init__()
         self.parameters_of = parameters
         self._index = {p.name: i for i, p in enumerate(parameters)}
+        self.uncertainty = {}
         start = [p.null for p in parameters]
         for key, value in (values or {}).items():
             if key not in self._index:
@@ -301,6 +160,37 @@ class Effect(nn.Module):
         """Return one parameter as a scalar tensor."""
         return self.theta[self._index[name]]
 
+    def state_uncertainty(self, given: Mapping[str, Any]) -> None:
+        """Keep the standard deviations of some parameters, in their units.
+
+        Raises:
+            ConfigError: a name is unknown, or a value is no number from nought up.
+        """
+        for key, value in given.items():
+            if key not in self._index:
+                raise ConfigError(unknown_name(f"parameter of {self.name}", str(key), self._index))
+            good = (
+                isinstance(value, (int, float))
+                and not isinstance(value, bool)
+                and 0.0 <= value < float("inf")
+            )
+            if not good:
+                raise ConfigError(
+                    f"{self.name}.uncertainty.{key} = {value!r}: a standard deviation, a number from 0 up, is needed"
+                )
+            self.uncertainty[str(key)] = float(value)
+
+    def standard_deviations(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Return how uncertain each parameter is, (p,): as stated, else a tenth of its value or of its scale.
+
+        The larger of the two; a parameter that is stated to be exact keeps a millionth of its scale.
+        """
+        out = []
+        for p, value in self.values().items():
+            scale = self.parameters_of[self._index[p]].scale
+            out.append(max(self.uncertainty.get(p, max(0.1 * abs(value), 0.1 * scale)), EXACT * scale))
+        return np.array(out)
+
     def absent(self) -> bool:
         """Return whether the effect is at its null, whatever its shape, and so does nothing."""
         null = torch.tensor([p.null for p in self.parameters_of], dtype=torch.float64)
@@ -323,6 +213,14 @@ class Effect(nn.Module):
     def command(self, command: Tensor, times: Tensor) -> Tensor:
         """Change the commands of a stretch: (..., T, n) held from `times` (..., T), to the same shape."""
         return command
+
+    def follow(self, state: Tensor, command: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the changed command and the rate of the state, (..., n) each; settled, the state is the command."""
+        return command, torch.zeros_like(state)
+
+    def advance(self, state: Tensor, command: Tensor, step: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the changed command, its mean while one is held for `step` seconds (..., 1), and the state after."""
+        return command, state
 
     def delay(self) -> Tensor:
         """Return by how many seconds the thrust comes after its command, a scalar, not negative."""

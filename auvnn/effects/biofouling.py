@@ -6,7 +6,8 @@ from typing import Any
 
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 
 
 class Biofouling(Effect):
@@ -21,6 +22,9 @@ class Biofouling(Effect):
     cause = "drag grows with time"
     symbol = "k_f"
     reference = "Schultz et al. (2015), Biofouling 31; Anderlini et al. (2021), IEEE JOE"
+    confused_with = ("voltage_droop", "quadratic_damping")
+    manoeuvre = "coast_down"
+    told_apart_by = "the same coast-down repeated early and late"
     plainer = ("quadratic_damping",)
 
     @classmethod

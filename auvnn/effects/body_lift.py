@@ -7,7 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 from auvnn.effects.sizes import volume
 
 
@@ -24,6 +25,9 @@ class BodyLift(Effect):
     cause = "the hull gives lift at an angle to the flow"
     symbol = "Y_uv"
     reference = "Prestero (2001), body lift; Hoerner and Borst (1985), Fluid-Dynamic Lift"
+    confused_with = ("munk_moment", "coupled_damping")
+    manoeuvre = "oblique"
+    told_apart_by = "steady speed at several angles of drift and attack"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

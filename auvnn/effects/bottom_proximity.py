@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from torch import Tensor
 
-from auvnn.effects.base import Moment
+from auvnn.effects.hooks import Moment
 from auvnn.effects.proximity import Proximity
 
 
@@ -19,6 +19,9 @@ class BottomProximity(Proximity):
     cause = "added mass and drag grow near the bottom"
     symbol = "f(h)"
     reference = "Lamb (1932), section 137; Korotkin (2009), Added Masses of Ship Structures"
+    confused_with = ("surface_proximity", "net_buoyancy")
+    manoeuvre = "dives"
+    told_apart_by = "the same commands at several heights above the bottom"
     plainer = ("added_mass",)
     channels = ("altitude",)
 

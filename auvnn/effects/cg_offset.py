@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 
 
 class CgOffset(Effect):
@@ -17,6 +18,9 @@ class CgOffset(Effect):
     cause = "the centre of gravity is elsewhere"
     symbol = "r_g"
     reference = "Fossen (2011), section 4.1"
+    confused_with = ("payload", "net_buoyancy", "constant_force")
+    manoeuvre = "rotation"
+    told_apart_by = "static angles of roll and pitch with the thrusters off"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

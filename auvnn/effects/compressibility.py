@@ -7,7 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 from auvnn.physics.restoring import restoring_force
 
 
@@ -23,6 +24,9 @@ class Compressibility(Effect):
     cause = "buoyancy changes with depth"
     symbol = "dB/dz"
     reference = "Fossen (2011), section 4.1"
+    confused_with = ("net_buoyancy", "current_shear")
+    manoeuvre = "dives"
+    told_apart_by = "slow dives over the whole range of depths"
     plainer = ("net_buoyancy",)
     channels = ("z",)
 

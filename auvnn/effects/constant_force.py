@@ -6,7 +6,8 @@ from typing import Any
 
 from torch import Tensor
 
-from auvnn.effects.base import AXES, Body, Effect, Moment, Parameter
+from auvnn.effects.base import AXES, Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 
 
 class ConstantForce(Effect):
@@ -19,6 +20,9 @@ class ConstantForce(Effect):
     cause = "a constant force or moment acts in body axes"
     symbol = "b"
     reference = "Fossen (2011), section 8.1"
+    confused_with = ("net_buoyancy", "cg_offset", "ocean_current", "thruster_gain")
+    manoeuvre = "reciprocal"
+    told_apart_by = "legs on several headings, and drifting without thrust"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -8,7 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import AXES, Body, Effect, Moment, Parameter
+from auvnn.effects.base import AXES, Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 from auvnn.effects.sizes import translational_drag
 
 SPEEDS = "uvwpqr"
@@ -28,6 +29,9 @@ class CoupledDamping(Effect):
     cause = "drag in one degree of freedom acts in another"
     symbol = "D_ij"
     reference = "Fossen (2011), section 6.4; Prestero (2001)"
+    confused_with = ("body_lift", "cross_flow_drag", "cg_offset")
+    manoeuvre = "oblique"
+    told_apart_by = "steady motion at 0, 30, 60 and 90 degrees of drift"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -8,7 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 from auvnn.effects.sizes import translational_drag
 
 STRIPS = 8
@@ -28,6 +29,9 @@ class CrossFlowDrag(Effect):
     cause = "sideways drag is spread along the hull"
     symbol = "C_d2D"
     reference = "Faltinsen (1990), chapter 6; Fossen (2011), section 6.4"
+    confused_with = ("coupled_damping", "quadratic_damping")
+    manoeuvre = "oblique"
+    told_apart_by = "sideways motion with and without turning"
     plainer = ("quadratic_damping",)
 
     @classmethod

@@ -7,7 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Moment, Parameter
 
 
 class CurrentShear(Effect):
@@ -21,6 +22,9 @@ class CurrentShear(Effect):
     cause = "the current changes with depth"
     symbol = "dv_c/dz"
     reference = "DNV-RP-C205 (2010), section 4"
+    confused_with = ("ocean_current", "velocity_scale")
+    manoeuvre = "dives"
+    told_apart_by = "legs at several depths and headings"
     plainer = ("ocean_current",)
     channels = ("z",)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from auvnn.effects.base import AXES, Body, Effect, Moment, Parameter, axis_scale
+from auvnn.effects.base import AXES, Effect, axis_scale
+from auvnn.effects.hooks import Body, Moment, Parameter
 
 
 def actuators(vehicle: Any, actuation: str) -> tuple[str, ...]:

@@ -8,7 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 from auvnn.physics.fins import fin_frame, fin_wrench
 
 
@@ -22,6 +23,9 @@ class FinStall(Effect):
     cause = "the fins stall at another angle"
     symbol = "alpha_0"
     reference = "Beard and McLain (2012), Small Unmanned Aircraft, section 4.2"
+    confused_with = ("body_lift",)
+    manoeuvre = "survey"
+    told_apart_by = "large fin angles at constant speed"
     channels = ("fin_1",)
 
     @classmethod

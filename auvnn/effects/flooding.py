@@ -7,7 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 
 
 class Flooding(Effect):
@@ -22,6 +23,9 @@ class Flooding(Effect):
     cause = "water leaks into the hull"
     symbol = "m_dot"
     reference = "Fossen (2011), sections 3.3 and 4.1"
+    confused_with = ("payload", "net_buoyancy")
+    manoeuvre = "survey"
+    told_apart_by = "a long run with the same legs early and late"
     plainer = ("net_buoyancy",)
     time_varying = True
 

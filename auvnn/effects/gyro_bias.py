@@ -8,7 +8,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter, Sensed
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Parameter, Sensed
 
 
 class GyroBias(Effect):
@@ -21,6 +22,9 @@ class GyroBias(Effect):
     cause = "the gyroscope has a bias"
     symbol = "b_g"
     reference = "Fossen (2011), section 11.5"
+    confused_with = ("velocity_lever_arm",)
+    manoeuvre = "survey"
+    told_apart_by = "lying still, then turning both ways"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -6,7 +6,8 @@ from typing import Any
 
 import torch
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 
 
 class InertiaFactors(Effect):

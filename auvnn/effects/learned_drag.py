@@ -7,7 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import AXES, Body, Effect, Moment, Parameter
+from auvnn.effects.base import AXES, Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 from auvnn.physics.products import matvec
 
 SPEEDS = "uvwpqr"

@@ -15,4 +15,7 @@ class LinearDamping(DampingFactors):
     cause = "the linear damping is not the nominal one"
     symbol = "D_L"
     reference = "Fossen (2011), section 6.4"
+    confused_with = ("quadratic_damping", "thruster_gain", "thrust_inflow_loss")
+    manoeuvre = "coast_down"
+    told_apart_by = "coasting without thrust over at least four to one in speed"
     damping = "linear"

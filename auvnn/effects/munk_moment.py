@@ -7,7 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 
 
 class MunkMoment(Effect):
@@ -22,6 +23,9 @@ class MunkMoment(Effect):
     cause = "the Munk moment is not the ideal one"
     symbol = "k_M"
     reference = "Munk (1924), NACA 184; Newman (1977), section 4.13"
+    confused_with = ("body_lift", "added_mass")
+    manoeuvre = "rotation"
+    told_apart_by = "turning at zero speed, then runs at an angle of drift"
     plainer = ("added_mass",)
 
     @classmethod

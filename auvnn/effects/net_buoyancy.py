@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 
 
 class NetBuoyancy(Effect):
@@ -17,6 +18,9 @@ class NetBuoyancy(Effect):
     cause = "weight and buoyancy differ from the model's"
     symbol = "B - W"
     reference = "Fossen (2011), section 4.1"
+    confused_with = ("payload", "compressibility", "constant_force", "tether")
+    manoeuvre = "rotation"
+    told_apart_by = "free ascent or descent, and large angles of roll and pitch"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -6,7 +6,8 @@ from typing import Any
 
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Moment, Parameter
 
 
 class OceanCurrent(Effect):
@@ -20,6 +21,11 @@ class OceanCurrent(Effect):
     cause = "the water moves over ground"
     symbol = "v_c"
     reference = "Fossen (2011), Handbook of Marine Craft Hydrodynamics and Motion Control, section 8.3"
+    confused_with = ("constant_force", "tether", "velocity_misalignment", "current_shear")
+    manoeuvre = "reciprocal"
+    told_apart_by = (
+        "the same speed on three headings or more: what comes from the water turns with the heading"
+    )
     channels = ("psi",)
 
     @classmethod

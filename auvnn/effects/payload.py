@@ -8,7 +8,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import AXES, Body, Effect, Extent, Moment, Parameter
+from auvnn.effects.base import AXES, Effect
+from auvnn.effects.hooks import Body, Extent, Moment, Parameter
 from auvnn.physics.restoring import restoring_force
 
 GRASP = 0.3
@@ -34,6 +35,9 @@ class Payload(Effect):
     cause = "a load is picked up at some time"
     symbol = "m_p"
     reference = "Van de Ven et al. (2004), section 5; Fossen (2011), section 3.3"
+    confused_with = ("net_buoyancy", "cg_offset", "flooding")
+    manoeuvre = "multisine"
+    told_apart_by = "the same motion before and after the load is taken, turning included"
     plainer = ("net_buoyancy",)
     time_varying = True
 

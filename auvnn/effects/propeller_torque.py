@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 from auvnn.physics.products import matvec
 
 
@@ -23,6 +24,9 @@ class PropellerTorque(Effect):
     cause = "the propellers' torque turns the vehicle about their axes"
     symbol = "Q/T"
     reference = "Prestero (2001); Fossen (2011), section 9.1"
+    confused_with = ("cg_offset", "constant_force")
+    manoeuvre = "pulses"
+    told_apart_by = "pushes of single thrusters, forward and in reverse"
 
     @classmethod
     def lacks(cls, vehicle: Any, actuation: str) -> tuple[str, ...]:

@@ -7,7 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 from auvnn.effects.sizes import radius
 from auvnn.physics.products import matvec
 

@@ -8,7 +8,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import AXES, Body, Effect, Moment, Parameter
+from auvnn.effects.base import AXES, Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 from auvnn.effects.sizes import full_wrench
 from auvnn.errors import ConfigError
 

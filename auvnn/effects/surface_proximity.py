@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from torch import Tensor
 
-from auvnn.effects.base import Moment
+from auvnn.effects.hooks import Moment
 from auvnn.effects.proximity import Proximity
 
 
@@ -19,6 +19,9 @@ class SurfaceProximity(Proximity):
     cause = "added mass and drag fall near the surface"
     symbol = "f(z)"
     reference = "Faltinsen (1990), Sea Loads on Ships and Offshore Structures, chapter 3"
+    confused_with = ("bottom_proximity", "net_buoyancy")
+    manoeuvre = "dives"
+    told_apart_by = "the same commands at several depths below the surface"
     plainer = ("added_mass",)
     channels = ("z",)
     sign = -1.0

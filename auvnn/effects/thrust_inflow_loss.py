@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Moment, Parameter
 from auvnn.effects.sizes import full_wrench
 
 
@@ -24,6 +25,9 @@ class ThrustInflowLoss(Effect):
     cause = "thrust falls with the speed of the inflow"
     symbol = "k_V"
     reference = "Fossen (2011), section 9.1"
+    confused_with = ("linear_damping", "quadratic_damping", "thruster_gain")
+    manoeuvre = "coast_down"
+    told_apart_by = "coasting, pushes from rest, and steady speed with several throttles"
     plainer = ("thruster_gain",)
 
     @classmethod

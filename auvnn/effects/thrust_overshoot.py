@@ -7,8 +7,9 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter
+from auvnn.effects.base import Effect
 from auvnn.effects.factors import actuators
+from auvnn.effects.hooks import Parameter
 
 # Rows whose filter is worked out as one product of matrices.
 CHUNK = 128
@@ -28,7 +29,11 @@ class ThrustOvershoot(Effect):
     cause = "thrust is larger at first and falls back as the flow develops"
     symbol = "kappa_T"
     reference = "Healey, Rock, Cody, Miles and Brown (1995), IEEE JOE 20(4)"
+    confused_with = ("thruster_lag", "added_mass")
+    manoeuvre = "pulses"
+    told_apart_by = "steps from rest, held for several seconds"
     plainer = ("thruster_lag",)
+    remembers = True
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
@@ -45,10 +50,18 @@ class ThrustOvershoot(Effect):
         # The last row has no length of its own: as long as the one before, as if the record went on.
         last = steps[..., -1:, :] if steps.shape[-2] else torch.zeros_like(times[..., :1].unsqueeze(-1))
         steps = torch.cat([steps, last], dim=-2)
-        ratio = steps / tau
-        # Share of the gap that is left on average over the row; one for a row without length.
-        mean = torch.where(ratio > 1e-6, -torch.expm1(-ratio) / torch.clamp(ratio, min=1e-6), 1 - ratio / 2)
-        return command + excess * (command - self._flow(command, times, tau)) * mean
+        return command + excess * (command - self._flow(command, times, tau)) * _left(steps / tau)
+
+    def follow(self, state: Tensor, command: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the command with its excess, and ds/dt."""
+        tau, excess = self.theta[0].to(command), self.theta[1:].to(command)
+        return command + excess * (command - state), (command - state) / tau
+
+    def advance(self, state: Tensor, command: Tensor, step: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the command with its mean excess over the step, and s at its end."""
+        ratio, excess = step / self.theta[0].to(command), self.theta[1:].to(command)
+        gap = command - state
+        return command + excess * gap * _left(ratio), command - gap * torch.exp(-ratio)
 
     def _flow(self, command: Tensor, times: Tensor, tau: Tensor) -> Tensor:
         """Return s at the start of every row: first-order filtering of the held commands, exact, (..., T, n)."""
@@ -67,3 +80,8 @@ class ThrustOvershoot(Effect):
             state = flow[..., -1, :]
             begin = end
         return torch.cat(parts, dim=-2)
+
+
+def _left(ratio: Tensor) -> Tensor:
+    """Return the share of the gap that is left on average over a row of so many time constants; one for no length."""
+    return torch.where(ratio > 1e-6, -torch.expm1(-ratio) / torch.clamp(ratio, min=1e-6), 1 - ratio / 2)

@@ -7,7 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Parameter
 from auvnn.effects.sizes import full_wrench
 
 
@@ -24,6 +25,9 @@ class ThrusterDeadband(Effect):
     cause = "small commands give no thrust"
     symbol = "delta_T"
     reference = "Bessa, Dutra and Kreuzer (2013), J. Brazilian Soc. Mech. Sci. 35"
+    confused_with = ("thruster_gain", "thruster_lag")
+    manoeuvre = "pulses"
+    told_apart_by = "small and large pushes from rest"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

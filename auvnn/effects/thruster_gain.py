@@ -6,8 +6,9 @@ from typing import Any
 
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Moment, Parameter
+from auvnn.effects.base import Effect
 from auvnn.effects.factors import actuators
+from auvnn.effects.hooks import Moment, Parameter
 
 
 class ThrusterGain(Effect):
@@ -20,6 +21,9 @@ class ThrusterGain(Effect):
     cause = "a thruster gives more or less than it should"
     symbol = "k_T"
     reference = "Fossen (2011), chapter 9"
+    confused_with = ("linear_damping", "quadratic_damping", "thruster_deadband", "voltage_droop")
+    manoeuvre = "pulses"
+    told_apart_by = "short pushes from rest with each thruster: thrust without drag"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -8,7 +8,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter, Response
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Parameter, Response
 
 SMALL = 0.05
 """Step over time constant below which the power series holds to the last digits."""
@@ -31,6 +32,9 @@ class ThrusterLag(Effect):
     cause = "the thrust follows its demand with a lag"
     symbol = "tau_T"
     reference = "Yoerger, Cooke and Slotine (1990), IEEE JOE 15(3)"
+    confused_with = ("actuation_delay", "added_mass", "thrust_overshoot")
+    manoeuvre = "chirp"
+    told_apart_by = "steps and swept sines"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

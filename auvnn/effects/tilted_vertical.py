@@ -7,7 +7,8 @@ from typing import Any
 
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter, Sensed
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Parameter, Sensed
 from auvnn.physics.attitude import quat_multiply, rotvec_to_quat
 
 
@@ -23,6 +24,9 @@ class TiltedVertical(Effect):
     cause = "the attitude's vertical is tilted"
     symbol = "delta_v"
     reference = "Fossen (2011), section 2.2"
+    confused_with = ("cg_offset", "velocity_misalignment", "constant_force")
+    manoeuvre = "reciprocal"
+    told_apart_by = "level legs on several headings"
     plainer = ("cg_offset",)
 
     @classmethod

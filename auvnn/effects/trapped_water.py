@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 
 
 class TrappedWater(Effect):
@@ -18,6 +19,9 @@ class TrappedWater(Effect):
     cause = "water inside the hull moves along"
     symbol = "m_w"
     reference = "Fossen (2011), sections 3.3 and 6.3"
+    confused_with = ("added_mass", "thruster_lag")
+    manoeuvre = "chirp"
+    told_apart_by = "swept sines, and a static weighing"
     plainer = ("added_mass",)
 
     @classmethod

@@ -7,7 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Moment, Parameter
 
 # Parameter: (axis of the wrench, linear velocity, rate), as indices into [u v w p q r] and [X Y Z K M N].
 PRODUCTS = {
@@ -39,6 +40,9 @@ class TurningForces(Effect):
     cause = "forces in a turn are not those of the added mass"
     symbol = "Y_ur"
     reference = "Gertler and Hagen (1967), DTMB report 2510"
+    confused_with = ("added_mass", "body_lift", "munk_moment")
+    manoeuvre = "rotation"
+    told_apart_by = "turns at several speeds"
     plainer = ("coupled_damping",)
 
     @classmethod

@@ -8,7 +8,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter, Sensed
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Parameter, Sensed
 
 
 class VelocityLeverArm(Effect):
@@ -21,6 +22,9 @@ class VelocityLeverArm(Effect):
     cause = "the velocity sensor is not at the body origin"
     symbol = "r_v"
     reference = "Hegrenaes and Hallingstad (2011), IEEE JOE 36(2)"
+    confused_with = ("gyro_bias", "coupled_damping")
+    manoeuvre = "rotation"
+    told_apart_by = "turning on the spot"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -8,7 +8,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter, Sensed
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Parameter, Sensed
 from auvnn.physics.attitude import euler_to_quat, quat_rotate_inverse
 
 
@@ -22,6 +23,9 @@ class VelocityMisalignment(Effect):
     cause = "the velocity sensor is mounted askew"
     symbol = "R_s"
     reference = "Hegrenaes and Hallingstad (2011), IEEE JOE 36(2)"
+    confused_with = ("ocean_current", "thruster_gain")
+    manoeuvre = "reciprocal"
+    told_apart_by = "straight legs on several headings with an independent position fix"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -8,7 +8,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Parameter, Sensed
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Parameter, Sensed
 
 
 class VelocityScale(Effect):
@@ -22,6 +23,9 @@ class VelocityScale(Effect):
     cause = "the velocity sensor reads too much or too little"
     symbol = "k_v"
     reference = "Hegrenaes and Hallingstad (2011), IEEE JOE 36(2)"
+    confused_with = ("linear_damping", "quadratic_damping", "thruster_gain")
+    manoeuvre = "reciprocal"
+    told_apart_by = "straight legs with an independent position fix"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

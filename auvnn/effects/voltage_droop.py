@@ -6,7 +6,8 @@ from typing import Any
 
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Moment, Parameter
 
 
 class VoltageDroop(Effect):
@@ -21,6 +22,9 @@ class VoltageDroop(Effect):
     cause = "thrust follows the battery's voltage"
     symbol = "gamma_V"
     reference = "Blue Robotics (2019), T200 performance data"
+    confused_with = ("biofouling", "thruster_gain")
+    manoeuvre = "pulses"
+    told_apart_by = "the same pushes with a full and an empty battery"
     plainer = ("thruster_gain",)
     channels = ("voltage",)
 

@@ -8,7 +8,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Body, Effect, Extent, Moment, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Body, Extent, Moment, Parameter
 from auvnn.physics.products import matvec
 
 SLOWEST, FASTEST = 0.4, 2.2
@@ -31,6 +32,9 @@ class Waves(Effect):
     cause = "waves move the water"
     symbol = "zeta_a"
     reference = "Faltinsen (1990), Sea Loads on Ships and Offshore Structures, chapters 2 and 3"
+    confused_with = ("ocean_current",)
+    manoeuvre = "survey"
+    told_apart_by = "straight legs at constant depth, long enough for twenty periods, and again deeper"
     channels = ("x", "y", "z")
 
     @classmethod

@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 # A channel is never trusted beyond this share of its own motion: the integrator's error and the logging's last
 # digits must not pass for information.
 TRUST = 1e-4
+# Sums beyond this are those of windows whose sensitivities have grown without bound.
+HUGE = 1e60
 # Windows worked out at a time, as long as there are no more parameters than columns: this bounds the memory.
 CHUNK, COLUMNS = 48, 80
 # Numbers of an answer that stay near the processor.
@@ -74,6 +76,17 @@ class Statistics:
         """Return the same statistics for some of the parameters."""
         index = np.asarray(chosen, dtype=int)
         return replace(self, hessian=self.hessian[:, index[:, None], index], slope=self.slope[:, index])
+
+    def finite(self) -> Statistics:
+        """Return the same with nothing said of parameters whose sums are not finite: no test finds them."""
+        whole, slope = self.hessian.sum(0), self.slope.sum(0)
+        with np.errstate(invalid="ignore"):
+            bad = ~np.isfinite(np.diag(whole)) | ~np.isfinite(slope) | (np.abs(np.diag(whole)) > HUGE)
+        if not bad.any():
+            return self
+        hessian, slopes = self.hessian.copy(), self.slope.copy()
+        hessian[:, bad], hessian[:, :, bad], slopes[:, bad] = 0.0, 0.0, 0.0
+        return replace(self, hessian=np.nan_to_num(hessian), slope=slopes)
 
     def noise(self) -> Array:
         """Return each channel's white noise, (18,), from successive differences of the errors; NaN unmeasured."""

@@ -20,11 +20,13 @@ from numpy.typing import NDArray
 from auvnn.effects.base import HOOKS as ALL_HOOKS
 from auvnn.errors import InputError
 from auvnn.estimation.normal_equations import Statistics
-from auvnn.estimation.prediction_error import Fitted
+from auvnn.estimation.prediction_error import FitError, Fitted
 from auvnn.estimation.priors import Priors, parameters_of, set_parameters
+from auvnn.estimation.scaling import unit_of
 from auvnn.logs import Log, Run
 from auvnn.logs.signals.derivatives import LocalPolynomial
-from auvnn.metrics.one_step import Derivative, OneStepReplay
+from auvnn.metrics.derivative import Derivative
+from auvnn.metrics.one_step import OneStepReplay
 from auvnn.metrics.windows import ACCELERATION, CHANNELS
 from auvnn.models import GreyBox
 
@@ -137,8 +139,11 @@ def fit_one_step(
         weighted = (slope / own[:, None]).reshape(-1, len(theta))
         hessian = weighted.T @ weighted + np.diag(priors.precision)
         gradient = weighted.T @ (here / own).ravel() - priors.precision * (theta - priors.mean)
-        scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
-        normal = hessian / scale[:, None] / scale
+        if not np.isfinite(hessian).all():
+            raise FitError(f"the accelerations of {model.vehicle.name} do not stay finite one step ahead")
+        unit = unit_of(hessian)
+        normal, gradient = hessian * unit[:, None] * unit, np.where(unit > 0.0, gradient, 0.0)
+        scale = 1.0 / np.where(unit > 0.0, unit, 1.0)
         now = float(((here / own) ** 2).sum()) + penalty(theta)
         for _attempt in range(10):
             step = (

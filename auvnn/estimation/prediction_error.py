@@ -18,6 +18,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from auvnn.errors import InputError
 from auvnn.estimation.normal_equations import (
     TRUST,
     Statistics,
@@ -28,11 +29,19 @@ from auvnn.estimation.normal_equations import (
     residual_std,
 )
 from auvnn.estimation.priors import Priors, bounded_step, limits, parameters_of, set_parameters
+from auvnn.estimation.scaling import unit_of
+from auvnn.estimation.sensitivity import Response
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
+# What torch raises where a matrix has no inverse.
+SINGULAR = torch.linalg.LinAlgError  # pyright: ignore[reportPrivateImportUsage]
+
+
+class FitError(InputError):
+    """A fit has nowhere to begin: free running leaves what is finite, or the equations cannot be solved there."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +76,12 @@ class Fitted:
         """Return the covariance (P, P) of the parameters under white noise of `sigma`."""
         precision = self.statistics.total + np.diag(self.priors.precision)
         # In units of each parameter's own: what is hardly known must not pass for rounding beside what is well known.
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(precision), 1e-300))
-        return np.linalg.pinv(precision * unit[:, None] * unit, hermitian=True) * unit[:, None] * unit
+        unit = unit_of(precision)
+        covariance = np.linalg.pinv(precision * unit[:, None] * unit, hermitian=True) * unit[:, None] * unit
+        # Of what the sums say nothing, no more is known than before.
+        dead = np.flatnonzero(unit == 0.0)
+        covariance[dead, dead] = 1.0 / np.maximum(self.priors.precision[dead], 1e-30)
+        return covariance
 
 
 def fit(
@@ -96,6 +109,9 @@ def fit(
         sigma: (18,) fixed weights, by default estimated.
         iterations: at most this many steps.
         progress: told in words after each step.
+
+    Raises:
+        FitError: at the values to start from, free running leaves what is finite. A step that does so is not taken.
     """
     model = model.rebuilt(model.copied_effects())
     names, fixed = tuple(names), sigma is not None
@@ -106,7 +122,12 @@ def fit(
     low, high = limits(model, names, priors)
     theta = np.clip(theta, low, high)
     set_parameters(model, names, theta)
-    here = list(linearise(model, windows, initial, names))
+    here = _answered(model, windows, initial, names)
+    if here is None or not np.isfinite(cost_of(here, np.ones(18))):
+        raise FitError(
+            f"free running of {model.vehicle.name} leaves what is finite within its windows: choose shorter ones with "
+            "window=, and check the signs and sizes of its coefficients"
+        )
     if sigma is None:
         measured = windows.mask.sum((0, 1)).numpy() > 0
         sigma = np.where(measured, 100 * floor + 1e-6, np.inf)
@@ -118,12 +139,29 @@ def fit(
     def penalty(at: Array) -> float:
         return float(priors.precision @ (at - priors.mean) ** 2)
 
+    before: tuple[Array, Tensor, Array] | None = None
+
+    def back(to: tuple[Array, Tensor, Array]) -> list[Response]:
+        set_parameters(model, names, to[0])
+        return list(linearise(model, windows, to[1], names))
+
     for taken in range(1, iterations + 1):
         statistics, a, slopes = normal_equations(windows, here, sigma)
+        if not _sound(statistics, a, slopes):
+            if before is None:
+                raise FitError(
+                    f"free running of {model.vehicle.name} is too sensitive to {', '.join(names) or 'its start'} to be "
+                    "fitted over these windows: choose shorter ones with window="
+                )
+            # The step led where slopes are none: back to where they were.
+            here = back(before)
+            theta, initial, sigma = before
+            break
         hessian = statistics.total + np.diag(priors.precision)
         gradient = statistics.slope.sum(0) - priors.precision * (theta - priors.mean)
-        scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
-        normal = hessian / scale[:, None] / scale
+        unit = unit_of(hessian)
+        normal, gradient = hessian * unit[:, None] * unit, np.where(unit > 0.0, gradient, 0.0)
+        scale = np.where(unit > 0.0, 1.0 / np.where(unit > 0.0, unit, 1.0), 1.0)
         now = cost_of(here, sigma) + penalty(theta)
         for _attempt in range(8):
             step = (
@@ -139,15 +177,16 @@ def fit(
             reached = parameters_of(model, names)
             change = a - np.einsum("bij,j->bi", slopes, reached - theta)
             trial = moved(initial, torch.as_tensor(change / (1 + damping)))
-            there = list(linearise(model, windows, trial, names))
-            then = cost_of(there, sigma) + penalty(reached)
-            if then <= now * (1 + 1e-9) + 1e-6:
+            there = _answered(model, windows, trial, names) if torch.isfinite(trial).all() else None
+            then = np.inf if there is None else cost_of(there, sigma) + penalty(reached)
+            if there is not None and then <= now * (1 + 1e-9) + 1e-6:
                 break
             damping = max(4 * damping, 1e-2)
         else:
             set_parameters(model, names, theta)
             break
         gain, damping = now - then, damping / 8 if damping > 1e-4 else 0.0
+        before = theta, initial, sigma
         theta, initial, here = reached, trial, there
         renewed = (
             sigma if fixed else residual_std(normal_equations(windows, here, sigma)[0], floor, len(theta))
@@ -160,7 +199,31 @@ def fit(
         if gain < 0.05 + 1e-6 * now and drift < 0.02:
             converged = True
             break
-    statistics, a, _ = normal_equations(windows, here, sigma)
+    statistics, a, slopes = normal_equations(windows, here, sigma)
+    if before is not None and not _sound(statistics, a, slopes):
+        here = back(before)
+        theta, initial, sigma = before
+        converged = False
+        statistics, a, slopes = normal_equations(windows, here, sigma)
+    if not _sound(statistics, a, slopes):
+        what = ", ".join(names) or "the initial states"
+        raise FitError(f"the fit of {what} has no finite errors: choose shorter windows with window=")
     initial = moved(initial, torch.as_tensor(a))
     total = float(statistics.cost.sum()) + penalty(theta)
     return Fitted(model, names, theta, initial, sigma, statistics, priors, total, converged, taken)
+
+
+def _answered(
+    model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str]
+) -> list[Response] | None:
+    """Return the windows' answers; None where the equations cannot be solved, such as with a singular inertia."""
+    try:
+        return list(linearise(model, windows, initial, names))
+    except SINGULAR:
+        return None
+
+
+def _sound(statistics: Statistics, a: Array, slopes: Array) -> bool:
+    """Whether sums are finite."""
+    parts = (statistics.hessian, statistics.slope, statistics.cost, a, slopes)
+    return all(bool(np.isfinite(x).all()) for x in parts)

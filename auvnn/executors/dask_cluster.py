@@ -8,7 +8,9 @@ from typing import Any
 
 from auvnn.errors import ConfigError, MissingExtra, one_line
 from auvnn.executors.base import AHEAD, TRIES, Executor, Lost, handed_ahead
+from auvnn.executors.safe_path import kept_safe
 
+_BEFORE = "distributed.nanny.pre-spawn-environ"
 # s after which it is asked whether any worker is left, and s to wait for one.
 _LOOK, _PATIENCE = 20.0, 120.0
 
@@ -40,9 +42,12 @@ class DaskCluster(Executor):
         self._cluster = None
         try:
             if self.address is None:
-                self._cluster = distributed.LocalCluster(
-                    n_workers=self.workers, threads_per_worker=1, processes=True, dashboard_address=None
-                )
+                # Also those that Dask starts later, in the place of one that died.
+                dask.config.set({f"{_BEFORE}.PYTHONSAFEPATH": "1"})
+                with kept_safe():
+                    self._cluster = distributed.LocalCluster(
+                        n_workers=self.workers, threads_per_worker=1, processes=True, dashboard_address=None
+                    )
             self.client = distributed.Client(self._cluster or self.address)
         except (OSError, ValueError) as problem:
             raise ConfigError(

@@ -9,9 +9,7 @@ after a death, which is why this one is here.
 from __future__ import annotations
 
 import contextlib
-import os
 import subprocess
-import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from multiprocessing import Pipe
@@ -20,6 +18,7 @@ from typing import Any
 
 from auvnn.executors.base import AHEAD, TRIES, Executor, Lost, in_order
 from auvnn.executors.packing import pack
+from auvnn.executors.safe_path import environment, python
 
 
 class _Worker:
@@ -27,14 +26,13 @@ class _Worker:
 
     def __init__(self) -> None:
         self.end, other = Pipe()
-        environment = dict(os.environ)
+        own = environment()
         # Several processes with several threads each would be in one another's way.
-        environment.update(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1", POLARS_MAX_THREADS="1")
-        environment["PYTHONPATH"] = os.pathsep.join(p or os.getcwd() for p in sys.path)
+        own.update(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1", POLARS_MAX_THREADS="1")
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "auvnn.executors.worker", str(other.fileno())],
+            python("auvnn.executors.worker", str(other.fileno())),
             pass_fds=[other.fileno()],
-            env=environment,
+            env=own,
             stdin=subprocess.DEVNULL,
         )
         other.close()

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from auvnn.errors import InputError
-from auvnn.log_chunks.windows import CHANGED, HOLD, ScanState, WindowCut
+from auvnn.log_chunks.scan import CHANGED, HOLD, ScanState, WindowCut
 from auvnn.logs import Run
 from auvnn.logs.log import blocks_of
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.logs.reading.portions import Portion, read_portion
-from auvnn.logs.reading.reading import file_hash
+from auvnn.logs.seal import file_hash
 
 # Samples of a piece at most, and s of history that it is read with, beside a filter's width.
 SAMPLES, HISTORY = 25_000, 8.0

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from auvnn.errors import ConfigError, InputError
+from auvnn.logs.channels import VELOCITY
 from auvnn.logs.reading.repair import Repair
 from auvnn.logs.run import MIN_SAMPLES, Run
 
@@ -28,7 +29,10 @@ class Log:
         name: what to call the log in words and file names.
         paths: the files it was read from; empty for a log made in memory.
         repairs: what was mended or noted while reading.
-        sha256: of the files' bytes where it was read, of the samples where it was made in memory.
+        sha256: of the files' bytes where it was read, of the samples where it was made in memory; where only the
+            beginning of a file was read, of that.
+        unknown: columns that are kept and not used.
+        unsealed: files in which damage that leaves numbers readable cannot be seen.
 
     Raises:
         InputError: there is no run, a number occurs twice, or the runs' columns differ.
@@ -40,6 +44,7 @@ class Log:
     repairs: tuple[Repair, ...] = ()
     sha256: str = ""
     unknown: tuple[str, ...] = field(default=(), kw_only=True)
+    unsealed: tuple[Path, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         """Check that the runs belong together."""
@@ -73,7 +78,8 @@ class Log:
         """Read a log from one file or several.
 
         Args:
-            path: a CSV or Parquet file, or a list of files; rows of different files are never joined.
+            path: a table (CSV, Parquet), a recording (ROS, DataFlash, ULog, ...; see `READERS`), the folder of a
+                ROS 2 bag, or a list of these; rows of different files are never joined.
             mapping: a mapping file's path, its content as a dict, or None for canonical columns.
             max_duration: of each file, s; what is recorded later is left out. A file larger than the memory can
                 be read so.
@@ -85,6 +91,39 @@ class Log:
         from auvnn.logs.reading.reading import read
 
         return cls(**vars(read(path, mapping, max_duration)))
+
+    @classmethod
+    def from_dataframe(cls, data: Any, mapping: Any = None, name: str = "data frame") -> Log:
+        """Make a log of a table in memory, as if a file of the same columns had been read.
+
+        Args:
+            data: a pandas or polars data frame, or a dict of arrays (N,).
+            mapping: a mapping file's path or its content as a dict; None for canonical columns.
+            name: of the log.
+
+        Raises:
+            InputError: it is no table, or its content must not be trusted.
+            ConfigError: the mapping is wrong.
+        """
+        from auvnn.logs.data_frames import from_dataframe
+
+        return cls(**vars(from_dataframe(data, mapping, name)))
+
+    def to_polars(self) -> Any:
+        """Return the log as a polars data frame, `run` first, then the canonical columns; NaN is missing."""
+        from auvnn.logs.data_frames import to_polars
+
+        return to_polars(self)
+
+    def to_pandas(self) -> Any:
+        """Return the log as a pandas data frame, `run` first, then the canonical columns; NaN is missing.
+
+        Raises:
+            MissingExtra: pandas is not there.
+        """
+        from auvnn.logs.data_frames import to_pandas
+
+        return to_pandas(self)
 
     @classmethod
     def from_runs(cls, runs: Iterable[Run], name: str = "log", repairs: Iterable[Repair] = ()) -> Log:
@@ -111,6 +150,10 @@ class Log:
         """What actuates the vehicle: "thrusters" where there are thruster commands, else "wrench"."""
         return self.runs[0].kind
 
+    def drives(self, kind: str) -> bool:
+        """Whether every run has commands of a kind, "thrusters" or "wrench"."""
+        return all((run.thrusters if kind == "thrusters" else run.wrench) is not None for run in self.runs)
+
     @property
     def n_thrusters(self) -> int:
         """Number of thruster commands, 0 for a log with a wrench alone."""
@@ -132,6 +175,26 @@ class Log:
     def quality(self) -> Quality:
         """Return what was read, repaired, implausible and excited; computed once."""
         return self._quality
+
+    @property
+    def unmeasured(self) -> list[str]:
+        """What a model needs of every sample and no run has measured: of attitude, u, v, w, p, q, r."""
+        absent = [n for i, n in enumerate(VELOCITY) if all(np.isnan(run.nu[:, i]).all() for run in self.runs)]
+        attitude = all(np.isnan(run.quaternion).any(axis=1).all() for run in self.runs)
+        return (["attitude"] if attitude else []) + absent
+
+    def refuse_unmeasured(self) -> None:
+        """Raise where attitude or a velocity was not measured at all.
+
+        Raises:
+            InputError: naming what is not there.
+        """
+        if self.unmeasured:
+            raise InputError(
+                f"log '{self.name}': {', '.join(self.unmeasured)} not measured; comparing and fitting need attitude "
+                "and u, v, w, p, q, r in some samples. `auvnn check` reads such a log; a mapping can make velocities of "
+                "positions (difference: true)"
+            )
 
     def select(self, numbers: int | Iterable[int]) -> Log:
         """Return a log of the runs with these numbers, in this order."""
@@ -167,11 +230,14 @@ class Log:
         return self._part([run.cut(slice(0, at))]), self._part([run.cut(slice(at, None))]), words
 
     def write(self, path: str | Path, overwrite: bool = False) -> Path:
-        """Write the log with canonical columns as `.parquet` or `.csv`; reading it back gives the same log.
+        """Write the log with canonical columns as `.parquet`, `.csv` or `.mcap`; reading it back gives the same log.
+
+        In MCAP it is ROS 2: nav_msgs/Odometry in ENU and FLU, everything else by name in a sensor_msgs/JointState.
 
         Raises:
             InputError: the file is there already and `overwrite` is false.
-            ConfigError: the name ends in neither `.parquet` nor `.csv`.
+            ConfigError: the name ends in none of these.
+            MissingExtra: a package is missing that writes the format.
         """
         from auvnn.logs.writing import write
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from auvnn.errors import ConfigError, InputError
+from auvnn.errors import ConfigError, InputError, one_line
+from auvnn.logs.seal import file_hash, seal_of, write_seal
 
 if TYPE_CHECKING:
     import polars as pl
@@ -25,8 +26,13 @@ def frame_hash(frame: pl.DataFrame) -> str:
     digest = hashlib.sha256()
     for series in frame:
         digest.update(series.name.encode())
-        digest.update(np.ascontiguousarray(series.to_numpy(), dtype=np.float64).tobytes())
+        digest.update(frame_bytes(series))
     return digest.hexdigest()
+
+
+def frame_bytes(series: pl.Series) -> bytes:
+    """Return the bytes of a column's float64 values, as they count in the hash."""
+    return np.ascontiguousarray(series.to_numpy(), dtype=np.float64).tobytes()
 
 
 def to_frame(log: Log) -> pl.DataFrame:
@@ -49,13 +55,20 @@ def write(log: Log, path: Path, overwrite: bool) -> Path:
 
     Raises:
         InputError: the file is there already and `overwrite` is false, or it cannot be written.
-        ConfigError: the name ends in neither `.parquet` nor `.csv`.
+        ConfigError: the name ends in none of `.parquet`, `.csv`, `.mcap`.
     """
-    if path.suffix.lower() not in (".parquet", ".csv"):
-        raise ConfigError(f"a log is written as .parquet or .csv, not as '{path.name}'")
+    if path.suffix.lower() not in (".parquet", ".csv", ".mcap"):
+        raise ConfigError(f"a log is written as .parquet, .csv or .mcap, not as '{path.name}'")
     if path.exists() and not overwrite:
         raise InputError(f"{path} is there already; choose another name or overwrite it explicitly")
-    return _placed(to_frame(log), path)
+    if path.suffix.lower() == ".mcap":
+        from auvnn.logs.writing_mcap import write_mcap
+
+        return write_mcap(log, path)
+    _placed(to_frame(log), path)
+    if path.suffix.lower() == ".csv":
+        write_seal(path, file_hash(path))
+    return path
 
 
 def write_commands(log: Log, path: Path) -> Path:
@@ -86,9 +99,18 @@ def _placed(frame: pl.DataFrame, path: Path) -> Path:
             # Parquet's own checksums are optional and rarely checked; this one is checked on reading.
             frame.write_parquet(temporary, metadata={HASH_KEY: frame_hash(frame)})
         os.chmod(temporary, 0o644)
+        # The seal of what was there goes first: it must never stand beside something else.
+        seal_of(path).unlink(missing_ok=True)
         os.replace(temporary, path)
     except OSError as problem:
-        raise InputError(f"{path} cannot be written: {problem.strerror}") from problem
+        raise InputError(
+            f"{path} cannot be written: {problem.strerror or one_line(problem, 200)}"
+        ) from problem
+    except Exception as problem:
+        # What polars says of a full disk is no OSError.
+        if type(problem).__module__.split(".")[0] != "polars":
+            raise
+        raise InputError(f"{path} cannot be written: {one_line(problem, 200)}") from problem
     finally:
         Path(temporary).unlink(missing_ok=True)
     return path

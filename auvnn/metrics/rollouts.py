@@ -80,24 +80,43 @@ class Rolled:
         return float(np.nanmean(value)) if np.isfinite(value).any() else float("nan")
 
 
-def roll(model: GreyBox, log: Log, horizon: str, scale: Scale) -> Rolled | None:
+def roll(model: GreyBox, log: Log, horizon: str, scale: Scale, engine: str = "torch") -> Rolled | None:
     """Run a model free over the windows of one horizon; None where no stretch is long enough.
 
     Windows start every half horizon, from measured states. Outliers of single samples do not count.
     """
+    windows = horizon_windows(log, horizon, model.actuation)
+    return None if windows is None else roll_windows(model, windows, scale, engine)
+
+
+def horizon_windows(log: Log, horizon: str, kind: str) -> Windows | None:
+    """Return the windows of one horizon, "full" or seconds; None where no stretch is long enough."""
     length = np.inf if horizon == "full" else float(horizon)
     try:
-        windows = cut_windows(
-            log, length, None if np.isinf(length) else 0.5 * length, warmup=WARMUP, kind=model.actuation
-        )
+        return cut_windows(log, length, None if np.isinf(length) else 0.5 * length, warmup=WARMUP, kind=kind)
     except InputError:
         return None
+
+
+def roll_windows(model: GreyBox, windows: Windows, scale: Scale, engine: str = "torch") -> Rolled:
+    """Run a model free over windows that have been cut; `engine` as in `rollout`."""
     with torch.no_grad():
         start = initial_states(model, windows)
         first = windows.inputs.command[:, windows.warmup]
         rate = fastest_rate(model, start[:, :7], start[:, 7:], first)
-        eta, nu = predict(model, windows, start, max(followed(MAX_STEP, rate), SHORTEST_STEP))
+        eta, nu = predict(model, windows, start, max(followed(MAX_STEP, rate), SHORTEST_STEP), engine)
         seen = model.sense(Sensed(eta[..., :3], eta[..., 3:], nu)).nu.numpy()
+    return scored(windows, seen, scale)
+
+
+def scored(windows: Windows, seen: Array, scale: Scale) -> Rolled:
+    """Return free runs with their errors, whoever predicted them.
+
+    Args:
+        windows: what was run.
+        seen: (B, L, 6) predicted velocities as the sensors would report them; not finite once one has run away.
+        scale: of the log.
+    """
     measured, mask = windows.nu.numpy(), windows.mask[..., VELOCITY].numpy().copy()
     mask[:, 0] = 0.0
     sound = (np.isfinite(seen) & (np.abs(seen) < LIMIT)).all(axis=-1)

@@ -3,8 +3,9 @@
 from auvnn.models.grey_box import GreyBox, Prepared
 from auvnn.models.inputs import Inputs
 from auvnn.models.loading import from_vehicle, load, remove
-from auvnn.models.rollout import Divergence, Trajectory, rollout
+from auvnn.models.rollout import rollout
 from auvnn.models.saving import save
+from auvnn.models.trajectory import Divergence, Trajectory
 
 __all__ = [
     "Divergence",

@@ -31,7 +31,8 @@ from auvnn.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from auvnn.damping.bank import DampingBank
-    from auvnn.models.rollout import Trajectory
+    from auvnn.models.linearise import Linearisation
+    from auvnn.models.trajectory import Trajectory
 
 
 def _tensor(value: Any) -> Tensor:
@@ -186,10 +187,24 @@ class GreyBox(nn.Module):
         """Return copies of the effects, with parameters of their own."""
         return [copy.deepcopy(e) for e in self.effects if isinstance(e, Effect)]
 
-    def rebuilt(self, effects: Iterable[Effect], vehicle: Vehicle | None = None) -> GreyBox:
-        """Return a model with the same damping subnetworks (copied) but other effects or other numbers."""
-        model = GreyBox(vehicle or self.vehicle, effects, copy.deepcopy(self.damping), self.actuation)
-        return model.to(self._known("mass"))
+    def rebuilt(
+        self, effects: Iterable[Effect], vehicle: Vehicle | None = None, actuation: str | None = None
+    ) -> GreyBox:
+        """Return a model with the same learned parts (copied) but other effects, other numbers, or driven otherwise."""
+        return self._like(effects, vehicle or self.vehicle, actuation or self.actuation, shared=False)
+
+    def sharing(self, effects: Iterable[Effect]) -> GreyBox:
+        """Return a model with other effects that shares its learned parts with this one: nothing is copied."""
+        return self._like(effects, self.vehicle, self.actuation, shared=True)
+
+    def beside(self, *effects: Effect) -> GreyBox:
+        """Return the model with further effects, probes among them: its own are copied, learned parts shared."""
+        return self.sharing([*self.copied_effects(), *effects])
+
+    def _like(self, effects: Iterable[Effect], vehicle: Vehicle, actuation: str, *, shared: bool) -> GreyBox:
+        """Return a model of the same kind: the one place where a model is built from another one."""
+        damping = self.damping if shared else copy.deepcopy(self.damping)
+        return GreyBox(vehicle, effects, damping, actuation).to(self._known("mass"))
 
     def without_absent(self, keep: Sequence[str] = ()) -> GreyBox:
         """Return the model without the effects that are at their nulls, but for those named in `keep`.
@@ -202,7 +217,7 @@ class GreyBox(nn.Module):
             return self
         known = _WITHOUT.get(self)
         if known is None or not known.shares(self, left):
-            known = GreyBox(self.vehicle, left, self.damping, self.actuation).to(self._known("mass"))
+            known = self.sharing(left)
             _WITHOUT[self] = known
         return known
 
@@ -428,6 +443,20 @@ class GreyBox(nn.Module):
         from auvnn.models.rollout import rollout
 
         return rollout(self, eta0, nu0, commands, times, **options)
+
+    def linearise(
+        self, state: Tensor, command: Tensor, dt: float | None = None, **given: Any
+    ) -> Linearisation:
+        """Return A and B at a state, with the actuators' states: see `auvnn.models.linearise.linearise`."""
+        from auvnn.models.linearise import linearise
+
+        return linearise(self, state, command, dt, **given)
+
+    def discrete_step(self, state: Tensor, command: Tensor, dt: float, **given: Any) -> Tensor:
+        """Return the state after one step: see `auvnn.models.linearise.discrete_step`."""
+        from auvnn.models.linearise import discrete_step
+
+        return discrete_step(self, state, command, dt, **given)
 
     def learned_parts(self) -> tuple[dict[str, Any], dict[str, Tensor] | None]:
         """Return how what was learned is built again, as entries of a model file, and its weights; None without any."""

@@ -9,10 +9,10 @@ from typing import Any
 from auvnn.config import parse_yaml
 from auvnn.damping.bank import DampingBank
 from auvnn.damping.region import Region
-from auvnn.effects import effect_class
+from auvnn.effects import Effect, effect_class
 from auvnn.errors import ConfigError, ModelError
 from auvnn.models.grey_box import GreyBox
-from auvnn.models.saving import MODEL, REGION, STRUCTURE, SUBNETWORKS, WEIGHTS
+from auvnn.models.saving import MODEL, REGION, STRUCTURE, SUBNETWORKS, UNCERTAINTY, WEIGHTS, reads_again
 from auvnn.models.structures import build_structure
 from auvnn.models.structures.base import Structure
 from auvnn.storage import folder_exists, read_folder, tensors_from_bytes
@@ -22,8 +22,16 @@ from auvnn.vehicle import Vehicle, load_vehicle
 def from_vehicle(vehicle: Vehicle, actuation: str | None = None) -> GreyBox:
     """Return the model of a vehicle with the effects that its file states."""
     how = actuation or ("thrusters" if vehicle.thrusters else "wrench")
-    effects = [effect_class(name).build(vehicle, how, values) for name, values in vehicle.effects.items()]
+    effects = [_stated(vehicle, how, name, values) for name, values in vehicle.effects.items()]
     return GreyBox(vehicle, effects, actuation=how)
+
+
+def _stated(vehicle: Vehicle, actuation: str, name: str, values: Mapping[str, Any]) -> Effect:
+    """Return an effect as a model file states it, with the standard deviations beside its values."""
+    given = {k: v for k, v in values.items() if k != UNCERTAINTY}
+    effect = effect_class(name).build(vehicle, actuation, given)
+    effect.state_uncertainty(values.get(UNCERTAINTY) or {})
+    return effect
 
 
 def load(source: str | Path, actuation: str | None = None) -> GreyBox:
@@ -106,3 +114,6 @@ def remove(model: GreyBox, effects: str | list[str]) -> GreyBox:
     for name in names:
         model.effect(name)
     return model.rebuilt(e for e in model.copied_effects() if e.name not in names)
+
+
+reads_again(from_contents)

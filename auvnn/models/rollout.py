@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import torch
@@ -20,55 +20,12 @@ from auvnn.models.rate import state_rate, unit_attitude
 from auvnn.models.stiffness import MAX_STEPS, MOST_CUT, UNSTABLE, fastest_rate, followed
 from auvnn.models.stiffness import words as stiff_words
 from auvnn.models.tableaus import TABLEAUS
+from auvnn.models.trajectory import Divergence, Trajectory
 from auvnn.physics.attitude import quat_to_matrix
 from auvnn.physics.kinematics import eta6_to_eta7
 
 if TYPE_CHECKING:
     from auvnn.models.grey_box import GreyBox
-
-
-@dataclass(frozen=True)
-class Divergence:
-    """Where a rollout left what is physical.
-
-    Attributes:
-        index: which trajectory, flattened.
-        time: s, the last time at which the state was sound.
-        term: the term of the equation of motion that pushed most, or "initial state".
-        words: the same as a sentence.
-    """
-
-    index: int
-    time: float
-    term: str
-    words: str
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """A free run.
-
-    Attributes:
-        times: (..., T), s.
-        eta: (..., T, 7), NED m and quaternion.
-        nu: (..., T, 6), m/s and rad/s.
-        thrust: (..., T, n), N, just after each row's command.
-        divergences: empty where the run stayed sound; a diverged trajectory holds its last sound state.
-        notes: in words, steps that were cut because the model is stiff, and velocities beyond those that the damping
-            was trained on, where what it says is extrapolated.
-    """
-
-    times: Tensor
-    eta: Tensor
-    nu: Tensor
-    thrust: Tensor
-    divergences: tuple[Divergence, ...] = ()
-    notes: tuple[str, ...] = ()
-
-    @property
-    def diverged(self) -> bool:
-        """Whether any trajectory left what is physical."""
-        return bool(self.divergences)
 
 
 def steps_per_interval(times: Tensor, max_step: float) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,21 @@ if TYPE_CHECKING:
 MODEL, WEIGHTS = "model.yaml", "weights.safetensors"
 SUBNETWORKS = "damping_subnetworks"
 STRUCTURE = "structure"
+UNCERTAINTY = "uncertainty"
 REGION = "trained_region"
+
+_readers: list[Callable[[Mapping[str, bytes], Path], object]] = []
+
+
+def reads_again(reader: Callable[[Mapping[str, bytes], Path], object]) -> None:
+    """Take the function that reads a model's files: `loading`, which stands above, says which one it is."""
+    _readers[:] = [reader]
+
+
+def read_again(files: Mapping[str, bytes], path: Path) -> None:
+    """Read a model's files before they take the place of others, and raise where they cannot be read."""
+    for reader in _readers:
+        reader(files, path)
 
 
 def save(model: GreyBox, folder: str | Path, *, overwrite: bool = False) -> Path:
@@ -26,7 +41,9 @@ def save(model: GreyBox, folder: str | Path, *, overwrite: bool = False) -> Path
         InputError: the folder exists, is not empty and `overwrite` is not set.
     """
     path = Path(folder)
-    write_folder(path, contents(model, path), overwrite=overwrite)
+    write_folder(
+        path, contents(model, path), overwrite=overwrite, readable=lambda files: read_again(files, path)
+    )
     return path
 
 
@@ -34,7 +51,10 @@ def contents(model: GreyBox, path: Path) -> dict[str, bytes | str]:
     """Return the files that describe a model, by name, as they are written into the folder `path`."""
     data = model.vehicle.to_dict()
     data.pop("effects", None)  # the file's order must not depend on where the effects came from
-    data["effects"] = {str(e.name): e.values() for e in model.copied_effects()}
+    data["effects"] = {
+        str(e.name): {**e.values(), **({UNCERTAINTY: dict(e.uncertainty)} if e.uncertainty else {})}
+        for e in model.copied_effects()
+    }
     data["actuation"] = model.actuation
     files: dict[str, bytes | str] = {}
     described, learned = model.learned_parts()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from auvnn.online.adapt import Adaptation, adapt
 from auvnn.online.adapter import Adapter, Counts, Update
-from auvnn.online.change import Change
+from auvnn.online.change_words import Change
 from auvnn.online.frozen import FrozenErrors, frozen_errors
 from auvnn.online.guards import Guards
 

@@ -17,7 +17,8 @@ from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
 from auvnn.online import state
 from auvnn.online.bounds import Bounds, known_drag
-from auvnn.online.change import Change, Monitor
+from auvnn.online.change import Monitor
+from auvnn.online.change_words import Change
 from auvnn.online.consistency import Consistency
 from auvnn.online.counts import Counts
 from auvnn.online.guards import REASONS, Guards, build_guards

@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 import json
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import torch
 from torch import Tensor
 
-from auvnn.errors import ModelError
+from auvnn.errors import AuvnnError, ModelError
 from auvnn.models.loading import from_contents
 from auvnn.models.saving import MODEL, contents
 from auvnn.online.change import Monitor
@@ -27,6 +28,7 @@ from auvnn.online.residual import Sample
 from auvnn.storage import read_folder, tensors_from_bytes, tensors_to_bytes, write_folder
 
 if TYPE_CHECKING:
+    from auvnn.models import GreyBox
     from auvnn.online.adapter import Adapter
 
 SCHEMA = "auvnn/adapter/1"
@@ -40,7 +42,9 @@ def save(adapter: Adapter, folder: str | Path) -> Path:
     files = contents(adapter._model, path)
     files[TENSORS] = tensors_to_bytes(_tensors(adapter), finite=False)
     files[PLAIN] = json.dumps(_plain(adapter), indent=1, sort_keys=True)
-    return write_folder(path, files, overwrite=True, schema=SCHEMA)
+    return write_folder(
+        path, files, overwrite=True, schema=SCHEMA, readable=lambda found: _parts(found, path)
+    )
 
 
 def restore(kind: type[Adapter], folder: str | Path, *, validated: bool = False) -> Adapter:
@@ -56,18 +60,20 @@ def restore(kind: type[Adapter], folder: str | Path, *, validated: bool = False)
         ModelError: it is damaged, incomplete, or of another kind.
     """
     path = Path(folder)
-    files = read_folder(path, schema=SCHEMA)
-    missing = [name for name in (PLAIN, TENSORS, MODEL) if name not in files]
-    if missing:
-        raise ModelError(f"{path}: {', '.join(missing)} is missing: this is no adapter's state")
-    tensors = {
-        k: v.clone() for k, v in tensors_from_bytes(files[TENSORS], where=TENSORS, finite=False).items()
-    }
+    adapter = _restored(kind, read_folder(path, schema=SCHEMA), path)
+    if validated:
+        adapter.weights.write(adapter._shadow.valid)
+        adapter.scheme.load(adapter._shadow.scheme_state)
+        adapter._shadow.close()
+    return adapter
+
+
+def _restored(kind: type[Adapter], files: Mapping[str, bytes], path: Path) -> Adapter:
+    tensors, plain, model = _parts(files, path)
     try:
-        plain = json.loads(files[PLAIN])
         watched = plain["monitor"]
         adapter = kind(
-            from_contents(files, path),
+            model,
             plain["scheme"],
             guards=Guards(**plain["guards"]),
             watch=False,
@@ -98,13 +104,24 @@ def restore(kind: type[Adapter], folder: str | Path, *, validated: bool = False)
         adapter._consistency.load(_part(tensors, "consistency"))
         adapter._off_cause = plain["off_cause"]
         predictor._last = _sample(tensors, "last") if plain["last"] else None
-    except (KeyError, TypeError, RuntimeError) as error:
+    except AuvnnError:
+        raise
+    except (KeyError, TypeError, RuntimeError, ValueError, AttributeError) as error:
         raise ModelError(f"{path}: not a complete adapter's state ({error}): begin a new one") from error
-    if validated:
-        adapter.weights.write(adapter._shadow.valid)
-        adapter.scheme.load(adapter._shadow.scheme_state)
-        adapter._shadow.close()
     return adapter
+
+
+def _parts(files: Mapping[str, bytes], path: Path) -> tuple[dict[str, Tensor], dict[str, Any], GreyBox]:
+    """Return what a state's files hold: tensors, the plain part, and the model."""
+    missing = [name for name in (PLAIN, TENSORS, MODEL) if name not in files]
+    if missing:
+        raise ModelError(f"{path}: {', '.join(missing)} is missing: this is no adapter's state")
+    tensors = tensors_from_bytes(files[TENSORS], where=TENSORS, finite=False)
+    try:
+        plain = json.loads(files[PLAIN])
+    except (ValueError, RecursionError) as error:
+        raise ModelError(f"{path}: {PLAIN} cannot be read ({error}): begin a new one") from error
+    return {k: v.clone() for k, v in tensors.items()}, plain, from_contents(files, path)
 
 
 def _plain(adapter: Adapter) -> dict[str, Any]:

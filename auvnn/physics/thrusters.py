@@ -61,3 +61,25 @@ def table_thrust(command: PerPart, command_grid: Knots, thrust_grid: Knots) -> P
         own = torch.take_along_dim(pieces[(None,) * (rank - pieces.dim())], index, -2).squeeze(-2)
     start, low, slope = own.unbind(-1)
     return low + slope * (c - start)
+
+
+def summed_table_thrust(command: PerPart, command_grid: Knots, thrust_grid: Knots) -> PerPart:
+    """Return the thrust of a table as a sum of kinks: T = (T_0 + T_n) / 2 + sum_k (s_k - s_k-1) / 2 |c - c_k|.
+
+    s_k is the slope of the piece after the point k, zero before the first point and after the last. The same function
+    as `table_thrust` to rounding, without an index that depends on the command, so that it can be written as
+    straight-line code; at a point of the table its slope is the mean of both sides.
+
+    Args:
+        command: (...).
+        command_grid: rising commands of the table, (k,), k >= 2.
+        thrust_grid: thrust at these commands, N, (k,).
+
+    Returns:
+        (...), N.
+    """
+    slope = (thrust_grid[1:] - thrust_grid[:-1]) / (command_grid[1:] - command_grid[:-1])
+    level = torch.zeros_like(slope[:1])
+    kink = 0.5 * (torch.cat((slope, level)) - torch.cat((level, slope)))
+    away = (command.unsqueeze(-1) - command_grid).abs()
+    return 0.5 * (thrust_grid[0] + thrust_grid[-1]) + (kink * away).sum(-1)

@@ -273,7 +273,7 @@ def _actuated(model: GreyBox, actuation: str | None) -> GreyBox:
     if actuation is None or actuation == model.actuation:
         return model
     effects = [type(e).build(model.vehicle, actuation, e.values()) for e in model.copied_effects()]
-    return GreyBox(model.vehicle, effects, model.damping, actuation)
+    return model.rebuilt(effects, actuation=actuation)
 
 
 def _battery(model: GreyBox, t: Array, generators: Sequence[np.random.Generator]) -> Array | None:

@@ -7,11 +7,12 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from auvnn.errors import InputError, ModelError
+from auvnn.errors import AuvnnError, InputError, ModelError
 from auvnn.storage.manifest import CODE_SUFFIXES, MANIFEST, check_name, read_manifest
+from auvnn.storage.removal import remove_own
 
 SCHEMA = "auvnn/folder/1"
 
@@ -22,6 +23,7 @@ def write_folder(
     overwrite: bool = False,
     *,
     schema: str = SCHEMA,
+    readable: Callable[[dict[str, bytes]], object] | None = None,
 ) -> Path:
     """Write files and their manifest into a new folder that appears whole or not at all.
 
@@ -34,12 +36,14 @@ def write_folder(
         files: plain file names and their content; text is written as UTF-8.
         overwrite: replace an existing folder of this kind. One that holds anything else is never replaced.
         schema: kind and version that the manifest states, "kind/number".
+        readable: reads what was written, and raises where it cannot; called before anything that was there goes.
 
     Returns:
         The folder's path.
 
     Raises:
         InputError: the folder exists and is not empty, or a name is not a plain file name.
+        ModelError: what was written cannot be read back; what was there is still there.
     """
     path = Path(path)
     for name in files:
@@ -59,6 +63,7 @@ def write_folder(
         _write_flushed(staged / MANIFEST, manifest.encode())
         staged.chmod(0o755)
         _flush_folder(staged)
+        _read_back(staged, content, path, schema, readable)
         previous = _previous(path)
         if path.is_dir():
             if any(path.iterdir()):
@@ -71,8 +76,27 @@ def write_folder(
         shutil.rmtree(staged, ignore_errors=True)
         _restore_previous(path)
         raise
-    shutil.rmtree(_previous(path), ignore_errors=True)
+    remove_own(_previous(path))
     return path
+
+
+def _read_back(
+    staged: Path,
+    content: Mapping[str, bytes],
+    path: Path,
+    schema: str,
+    readable: Callable[[dict[str, bytes]], object] | None,
+) -> None:
+    try:
+        found = read_folder(staged, schema=schema)
+        if found != content:
+            raise ModelError("the disk holds something else than was written")
+        if readable is not None:
+            readable(found)
+    except AuvnnError as error:
+        raise ModelError(
+            f"{path}: not saved, because it could not be read again ({error}); what was there is kept"
+        ) from error
 
 
 def folder_exists(path: str | Path) -> bool:
@@ -163,10 +187,11 @@ def _previous(path: Path) -> Path:
 def _restore_previous(path: Path) -> None:
     """Put back what a killed replacement had moved aside."""
     previous = _previous(path)
-    if not previous.is_dir():
+    if not previous.is_dir() or previous.is_symlink():
+        remove_own(previous)
         return
     if path.exists():
-        shutil.rmtree(previous, ignore_errors=True)
+        remove_own(previous)
     else:
         os.replace(previous, path)
 

@@ -27,7 +27,14 @@ def tensors_to_bytes(tensors: Mapping[str, Tensor], *, finite: bool = True) -> b
         raise ModelError(
             f"weights are NaN or infinite in {', '.join(bad)}: not saved; train again from the last good"
         )
-    return save({name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()})
+    plain = {name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}
+    data = save(plain)
+    again = tensors_from_bytes(data, finite=False)
+    if again.keys() != plain.keys() or not all(_same(again[name], plain[name]) for name in plain):
+        raise ModelError(
+            "weights cannot be read back as they are: not saved; please report this with the model"
+        )
+    return data
 
 
 def tensors_from_bytes(
@@ -52,13 +59,14 @@ def tensors_from_bytes(
     from safetensors import SafetensorError
     from safetensors.torch import load
 
-    if data[:1] == b"\x80" or data[:2] == b"PK":
-        raise ModelError(
-            f"{where}: this is a pickle or a zip archive, not safetensors: auvnn does not open those"
-        )
     try:
         tensors = load(data)
     except (SafetensorError, KeyError, ValueError, RuntimeError) as error:
+        # Only now: a safetensors file begins with a length, whose first byte may be that of a pickle by chance.
+        if data[:1] == b"\x80" or data[:2] == b"PK":
+            raise ModelError(
+                f"{where}: this is a pickle or a zip archive, not safetensors: auvnn does not open those"
+            ) from None
         raise ModelError(f"{where}: not a readable safetensors file ({error}): make it again") from error
     wrong = [] if expected is None else _differences(tensors, expected)
     if finite:
@@ -81,6 +89,14 @@ def _differences(
         if name in tensors and tensors[name].dtype != dtype:
             wrong.append(f"{name} is {tensors[name].dtype} instead of {dtype}")
     return wrong
+
+
+def _same(a: Tensor, b: Tensor) -> bool:
+    """Say whether two tensors hold the same bits."""
+    alike = a.dtype == b.dtype and a.shape == b.shape
+    if not alike or a.numel() == 0:
+        return alike
+    return torch.equal(a.reshape(-1).view(torch.uint8), b.reshape(-1).view(torch.uint8))
 
 
 def _is_finite(tensor: Tensor) -> bool:

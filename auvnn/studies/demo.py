@@ -13,9 +13,11 @@ from auvnn.comparison import Comparison, compare
 from auvnn.diagnosis import Diagnosis, diagnose
 from auvnn.diagnosis.answers.words import number
 from auvnn.improvement import Improvement, add
+from auvnn.logs import Log
 from auvnn.metrics.rollouts import rollout_table, scale_of
-from auvnn.models import load
+from auvnn.models import GreyBox, load
 from auvnn.simulation import simulate
+from auvnn.simulation.simulate import Simulation
 
 VEHICLE = "rov95"
 HIDDEN = {"ocean_current": {"v_north": 0.15, "v_east": -0.10, "v_down": 0.0}}
@@ -63,6 +65,13 @@ class Demo(Answer):
         )
 
 
+def made_logs(model: GreyBox, seed: int = 0) -> tuple[Simulation, Log, Log]:
+    """Return the demo's simulation with its hidden current, the log to fit on, and the held-out last run."""
+    made = simulate(model, "multisine", "realistic", HIDDEN, seed, runs=RUNS, duration=DURATION)
+    numbers = [run.number for run in made.log.runs]
+    return made, made.log.select(numbers[:-1]), made.log.select(numbers[-1:])
+
+
 def run_demo(out: Path, seed: int = 0, say: Callable[[str], None] = print) -> Demo:
     """Hide a current, and go the whole way.
 
@@ -76,9 +85,7 @@ def run_demo(out: Path, seed: int = 0, say: Callable[[str], None] = print) -> De
     began = time.monotonic()
     out = Path(out)
     model = load(VEHICLE)
-    made = simulate(model, "multisine", "realistic", HIDDEN, seed, runs=RUNS, duration=DURATION)
-    numbers = [run.number for run in made.log.runs]
-    log, test = made.log.select(numbers[:-1]), made.log.select(numbers[-1:])
+    made, log, test = made_logs(model, seed)
     log.write(out / "simulate" / "log.parquet")
     test.write(out / "simulate" / "test.parquet")
     write_text(out / "simulate" / "truth.json", json.dumps(plain(made.truth), indent=1, allow_nan=False))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,11 @@ from torch import Tensor
 
 from auvnn.errors import ConfigError, InputError, ModelError
 from auvnn.storage import read_folder, tensors_from_bytes, tensors_to_bytes, write_folder
+from auvnn.storage.removal import remove_own, remove_unfinished
 
 SCHEMA = "auvnn/checkpoint/1"
 KEPT = 2
+_FILES = ("state.json", "state.safetensors")
 
 
 class Checkpoints:
@@ -59,10 +61,12 @@ class Checkpoints:
         path = self.folder / f"checkpoint-{iteration:08d}"
         if path.exists():
             # A damaged one that was passed over, or one ahead of where a resumed fit went on from.
-            shutil.rmtree(path)
-        write_folder(path, {"state.json": state, "state.safetensors": weights}, schema=SCHEMA)
+            remove_own(path, _FILES)
+        files: dict[str, bytes | str] = {"state.json": state, "state.safetensors": weights}
+        write_folder(path, files, schema=SCHEMA, readable=_parts)
         for old in self._found()[KEPT:]:
-            shutil.rmtree(old, ignore_errors=True)
+            with contextlib.suppress(InputError):  # what it also holds is not ours to delete
+                remove_own(old, _FILES)
         return path
 
     def load(
@@ -83,14 +87,12 @@ class Checkpoints:
             ConfigError: data or options have changed since.
         """
         for leftover in self.folder.glob(".checkpoint-*.partial") if self.folder.is_dir() else ():
-            shutil.rmtree(leftover, ignore_errors=True)  # of a run that was killed while it saved
+            remove_unfinished(leftover)  # of a run that was killed while it saved
         notes: list[str] = []
         for path in self._found():
             try:
                 files = read_folder(path, schema=SCHEMA)
-                state = json.loads(files["state.json"])
-                where = f"{path}/state.safetensors"
-                tensors = tensors_from_bytes(files["state.safetensors"], where=where, finite=False)
+                state, tensors = _parts(files, path)
             except (ModelError, KeyError, ValueError) as error:
                 notes.append(f"checkpoint not used: {error}")
                 continue
@@ -127,6 +129,15 @@ class Checkpoints:
             raise ModelError(
                 f"{path}: does not fit this fit: {'; '.join(wrong)}: train again in another folder"
             )
+
+
+def _parts(
+    files: Mapping[str, bytes], path: Path | str = "checkpoint"
+) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """Return what a checkpoint's files hold: the plain part, and the tensors."""
+    state = json.loads(files["state.json"])
+    where = f"{path}/state.safetensors"
+    return state, tensors_from_bytes(files["state.safetensors"], where=where, finite=False)
 
 
 def _changes(old: Any, new: Any, where: str = "") -> list[str]:

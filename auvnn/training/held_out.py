@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from auvnn.executors import Executor
 from auvnn.log_chunks.samples import Piece, inside, run_of
 from auvnn.logs.reading.mapping import Mapping
-from auvnn.metrics.one_step import Derivative, accelerations
+from auvnn.metrics.derivative import Derivative
+from auvnn.metrics.one_step import accelerations
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]

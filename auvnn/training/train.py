@@ -16,16 +16,12 @@ from auvnn.answers import Answer, plain
 from auvnn.damping.bank import DampingBank
 from auvnn.logs import Log
 from auvnn.logs.leakage import leakage
-from auvnn.metrics.one_step import (
-    Derivative,
-    OneStep,
-    choose_derivative,
-    one_step,
-    scores,
-)
+from auvnn.metrics.derivative import Derivative, choose_derivative
+from auvnn.metrics.one_step import OneStep, one_step, scores
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
-from auvnn.training.confounding.confounded_effects import Confounding, confounded_effects
+from auvnn.training.confounding.confounded_effects import confounded_effects
+from auvnn.training.confounding.confounding import Confounding
 from auvnn.training.fit_damping import Fit, fit_damping
 from auvnn.training.history import Record
 from auvnn.training.objectives.base import build_objective

@@ -142,7 +142,7 @@ def train_files(
             refuse_leakage(pool, whole, tested, plan)
         looked = _sample(shares.fitted, plan, name)
         for some in (looked, *([] if tested is None else [_sample(tested, plan, test_name)])):
-            some.quality().refuse_contradictions(force)
+            some.quality().refuse_errors(force)
         problem, held = _problem(pool, Source.of(model, how, plan, Path(folder)), shares, group, say)
 
         def told(record: Record) -> None:

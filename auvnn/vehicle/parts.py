@@ -19,6 +19,9 @@ DEFAULT_UNCERTAINTY = {
     "mass": 0.0,
     "buoyancy": 0.0,
     "thrust": 0.0,
+    "fins": 0.0,
+    "center_of_gravity": 0.0,
+    "center_of_buoyancy": 0.0,
 }
 
 

@@ -180,8 +180,26 @@ def _effects(fields: Fields) -> dict[str, dict[str, Any]]:
         for key, value in (parameters or {}).items():
             if not isinstance(key, str):
                 raise ModelError(f"{where}: {name}: {shown(key)} is not the name of a parameter; use a word")
+            if key == "uncertainty" and value is not None:
+                result[name][key] = _deviations(value, f"{where}: {name}")
+                continue
             result[name][key] = _plain(value, where, f"{name}.{key}")
     return result
+
+
+def _deviations(value: Any, where: str) -> dict[str, float]:
+    """Return standard deviations by parameter."""
+    if not isinstance(value, Mapping):
+        raise ModelError(
+            f"{where}: uncertainty is {shown(value)}; write `uncertainty: {{parameter: deviation}}`"
+        )
+    out = {str(k): number(where, f"uncertainty.{k}", v) for k, v in value.items()}
+    for key, deviation in out.items():
+        if deviation < 0:
+            raise ModelError(
+                f"{where}: uncertainty.{key} is {deviation:g}: a deviation is not negative; drop the sign"
+            )
+    return out
 
 
 def _plain(value: Any, where: str, field: str, depth: int = 0) -> Any:

@@ -65,7 +65,8 @@ def peer(hidden: str, minutes: float, rate: float) -> dict[str, Any]:
         return {"answer": ["skipped: pip install pysindy"]}
     import numpy as np
 
-    from auvnn.metrics.one_step import choose_derivative, one_step
+    from auvnn.metrics.derivative import choose_derivative
+    from auvnn.metrics.one_step import one_step
 
     model, log = logged(hidden, minutes, rate)
     parts = one_step(model, log, choose_derivative(log))

@@ -88,7 +88,8 @@ def measure(what: str, path: Path, workers: int) -> dict[str, float]:
     from auvnn.diagnosis.hypotheses.layout import lay_out
     from auvnn.effects import Extent
     from auvnn.executors import executor_for
-    from auvnn.log_chunks.windows import WindowCut, plan_files
+    from auvnn.log_chunks.scan import WindowCut
+    from auvnn.log_chunks.windows import plan_files
     from auvnn.logs.reading.mapping import Mapping
 
     model = auvnn.load("rov90", actuation="wrench")

@@ -105,7 +105,7 @@ def test_code_in_a_folder_of_configs_is_refused(refused, tmp_path):
         f"# @package _global_\nhydra:\n  callbacks:\n    x:\n      _target_: os.mkdir\n      path: {marker}\n"
     )
     line = refused("check", "log=dive.csv", "--config-dir", str(tmp_path / "theirs"), "+extra=evil")
-    assert "never Python code" in line
+    assert "'_target_' could name code" in line
     assert not marker.exists()
 
 
@@ -114,7 +114,7 @@ def test_environment_variables_in_a_folder_of_configs_are_refused(refused, tmp_p
     folder.mkdir(parents=True)
     (folder / "leak.yaml").write_text("# @package _global_\nmapping: ${oc.env:HOME}\n")
     line = refused("check", "log=dive.csv", "--config-dir", str(tmp_path / "theirs"), "+extra=leak")
-    assert "${oc.env:...}" in line
+    assert "'${oc.env:HOME}' asks for interpolation" in line
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from auvnn.cli.folder import WORK, locked, refuse_taken, written
+from auvnn.cli.working import marked
 from auvnn.errors import ConfigError, InputError
 
 
@@ -72,6 +73,7 @@ def test_a_failed_run_into_a_new_place_leaves_no_folders_behind(tmp_path):
 
 
 def test_files_of_a_killed_run_neither_block_nor_reach_the_next(tmp_path):
+    marked(tmp_path)
     stale = tmp_path / WORK / "new"
     stale.mkdir(parents=True)
     (stale / "stale.json").write_text("half")
@@ -80,6 +82,7 @@ def test_files_of_a_killed_run_neither_block_nor_reach_the_next(tmp_path):
 
 
 def test_folders_that_a_killed_run_had_moved_aside_come_back(tmp_path):
+    marked(tmp_path)
     aside = tmp_path / WORK / "old" / "figures"
     aside.mkdir(parents=True)
     (aside / "precious.svg").write_text("kept")

@@ -11,7 +11,8 @@ import torch
 
 from auvnn.compiled import toolchain
 from auvnn.damping.bank import DampingBank
-from auvnn.effects.base import Effect, Parameter
+from auvnn.effects.base import Effect
+from auvnn.effects.hooks import Parameter
 from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
 from auvnn.models import engine as engines

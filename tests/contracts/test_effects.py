@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
-
 import pytest
 
 from auvnn.effects import EFFECTS
@@ -56,20 +53,3 @@ def test_a_misspelt_effect_is_answered_with_the_right_one():
         ConfigError, match=r"no effect called 'ocean_curent'\. Did you mean 'ocean_current'\?"
     ):
         EFFECTS.get("ocean_curent")
-
-
-def readme_rows() -> dict[str, str]:
-    text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
-    section = text.split("\n## Effects\n", 1)[1].split("\n## ", 1)[0]
-    return {row[1]: row[0] for row in re.finditer(r"^\| `(\w+)` \|.*\|$", section, re.MULTILINE)}
-
-
-def test_the_readme_names_each_with_its_parameters_and_units():
-    rows = readme_rows()
-    assert list(rows) == EFFECTS.names()
-    vehicle = load_vehicle("rov95")
-    for name, row in rows.items():
-        for p in EFFECTS.get(name).describe(vehicle, "wrench"):
-            assert f"`{p.name}`" in row, f"{name}: {p.name}"
-            words = ("factor", "share", "exponent") if p.unit == "1" else (p.unit,)
-            assert any(w in row for w in words), f"{name}: {p.unit}"

@@ -53,3 +53,16 @@ def test_its_drag_is_against_the_motion_in_proportion_to_length_and_speed_square
     speed = np.linalg.norm(v, axis=1)
     expected = -1.3 * (length * speed)[:, None] * v
     np.testing.assert_allclose(force, np.pad(expected, ((0, 0), (0, 3))), rtol=1e-8, atol=1e-9)
+
+
+def test_made_fast_at_the_stern_it_turns_the_vehicle_by_its_arm(plain, vector, still):
+    at = {"stiffness": 5.0, "slack": 1.0, "x": -0.4, "z": 0.1}
+    model = plain({"tether": at})
+    # Heading north, made fast at (9.6, 0, 3.1) in the world, with the cable to the world's origin.
+    end = np.array([10.0 - 0.4, 0.0, 3.0 + 0.1])
+    length = np.linalg.norm(end)
+    force = -5.0 * (length - 1.0) * end / length
+    moment = np.cross([-0.4, 0.0, 0.1], force)
+    found = model(vector(10, 0, 3, 0, 0, 0), still, still).tolist()
+    inertia = np.array([70, 80, 90, *np.diag(model.vehicle.inertia_matrix)[3:]])
+    assert found == pytest.approx(np.concatenate([force, moment]) / inertia, rel=1e-9, abs=1e-12)

@@ -9,7 +9,8 @@ from auvnn.errors import InputError
 from auvnn.estimation.one_step_error import fit_one_step
 from auvnn.estimation.priors import Priors, set_parameters
 from auvnn.logs import Log, Run
-from auvnn.metrics.one_step import Derivative, accelerations, choose_derivative
+from auvnn.metrics.derivative import Derivative, choose_derivative
+from auvnn.metrics.one_step import accelerations
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
 

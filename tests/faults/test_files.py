@@ -66,7 +66,7 @@ def test_row_03_a_name_that_promises_another_format(refused, noted, good):
     Path("good.csv").rename("log.parquet")
     assert "warning: log.parquet: the name says parquet, the content is csv" in noted("log.parquet")
     Path("dive.csv").write_bytes(b"\x89MCAP0\r\n" + bytes(60))
-    assert "an MCAP recording: export its topics as CSV or Parquet" in refused("check", "log=dive.csv")
+    assert "is a mcap recording and holds no messages" in refused("check", "log=dive.csv")
 
 
 @pytest.mark.parametrize("name", ["noise.csv", "noise.parquet"])

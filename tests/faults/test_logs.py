@@ -210,7 +210,8 @@ def test_row_47_quaternions_that_are_no_rotation(noted, refused):
 
 
 def test_row_59_spikes_are_left_out_and_counted(noted):
-    from auvnn.metrics.one_step import accelerations, choose_derivative
+    from auvnn.metrics.derivative import choose_derivative
+    from auvnn.metrics.one_step import accelerations
     from auvnn.metrics.windows import cut_windows
     from auvnn.models import load
 

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 import torch
 
+from auvnn.diagnosis.fitters import fitter_for
 from auvnn.diagnosis.hypotheses.bake import with_body
 from auvnn.diagnosis.hypotheses.layout import lay_out
 from auvnn.errors import ConfigError, InputError
 from auvnn.improvement import add
-from auvnn.improvement.add import _by_one_step
-from auvnn.improvement.gains import noise_floor, paired_gain
+from auvnn.improvement.gains import paired_gain
 from auvnn.logs import Log, Run
+from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.rollouts import Rolled, Scale, roll, rollout_table, scale_of
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox, load, remove
@@ -294,9 +295,7 @@ def test_a_parameter_that_ends_at_its_bound_is_reported(model):
     log = make_log(GreyBox(small_vehicle(**bare)), runs=3, duration=8.0, size=0.5)
     found = add(GreyBox(small_vehicle(0.0)), log, "linear_damping")
     assert found.parameters["linear_damping"]["X"]["value"] == 0.01
-    assert any(
-        "linear_damping.X ended at its bound 0.01 1: the data ask for more" in w for w in found.warnings
-    )
+    assert any("linear_damping.X ended at its bound 0.01: the data ask for more" in w for w in found.warnings)
     assert found.accepted
 
 
@@ -411,7 +410,8 @@ def test_a_fit_one_step_ahead_leaves_spikes_out_as_the_warning_says(model):
         nu = run.nu.copy()
         nu[40, 2] = value
         log = Log.from_runs([replace(run, nu=nu)])
-        found = _by_one_step(log, None)(lay_out(model, ["net_buoyancy"]), [], ["net_buoyancy"], None)
+        fitter = fitter_for(model, log, "one_step")
+        found = fitter.fit(lay_out(model, ["net_buoyancy"]), [], ["net_buoyancy"], None)
         fits.append(found.fitted.theta)
     assert fits[0] == pytest.approx(fits[1], rel=1e-9) and fits[0] == pytest.approx(6.0, abs=0.5)
 

@@ -10,7 +10,8 @@ import pytest
 from scipy import stats
 
 from auvnn.errors import ConfigError, InputError
-from auvnn.improvement.fleet import Question, dive, fleet
+from auvnn.improvement.fleet import fleet
+from auvnn.improvement.one_dive import Question, dive
 from auvnn.improvement.trend import trend
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.models import GreyBox

@@ -9,8 +9,9 @@ import pytest
 import torch
 
 from auvnn.errors import InputError
-from auvnn.log_chunks import windows as parts_
-from auvnn.log_chunks.windows import WindowCut, concatenate_windows, plan_file, runs_of, windows_of
+from auvnn.log_chunks import scan as parts_
+from auvnn.log_chunks.scan import WindowCut
+from auvnn.log_chunks.windows import concatenate_windows, plan_file, runs_of, windows_of
 from auvnn.logs import Log, Run
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.metrics.windows import Windows, cut_windows

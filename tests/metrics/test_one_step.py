@@ -10,9 +10,9 @@ from scipy.signal import freqz, savgol_coeffs, savgol_filter
 import tests.metrics.surge_and_roll as simple
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run
+from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.one_step import (
     OneStepReplay,
-    choose_derivative,
     integrated,
     model_acceleration,
     model_velocity,

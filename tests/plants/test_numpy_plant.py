@@ -20,7 +20,8 @@ from tests.plants.plant_tasks import apart, move, plausible, task
 # As a share of the largest motion. Left over by the model's own RK4 at 5 ms; at 2.5 ms it is a tenth of it.
 CLOSE = 2e-6
 VEHICLES = ("rov95", "bluerov2_heavy", "remus100")
-NEEDS = {"voltage_droop": "bluerov2", "fin_stall": "remus100"}
+NEEDS = {"voltage_droop": "bluerov2", "fin_stall": "remus100", "fin_gain": "remus100", "fin_offset": "remus100",
+         "fin_drag": "remus100"}  # fmt: skip
 # Compared on their own below: the model takes sums (over strips, over rows) where this plant has integrals.
 SUMMED = ("cross_flow_drag", "thrust_overshoot")
 

@@ -16,7 +16,8 @@ from scipy import stats
 from auvnn.answers import DRAWERS
 from auvnn.report import style
 from auvnn.report.html import SECURITY
-from auvnn.report.pages.benchmark import PAGE, TARGET, BenchmarkPage
+from auvnn.report.pages.benchmark import PAGE, BenchmarkPage
+from auvnn.report.pages.benchmark_words import TARGET
 from auvnn.report.panels import NoData
 from auvnn.report.plots.confusion import OUTCOMES, confusion
 from auvnn.report.plots.coverage import coverage

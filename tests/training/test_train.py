@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run
-from auvnn.metrics.one_step import choose_derivative, one_step, scores
+from auvnn.metrics.derivative import choose_derivative
+from auvnn.metrics.one_step import one_step, scores
 from auvnn.models import GreyBox, load
 from auvnn.training.train import targets, train
 from tests.small_logs import make_log, small_vehicle

@@ -19,11 +19,12 @@ import auvnn
 from auvnn.errors import ConfigError, InputError
 from auvnn.executors import EXECUTORS, executor_for
 from auvnn.log_chunks import samples as pieces
-from auvnn.log_chunks import windows as parts
+from auvnn.log_chunks import scan as parts
 from auvnn.log_chunks.samples import Reading, evenly_spread_runs, pieces_of_file
 from auvnn.logs import Log
 from auvnn.logs.reading.mapping import Mapping
-from auvnn.metrics.one_step import choose_derivative, one_step, scores
+from auvnn.metrics.derivative import choose_derivative
+from auvnn.metrics.one_step import one_step, scores
 from auvnn.models import GreyBox
 from auvnn.training import train, train_files
 from auvnn.training import train_files as module_function

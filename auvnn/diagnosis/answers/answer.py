@@ -10,14 +10,32 @@ from numpy.typing import NDArray
 
 from auvnn.answers import Answer
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.training.confounding.confounded_effects import Confounding
+from auvnn.training.confounding.confounding import Confounding
 
 Array = NDArray[np.float64]
 
 
-@dataclass
+class OneOf(list[str]):
+    """Names of which one is missing, and the log cannot tell which; `add` takes the first of them."""
+
+
+@dataclass(kw_only=True)
 class Diagnosis(Answer):
-    """What is missing in a model; `to_dict` is `diagnosis.json` of the public contract."""
+    """What is missing in a model; `to_dict` is `diagnosis.json` of the public contract.
+
+    Attributes:
+        verdict: named, ambiguous, partial, unknown or adequate.
+        missing: names to add, those that matter first; of an ambiguous verdict the rivals, as `OneOf`.
+        matters: name to what it costs, how large its force is, and whether that is beyond the tolerance.
+        nearest: names that explain a part and are not the cause; of a partial verdict those that predict.
+        joint: of a partial verdict, what each of these does beside the others.
+        left: degree of freedom to the force without a name, and the smallest that this log would have shown.
+        small_remainder: whether a force is left that does not matter.
+        moved: stated coefficients that were moved by more than two of their standard deviations.
+        tolerance: what does not matter.
+        judged_by: how the costs were worked out.
+        baseline: error of the model as given, of a plain regression and of persistence, and where it loses to them.
+    """
 
     kind = "diagnosis"
     model: str
@@ -38,9 +56,16 @@ class Diagnosis(Answer):
     absorbed: Confounding | None = None
     acts_in: dict[str, float] = field(default_factory=dict)
     nearest: list[str] = field(default_factory=list)
+    matters: dict[str, dict[str, Any]] = field(default_factory=dict)
+    joint: dict[str, dict[str, Any]] = field(default_factory=dict)
+    left: dict[str, Any] = field(default_factory=dict)
+    small_remainder: bool = False
+    moved: list[dict[str, Any]] = field(default_factory=list)
+    tolerance: dict[str, float] = field(default_factory=dict)
+    judged_by: str = ""
     whole_log: dict[str, Any] | None = None
-    left: dict[str, dict[str, float]] = field(default_factory=dict)
-    commands: dict[str, Any] | None = None
+    baseline: dict[str, Any] = field(default_factory=dict)
+    stochastic: dict[str, Any] = field(default_factory=dict)
 
     @property
     def surfaces(self) -> list[dict[str, Any]]:
@@ -53,6 +78,15 @@ class Diagnosis(Answer):
         from auvnn.diagnosis.answers.words import tell
 
         return tell(self)
+
+    @property
+    def judged_words(self) -> list[str]:
+        """What each name costs and what is left, as plain sentences."""
+        from auvnn.diagnosis.answers import judged_words
+        from auvnn.diagnosis.answers.moved import moved_words
+
+        told = judged_words.predicts(self) if self.verdict == "partial" else judged_words.costs(self)
+        return [*told, *judged_words.left(self), *moved_words(self.moved)]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
@@ -70,14 +104,22 @@ class Diagnosis(Answer):
             "depends_on",
             "acts_in",
             "nearest",
+            "matters",
+            "joint",
+            "left",
+            "small_remainder",
+            "moved",
+            "tolerance",
+            "judged_by",
+            "judged_words",
             "next_experiment",
             "warnings",
             "global_p_value",
             "residual_tests",
             "story",
             "whole_log",
-            "left",
-            "commands",
+            "baseline",
+            "stochastic",
         )
         absorbed = None if self.absorbed is None else self.absorbed.to_dict()
         return plain(

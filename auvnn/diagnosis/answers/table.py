@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,7 @@ def candidate_table(
             "parameters": {},
             "confusable_with": [],
             "needs": absent,
+            "reason": None,
             "_order": -np.inf,
         }
         if found is not None:
@@ -66,16 +67,37 @@ def candidate_table(
 
 
 def fill_candidate(
-    layout: Layout, table: dict[str, dict[str, Any]], explanation: FittedHypothesis, before: FittedHypothesis
-) -> None:
-    """Replace the one-step figures of an effect by those of its own fit."""
-    found = values(layout, explanation, explanation.effects)
+    layout: Layout,
+    table: Mapping[str, dict[str, Any]],
+    explanation: FittedHypothesis,
+    before: FittedHypothesis,
+    beside: Mapping[str, FittedHypothesis] | None = None,
+) -> dict[str, dict[str, Any]]:
+    """Return the table with the one-step figures of an explanation's effects replaced by those of its own fit.
+
+    Args:
+        layout: stated values.
+        table: the candidates.
+        explanation: the fit.
+        before: the fit without any effect.
+        beside: of several effects, the fits without each: what an effect does is what it does beside the others.
+    """
+    found, out = values(layout, explanation, explanation.effects), dict(table)
+    whole = max(excess_variance(before, before), 1e-12)
+    after = _scaled_left_out(explanation, before)
     for name in explanation.effects:
-        table[name].update(
-            cv_before=before.cv,
-            cv_after=float(np.sqrt(_scaled_left_out(explanation, before) / before.left_out_count.sum())),
-            parameters=found[name],
-        )
+        own: dict[str, Any] = {"parameters": found[name]}
+        count = before.left_out_count.sum()
+        if beside is None or name not in beside or beside[name] is before:
+            own["cv_before"] = before.cv
+        else:
+            own["cv_before"] = float(np.sqrt(max(_scaled_left_out(beside[name], before), 0.0) / count))
+        own["cv_after"] = float(np.sqrt(max(after, 0.0) / count))
+        if beside is not None and name in beside:
+            fall = excess_variance(beside[name], before) - excess_variance(explanation, before)
+            own["explained"] = float(np.clip(fall / whole, 0.0, 1.0))
+        out[name] = {**out[name], **own}
+    return out
 
 
 def values(

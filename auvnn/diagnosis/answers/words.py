@@ -6,13 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from auvnn.diagnosis.answers import judged_words
+from auvnn.diagnosis.answers.moved import moved_words
+from auvnn.diagnosis.noise_law.words import stochastic_words
 from auvnn.effects import EFFECTS
 
 if TYPE_CHECKING:
     from auvnn.diagnosis.answers.answer import Diagnosis
 
 
-MOTIONS = {"X": "surge", "Y": "sway", "Z": "heave", "K": "roll", "M": "pitch", "N": "yaw"}
+MOTIONS = judged_words.MOTIONS
 
 
 def number(value: float | None, std: float | None, unit: str) -> str:
@@ -33,15 +36,6 @@ def parameters(candidate: dict[str, Any]) -> str:
     )
 
 
-def stochastic(left: dict[str, dict[str, float]]) -> str:
-    """Return the stochastic force that is left as a sentence."""
-    parts = [
-        f"{MOTIONS[axis]} {told['rms']:.2g} {'N' if axis in 'XYZ' else 'N m'} over {told['correlation_time']:.2g} s"
-        for axis, told in left.items()
-    ]
-    return f"A stochastic force is left (rms, correlation time): {', '.join(parts)}."
-
-
 def tell(diagnosis: Diagnosis) -> list[str]:
     """Return the diagnosis as a few sentences."""
     by_name = {c["effect"]: c for c in diagnosis.candidates}
@@ -49,8 +43,18 @@ def tell(diagnosis: Diagnosis) -> list[str]:
     gone = {e for step in diagnosis.steps if step["verdict"] == "withdrawn" for e in step["effects"]}
     if diagnosis.verdict == "adequate":
         return [
-            f"Nothing is missing that this log can show: the model is adequate within its stated "
-            f"uncertainties (global p = {diagnosis.global_p_value:.2g})."
+            _adequate(diagnosis),
+            *judged_words.left(diagnosis),
+            *moved_words(diagnosis.moved),
+        ]
+    if diagnosis.verdict == "partial":
+        return [
+            "Something is missing that no effect of the catalogue explains as a whole.",
+            *judged_words.predicts(diagnosis),
+            *_where(diagnosis),
+            *judged_words.left(diagnosis),
+            *_dependence(diagnosis),
+            *moved_words(diagnosis.moved),
         ]
     for step in diagnosis.steps:
         if step["verdict"] == "named":
@@ -71,32 +75,57 @@ def tell(diagnosis: Diagnosis) -> list[str]:
                 else "What is left is not noise, and no further effect of the catalogue explains it."
             )
         elif lines:
-            lines.append("With that the model is adequate: what is left looks like noise.")
+            lines.append(
+                "With that the model is adequate: what is left does not matter within the tolerance."
+                if diagnosis.small_remainder
+                else "With that the model is adequate: what is left looks like noise."
+            )
+    lines += judged_words.costs(diagnosis)
     if diagnosis.nearest:
         one = len(diagnosis.nearest) == 1
         lines.append(
             f"{' and '.join(diagnosis.nearest)} {'comes' if one else 'come'} nearest, and "
             f"{'leaves' if one else 'leave'} too much of it to be the cause."
         )
-    if diagnosis.acts_in:
-        first, *others = (f"{MOTIONS[axis]} ({axis})" for axis in diagnosis.acts_in)
-        also = f", and shows in {' and '.join(others)} too" if others else ""
-        lines.append(f"It acts in {first}{also}.")
-    if diagnosis.left:
-        lines.append(stochastic(diagnosis.left))
-    if diagnosis.commands and diagnosis.commands["between_samples"] != "held":
-        lines.append(
-            "Commands change between the log's samples: the mean of an interval was taken as "
-            f"{1 - diagnosis.commands['share_of_next']:.0%} of its own sample's and "
-            f"{diagnosis.commands['share_of_next']:.0%} of the next one's."
-        )
-    if diagnosis.depends_on:
-        strong = []
-        for axis, shares in diagnosis.depends_on.items():
-            if shares:
-                top = max(shares, key=lambda n: shares[n])
-                if shares[top] >= 0.05:
-                    strong.append(f"{axis} on {top} ({shares[top]:.0%})")
-        if strong:
-            lines.append("The remaining residual depends on: " + ", ".join(strong) + ".")
-    return lines
+    return [
+        *lines,
+        *_where(diagnosis),
+        *judged_words.left(diagnosis),
+        *stochastic_words(diagnosis.stochastic),
+        *_dependence(diagnosis),
+        *moved_words(diagnosis.moved),
+    ]
+
+
+def _adequate(diagnosis: Diagnosis) -> str:
+    if diagnosis.small_remainder:
+        return "Nothing is missing that matters within the tolerance."
+    return (
+        f"Nothing is missing that this log can show: the model is adequate within its stated "
+        f"uncertainties (global p = {diagnosis.global_p_value:.2g})."
+    )
+
+
+def _where(diagnosis: Diagnosis) -> list[str]:
+    """Say where the force that is left acts."""
+    if not diagnosis.acts_in or diagnosis.small_remainder:
+        return []
+    first, *others = (f"{MOTIONS[axis]} ({axis})" for axis in diagnosis.acts_in)
+    also = f", and shows in {' and '.join(others)} too" if others else ""
+    what = "What is left" if diagnosis.missing or diagnosis.joint else "It"
+    return [f"{what} acts in {first}{also}."]
+
+
+def _dependence(diagnosis: Diagnosis) -> list[str]:
+    """Say on which measured inputs what is left depends."""
+    strong = []
+    for axis, shares in diagnosis.depends_on.items():
+        if shares:
+            top = max(shares, key=lambda n: shares[n])
+            if shares[top] >= 0.05:
+                strong.append(f"{axis} on {top} ({shares[top]:.0%})")
+    if not strong and any(diagnosis.depends_on.values()):
+        axis = max(diagnosis.depends_on, key=lambda a: max(diagnosis.depends_on[a].values(), default=0.0))
+        top = max(diagnosis.depends_on[axis], key=lambda n: diagnosis.depends_on[axis][n])
+        strong = [f"{axis} on {top} (surely, though for a small part of it)"]
+    return ["The remaining residual depends on: " + ", ".join(strong) + "."] if strong else []

@@ -18,8 +18,9 @@ from auvnn.diagnosis.score_tests.probes import Probed
 from auvnn.diagnosis.score_tests.score import Score, following, projection, ratio, score_from_sums
 from auvnn.effects import Extent
 from auvnn.estimation.priors import Priors, bounded_step, limits, parameters_of, set_parameters
+from auvnn.estimation.scaling import unit_of
 from auvnn.estimation.sufficient_statistics import Combination, WindowSums
-from auvnn.log_chunks.windows import WindowCut
+from auvnn.log_chunks.scan import WindowCut
 
 Array = NDArray[np.float64]
 # Steps of the fit on everything; it begins where the fit on the sample has ended, and ends when a step would change the
@@ -157,9 +158,10 @@ def refit(
             break
         normal = sums.hessian + np.diag(priors.precision)
         gradient = sums.slope - priors.precision * (theta - priors.mean)
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+        unit = unit_of(normal)
+        scale = 1.0 / np.where(unit > 0.0, unit, 1.0)
         step = unit * bounded_step(
-            normal * unit[:, None] * unit, gradient * unit, (low - theta) / unit, (high - theta) / unit
+            normal * unit[:, None] * unit, gradient * unit, (low - theta) * scale, (high - theta) * scale
         )
         done = float(step @ normal @ step) < ENOUGH
         theta, steps = theta + step, steps + 1
@@ -178,7 +180,7 @@ def _errors(
     """Return standard errors as `explain.standard_errors` does, for each effect's columns at a time."""
     size = len(sums.slope)
     total = sums.hessian + np.diag(priors.precision)
-    unit = 1.0 / np.sqrt(np.maximum(np.diag(total), 1e-300))
+    unit = unit_of(total)
     covariance = np.linalg.pinv(total * unit[:, None] * unit, hermitian=True) * unit[:, None] * unit
     combinations, informations = [], []
     for own in blocks:

@@ -20,6 +20,7 @@ a dozen runs through each window for the last two. Memory is that of a portion a
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -34,11 +35,12 @@ from auvnn.diagnosis.full_data.map_reduce import LinearisationPoint, MapReduce
 from auvnn.diagnosis.hypotheses.candidates import HORIZON, WARMUP, check_window_length
 from auvnn.diagnosis.hypotheses.layout import Layout, lay_out
 from auvnn.diagnosis.score_tests.null_tests import bonferroni
-from auvnn.diagnosis.search import Search
+from auvnn.diagnosis.stages.state import Searched
 from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.priors import set_parameters
 from auvnn.executors import Executor, executor_for
-from auvnn.log_chunks.windows import Plan, WindowCut, concatenate_windows, plan_file, runs_of
+from auvnn.log_chunks.scan import Plan, WindowCut
+from auvnn.log_chunks.windows import concatenate_windows, plan_file, runs_of
 from auvnn.logs import Log
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.logs.reading.portions import log_files
@@ -64,6 +66,8 @@ def diagnose_files(
     address: str | None = None,
     advice: bool = True,
     force: bool = False,
+    tolerance: Any = None,
+    costs: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """Say which physical effects a model lacks, by files of any size and number; see the module's text.
@@ -83,6 +87,8 @@ def diagnose_files(
         address: of a Ray or Dask cluster that is running.
         advice: for an ambiguous answer, also work out which manoeuvre would tell the candidates apart.
         force: go on with a log that contradicts itself.
+        tolerance: what does not matter, as in `diagnose`.
+        costs: also work out what each name costs.
         progress: told in words what is being done.
 
     Returns:
@@ -111,6 +117,8 @@ def diagnose_files(
             window=window,
             advice=advice,
             force=force,
+            tolerance=tolerance,
+            costs=costs,
             progress=say,
         )
         parts = plan.spread(windows)
@@ -122,11 +130,12 @@ def diagnose_files(
         fitted = refit(
             passes, layout_with(under_way, last.effects), last, under_way.extent, cut, under_way.floor
         )
-    found.whole_log = _describe(plan, len(paths), sum(map(len, parts)), told, looked, layout, fitted, found)
-    found.warnings += [told["words"], *plan.notes[:5]]
-    if len(plan.notes) > 5:
-        found.warnings.append(f"and {len(plan.notes) - 5} more stretches of rows left out")
-    return found
+    more = [f"and {len(plan.notes) - 5} more stretches of rows left out"] if len(plan.notes) > 5 else []
+    return replace(
+        found,
+        whole_log=_describe(plan, len(paths), sum(map(len, parts)), told, looked, layout, fitted, found),
+        warnings=[*found.warnings, told["words"], *plan.notes[:5], *more],
+    )
 
 
 def _plan_one(cut: WindowCut, path: Path) -> Plan | InputError:
@@ -176,7 +185,7 @@ def _sample(plan: Plan, paths: Sequence[Path], cut: WindowCut, most: int) -> tup
     }
 
 
-def _leading(found: Diagnosis, under_way: Search, count: int | None) -> list[str]:
+def _leading(found: Diagnosis, under_way: Searched, count: int | None) -> list[str]:
     """Return the effects to test on the whole: those found, and those that led on the sample."""
     tested = [c["effect"] for c in found.candidates if c["p_value"] is not None]
     tested = [n for n in tested if n in under_way.usable and n not in under_way.silent]
@@ -185,13 +194,13 @@ def _leading(found: Diagnosis, under_way: Search, count: int | None) -> list[str
     return [*first, *[n for n in tested if n not in first][: count if count is not None else len(tested)]]
 
 
-def layout_with(under_way: Search, names: Sequence[str]) -> Layout:
+def layout_with(under_way: Searched, names: Sequence[str]) -> Layout:
     """Return the search's layout with none of the candidates in it but those named."""
     whole = under_way.layout
     keep = [*under_way.base, *names]
     effects = [e for e in whole.model.copied_effects() if str(e.name) in keep]
     bare = [e for e in effects if str(e.name) not in names or str(e.name) in under_way.base]
-    model = GreyBox(whole.model.vehicle, bare, whole.model.damping, whole.model.actuation)
+    model = whole.model.sharing(bare)
     laid = lay_out(model, names, whole.spreads.get("learned_drag"))
     # What was stated of each stays what was stated, whatever has been fitted since.
     means = {n: whole.means[n] for n in laid.names}
@@ -199,7 +208,7 @@ def layout_with(under_way: Search, names: Sequence[str]) -> Layout:
 
 
 def _score_all(
-    passes: MapReduce, model: GreyBox, under_way: Search, asked: list[str], cut: WindowCut
+    passes: MapReduce, model: GreyBox, under_way: Searched, asked: list[str], cut: WindowCut
 ) -> tuple[ScoreTests, Layout]:
     layout, null = layout_with(under_way, asked), under_way.first
     assert null is not None  # the search has run

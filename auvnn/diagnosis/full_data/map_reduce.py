@@ -28,7 +28,8 @@ from auvnn.estimation.sufficient_statistics import (
     reduce_windows,
 )
 from auvnn.executors import Executor
-from auvnn.log_chunks.windows import Part, WindowCut, windows_of
+from auvnn.log_chunks.scan import Part, WindowCut
+from auvnn.log_chunks.windows import windows_of
 
 Array = NDArray[np.float64]
 

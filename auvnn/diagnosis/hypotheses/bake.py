@@ -2,32 +2,66 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout
-from auvnn.effects.base import Body
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, standard_errors
+from auvnn.diagnosis.hypotheses.layout import GROUPS, Layout
+from auvnn.effects import EFFECTS
+from auvnn.effects.hooks import Body
 from auvnn.estimation.priors import set_parameters
 from auvnn.models import GreyBox
 from auvnn.vehicle import Vehicle
+
+Array = NDArray[np.float64]
 
 
 def with_fitted_parameters(model: GreyBox, layout: Layout, found: FittedHypothesis) -> GreyBox:
     """Return the model with an explanation in it.
 
     Coefficients that were merely refitted become the vehicle's numbers; effects that were asked for, and
-    those that the model had, stay effects, so that they can be seen and removed.
+    those that the model had, stay effects, so that they can be seen and removed, with their standard errors as their
+    uncertainty. A mass, a centre or a thrust that was stated to be uncertain becomes an effect too.
+    """
+    return holding(model, layout, found.names, found.fitted.theta, found.effects, found)
+
+
+def holding(
+    model: GreyBox,
+    layout: Layout,
+    names: Sequence[str],
+    theta: Array,
+    effects: Sequence[str],
+    fit: FittedHypothesis | None = None,
+) -> GreyBox:
+    """Return the model with fitted values in it; see `with_fitted_parameters`.
+
+    Args:
+        model: as known.
+        layout: of the fit.
+        names: effects that were free, in order of their columns.
+        theta: (P,) their values.
+        effects: those that were asked for.
+        fit: from which the effects' standard errors are taken, where they are wanted.
     """
     full = layout.model.rebuilt(layout.model.copied_effects())
-    set_parameters(full, found.names, found.fitted.theta)
-    coefficients = [n for n in layout.nuisance if n not in found.effects and n not in model.effect_names]
-    keep = [*model.effect_names, *(n for n in found.effects if n not in model.effect_names)]
+    set_parameters(full, names, theta)
+    refitted = [n for n in layout.nuisance if n not in effects and n not in model.effect_names]
+    coefficients = [n for n in refitted if n in GROUPS or n not in EFFECTS]
+    others = [n for n in refitted if n not in coefficients and n in names]
+    keep = [*model.effect_names, *(n for n in effects if n not in model.effect_names), *others]
     body = GreyBox(model.vehicle, actuation=model.actuation).prepare().body
     for name in coefficients:
         body = full.effect(name).body(body, None)
     copies = {str(e.name): e for e in full.copied_effects()}
+    for name, at in layout.places(names).items() if fit is not None else ():
+        if fit is not None and name in keep and name in EFFECTS:
+            errors, _ = standard_errors(fit, at)
+            known = zip(copies[name].parameters_of, errors, strict=True)
+            copies[name].uncertainty = {p.name: float(std) for p, std in known if np.isfinite(std)}
     return model.rebuilt([copies[n] for n in keep], with_body(model.vehicle, body))
 
 

@@ -12,7 +12,7 @@ from auvnn.diagnosis.hypotheses.layout import DETERMINED, Layout, priors, scales
 from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
 from auvnn.diagnosis.score_tests.score import variance_inflation
 from auvnn.estimation.normal_equations import Statistics
-from auvnn.estimation.prediction_error import Fitted, fit
+from auvnn.estimation.prediction_error import Fitted
 from auvnn.estimation.priors import Priors
 from auvnn.metrics.windows import Windows
 
@@ -122,15 +122,17 @@ def fit_hypothesis(
         guess: a layout whose model holds values to start from.
         sigma: fixed weights; estimated where absent.
         iterations: at most this many steps of the fit.
+
+    Raises:
+        FitError: the fit has nowhere to begin.
     """
     names = tuple(dict.fromkeys([*base, *effects]))
     held = priors(layout, names, free=effects)
     model = (guess or layout).model
-    if start is None and sigma is None:
-        fitted = fit_with_outlier_restart(model, windows, names, held, iterations=iterations)
-    else:
-        initial = None if start is None else start.initial
-        fitted = fit(model, windows, names, held, initial=initial, sigma=sigma, iterations=iterations)
+    initial = None if start is None else start.initial
+    fitted = fit_with_outlier_restart(
+        model, windows, names, held, iterations=iterations, initial=initial, sigma=sigma
+    )
     judged = plausible(layout, names, effects, held, fitted.theta)
     cost = left_out(fitted.statistics, fitted.theta, judged, folds(windows.run))
     count = fitted.statistics.count[:, np.isfinite(fitted.sigma)].sum(1)

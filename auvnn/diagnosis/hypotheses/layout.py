@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.effects import Parameter, effect_class
+from auvnn.effects import EFFECTS, Parameter, effect_class
 from auvnn.estimation.priors import Priors
 from auvnn.models import GreyBox
 
@@ -16,7 +16,8 @@ Array = NDArray[np.float64]
 
 # Groups of the model file's `uncertainty` and the effect that varies each.
 GROUPS = ("added_mass", "linear_damping", "quadratic_damping", "inertia")
-# An effect that is already part of the model was fitted or stated: it may move by its plausible scale.
+# Numbers that are exact unless the model file says how uncertain they are, and the effect that varies each.
+EXACT = {"mass": "trapped_water", "buoyancy": "net_buoyancy", "thrust": "thruster_gain", "fins": "fin_gain"}
 # A candidate is all but free, so that its prior neither pulls the estimate nor leaves it without bound.
 FREE = 10.0
 # What is merely uncertain stays within this many of its stated standard deviations. Without that limit a stated
@@ -37,7 +38,7 @@ class Layout:
         columns: effect to columns.
         nuisance: effects that stand for stated uncertainty.
         means: what was stated of each effect's parameters before anything was fitted.
-        spreads: nuisance effect to the standard deviations of its parameters.
+        spreads: nuisance effect, or one that the model had, to the standard deviations of its parameters.
     """
 
     model: GreyBox
@@ -77,6 +78,29 @@ def has_stated_uncertainty(model: GreyBox) -> dict[str, float]:
     }
 
 
+def exact_unless_stated(model: GreyBox) -> dict[str, Array]:
+    """Return what the model file says is uncertain of numbers that are exact otherwise: effect to deviations, (p,).
+
+    Each is varied by the effect that is the same as another value of it: the mass by water that moves along, the
+    buoyancy by a net buoyancy, the centres by an offset of the centre of gravity, thrust and fins by their gains.
+    Relative amounts, but of the centres: a share of the vehicle's length.
+    """
+    vehicle = model.vehicle
+    of = {
+        k: float(vehicle.uncertainty.get(k, 0.0)) for k in (*EXACT, "center_of_gravity", "center_of_buoyancy")
+    }
+    out: dict[str, Array] = {}
+    centres = vehicle.length * float(np.hypot(of.pop("center_of_gravity"), of.pop("center_of_buoyancy")))
+    sizes = {"mass": float(vehicle.mass), "buoyancy": float(vehicle.buoyancy), "thrust": 1.0, "fins": 1.0}
+    for key, share in of.items():
+        if share > 0.0 and not (key == "fins" and not vehicle.fins):
+            kind = effect_class(EXACT[key])
+            out[EXACT[key]] = np.full(len(kind.describe(vehicle, model.actuation)), share * sizes[key])
+    if centres > 0.0:
+        out["cg_offset"] = np.full(3, centres)
+    return out
+
+
 def lay_out(model: GreyBox, candidates: Sequence[str], learned: Array | None = None) -> Layout:
     """Return the model with nuisance terms and candidates in it, those not there yet at their nulls.
 
@@ -86,9 +110,10 @@ def lay_out(model: GreyBox, candidates: Sequence[str], learned: Array | None = N
         learned: standard deviations (252,) of `learned_drag`, where damping was learned.
     """
     uncertain = has_stated_uncertainty(model)
-    groups = [*uncertain, *([] if learned is None else ["learned_drag"])]
     effects = model.copied_effects()
     present = [str(e.name) for e in effects]
+    further = {n: s for n, s in exact_unless_stated(model).items() if n not in present}
+    groups = [*uncertain, *([] if learned is None else ["learned_drag"]), *further]
     for name in dict.fromkeys([*groups, *candidates]):
         if name in present:
             continue
@@ -103,6 +128,11 @@ def lay_out(model: GreyBox, candidates: Sequence[str], learned: Array | None = N
     spreads = {g: s * np.maximum(np.abs(means[g]), 1e-3) for g, s in uncertain.items()}
     if learned is not None:
         spreads["learned_drag"] = learned
+    spreads |= further
+    for effect in model.members:
+        # What the model has was fitted or stated: were it all but free, it would swallow what is missing.
+        if str(effect.name) not in spreads and str(effect.name) in EFFECTS:
+            spreads[str(effect.name)] = effect.standard_deviations()
     return Layout(full, tuple(columns), columns, tuple(groups), means, spreads)
 
 

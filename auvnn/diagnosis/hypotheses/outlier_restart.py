@@ -11,9 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
-from auvnn.estimation.prediction_error import Fitted, fit
+from auvnn.estimation.prediction_error import FitError, Fitted, fit
 from auvnn.estimation.priors import Priors
 from auvnn.metrics.free_run import initial_states
 from auvnn.metrics.windows import Windows
@@ -21,6 +22,8 @@ from auvnn.models import GreyBox
 
 # A window is astray whose error is so many times the median's, and fit to lead the others back below so many.
 ASTRAY, NEAR = 3.0, 2.0
+# A fit that goes out from another one is left alone unless a window is as far out as this.
+WILD = 1e3
 # How often at most a fit is begun again, and steps of a window's initial state on its own.
 TRIES, ALONE = 3, 30
 # Each is fitted on its own where they are no larger a share of all.
@@ -28,9 +31,19 @@ FEW = 0.15
 
 
 def fit_with_outlier_restart(
-    model: GreyBox, windows: Windows, names: Sequence[str], priors: Priors, *, iterations: int
+    model: GreyBox,
+    windows: Windows,
+    names: Sequence[str],
+    priors: Priors,
+    *,
+    iterations: int,
+    initial: Tensor | None = None,
+    sigma: NDArray[np.float64] | None = None,
 ) -> Fitted:
-    """Fit from the measured initial states; where windows end astray, again from a fit without them.
+    """Fit; where windows end astray, again from a fit without them.
+
+    A fit that goes out from another one, by initial states or weights, is begun again only where a window is so far out
+    that it leaves no other a say: the other fit had none astray.
 
     Args:
         model: holds the named effects; it is not changed.
@@ -38,28 +51,62 @@ def fit_with_outlier_restart(
         names: effects whose parameters are free.
         priors: of those parameters.
         iterations: at most this many steps of each fit.
+        initial: (B, 13) initial states to start from; the measured ones by default.
+        sigma: (18,) fixed weights, by default estimated.
 
     Returns:
         the fit to all windows that leaves the smaller errors.
+
+    Raises:
+        FitError: there is nowhere to begin, whatever windows are left out.
     """
-    best = fit(model, windows, names, priors, iterations=iterations)
+    plain = initial is None and sigma is None
+    best = fit(model, windows, names, priors, initial=initial, sigma=sigma, iterations=iterations)
     for _ in range(TRIES):
         cost = best.statistics.cost
-        near = cost <= NEAR * np.median(cost)
-        if near.all() or (best.converged and (cost <= ASTRAY * np.median(cost)).all()):
+        middle = max(float(np.median(cost)), 1e-300)
+        near = cost <= NEAR * middle
+        settled = (cost <= ASTRAY * middle).all() if plain else (cost <= WILD * middle).all()
+        if near.all() or (settled and (best.converged or not plain)):
             break
-        others = fit(best.model, windows.pick(near), names, priors, iterations=iterations)
-        initial = initial_states(model, windows)
-        initial[torch.as_tensor(near)] = others.initial
-        strays = np.nonzero(~near)[0]
-        # One that needs short steps would hold up the others.
-        for few in np.array_split(strays, len(strays) if len(strays) <= FEW * len(windows) else 1):
-            initial[torch.as_tensor(few)] = _restarted(others, windows.pick(few))
-        again = fit(others.model, windows, names, priors, initial=initial, iterations=iterations)
-        if _errors(again) >= _errors(best):
+        try:
+            again = _begun_again(best, model, windows, names, priors, near, sigma, iterations)
+        except FitError:
+            break
+        worse = _errors(again) >= _errors(best) if sigma is None else again.cost >= best.cost
+        if worse:
             break
         best = again
     return best
+
+
+def _begun_again(
+    best: Fitted,
+    model: GreyBox,
+    windows: Windows,
+    names: Sequence[str],
+    priors: Priors,
+    near: NDArray[np.bool_],
+    sigma: NDArray[np.float64] | None,
+    iterations: int,
+) -> Fitted:
+    """Return the fit to all windows from one to those that are near, each stray brought back."""
+    others = fit(
+        best.model,
+        windows.pick(near),
+        names,
+        priors,
+        initial=None if sigma is None else best.initial[torch.as_tensor(near)],
+        sigma=sigma,
+        iterations=iterations,
+    )
+    initial = initial_states(model, windows)
+    initial[torch.as_tensor(near)] = others.initial
+    strays = np.nonzero(~near)[0]
+    # One that needs short steps would hold up the others.
+    for few in np.array_split(strays, len(strays) if len(strays) <= FEW * len(windows) else 1):
+        initial[torch.as_tensor(few)] = _restarted(others, windows.pick(few))
+    return fit(others.model, windows, names, priors, initial=initial, sigma=sigma, iterations=iterations)
 
 
 def _restarted(others: Fitted, strays: Windows) -> Tensor:

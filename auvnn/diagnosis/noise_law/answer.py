@@ -12,85 +12,73 @@ import numpy as np
 
 from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.answers.table import values
+from auvnn.diagnosis.hypotheses.layout import Layout
 from auvnn.diagnosis.noise_law.command_holding import Holding, between, holding
 from auvnn.diagnosis.noise_law.foretold import foretold
 from auvnn.diagnosis.noise_law.law import ALPHA_BOUNDARY, left
 from auvnn.diagnosis.noise_law.search import BesideForce, ForceSearch
 from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
-from auvnn.diagnosis.score_tests.null_tests import NullTests
-from auvnn.diagnosis.search import Search
-from auvnn.logs import Log
-from auvnn.models import GreyBox
+from auvnn.diagnosis.search import search
+from auvnn.diagnosis.stages.state import Searched
 
 # Share of a degree of freedom's force that measured inputs may foretell (lower 95 % limit) before it is no noise.
 FORETOLD = 0.1
 
 
-def beside_what_is_left(
-    found: Diagnosis, search: Search, model: GreyBox, log: Log, needs: dict[str, list[str]], most: int
-) -> tuple[Diagnosis, Search]:
+def beside_what_is_left(found: Diagnosis, under_way: Searched) -> tuple[Diagnosis, Searched]:
     """Return the answer and the search that led to it, once what is left has been asked for.
 
     Args:
         found: of the first search.
-        search: the first one.
-        model: as known.
-        log: measurements.
-        needs: effects wanted, and the channels that the log lacks for them.
-        most: look for at most so many effects.
+        under_way: where that ended.
     """
-    if found.verdict == "adequate" or search.first is None:
-        return found, search
-    held = _held(search)
+    if found.verdict == "adequate":
+        return found, under_way
+    asked = under_way.setting
+    held = _held(under_way)
     if held.share > 0.0:
-        search.say(f"commands change between samples ({held.name}): searching again")
-        windows = between(search.windows, held.share)
-        search = Search(search.layout, windows, search.usable, search.say, search.advice, search.whiteness)
-        found = search.run(model, log, needs, most)
-    found.commands = held.to_dict()
-    return _beside_force(found, search, most), search
+        asked.say(f"commands change between samples ({held.name}): searching again")
+        found, under_way = search(asked, between(under_way.state.windows, held.share))
+    found = replace(found, stochastic={"commands": held.to_dict()})
+    return _beside_force(found, under_way), under_way
 
 
-def _held(search: Search) -> Holding:
+def _held(under_way: Searched) -> Holding:
     """Return how commands go between samples; held where an effect explains more than anything else would."""
-    assert search.first is not None
-    asked = holding(search.first, search.windows)
-    if asked.share == 0.0:
-        return asked
-    search.say("asking whether an effect explains more than commands between samples")
-    tested = NullTests(search.layout, search.windows, search.say)(
-        search.first, search.usable, search.base, []
-    )
+    windows, asked = under_way.state.windows, under_way.setting
+    held = holding(under_way.first, windows)
+    if held.share == 0.0:
+        return held
+    asked.say("asking whether an effect explains more than commands between samples")
+    tested = asked.tests(windows)(under_way.first, asked.usable, list(asked.base), [])
     most = max(((s.gain - s.degrees) / s.inflation for s in tested.scores.values() if s.degrees), default=0.0)
-    return asked if asked.gain > most else replace(asked, name="held", share=0.0, odds=0.0, gain=0.0)
+    return held if held.gain > most else replace(held, name="held", share=0.0, odds=0.0, gain=0.0)
 
 
-def _beside_force(found: Diagnosis, search: Search, most: int) -> Diagnosis:
+def _beside_force(found: Diagnosis, under_way: Searched) -> Diagnosis:
     """Return the answer with the stochastic force that is left, and the names that stand beside it."""
-    last = found.explanation
-    assert last is not None and search.first is not None
-    noise = white(last, search.floor)
-    if variance_component_test(last, search.windows, noise).p_value >= ALPHA_BOUNDARY:
+    asked, windows, floor = under_way.setting, under_way.state.windows, under_way.floor
+    last = under_way.state.current
+    if variance_component_test(last, windows, white(last, floor)).p_value >= ALPHA_BOUNDARY:
         return found
-    beside = ForceSearch(search.layout, search.windows, search.usable, search.base, search.floor, search.say)
-    null = beside.begin(search.first, white(search.first, search.floor))
+    beside = ForceSearch(asked.layout, windows, asked.usable, asked.base, floor, asked.say)
+    null = beside.begin(under_way.first, white(under_way.first, floor))
     if null is None:
         return found
-    result = beside.run(null, [c["effect"] for c in found.candidates], most)
-    search.say("asking how much of the force measured inputs foretell")
+    result = beside.run(null, [c["effect"] for c in found.candidates], asked.most)
+    asked.say("asking how much of the force measured inputs foretell")
     told = foretold(result.last, result.windows)
-    found.left = left(result.estimate.law)
     if told is not None and told.least > FORETOLD:
-        found.left = {}
-        found.warnings.append(
+        words = (
             f"{told.input} foretells {told.share:.0%} of the force in {told.axis} that is left "
             f"(at least {told.least:.0%}): it is no chance, and has no name"
         )
-        return found
-    return _answer(found, search, result)
+        return replace(found, warnings=[*found.warnings, words])
+    found = replace(found, stochastic={**found.stochastic, "force": left(result.estimate.law)})
+    return _answer(found, asked.layout, result)
 
 
-def _answer(found: Diagnosis, search: Search, result: BesideForce) -> Diagnosis:
+def _answer(found: Diagnosis, layout: Layout, result: BesideForce) -> Diagnosis:
     """Put what was found beside the force in the place of what the first search found."""
     gone = {e for s in result.steps if s["verdict"] == "withdrawn" for e in s["effects"]}
     given = [e for e in result.names if e not in gone]
@@ -105,7 +93,7 @@ def _answer(found: Diagnosis, search: Search, result: BesideForce) -> Diagnosis:
     for explanation in (*result.tried, result.last):
         if not explanation.effects:
             continue
-        for name, parameters in values(search.layout, explanation, explanation.effects).items():
+        for name, parameters in values(layout, explanation, explanation.effects).items():
             if name in by_name:
                 by_name[name]["parameters"] = parameters
     order = [c for n in given for c in [by_name[n]]] + [

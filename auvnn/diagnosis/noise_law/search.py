@@ -29,6 +29,7 @@ from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
 from auvnn.estimation.normal_equations import linearise, normal_equations, residual_std
+from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.metrics.force_law import ForceLaw, cell_for
 from auvnn.metrics.windows import Windows
@@ -232,7 +233,8 @@ class ForceSearch:
         order = sorted(scores, key=lambda n: -scores[n].evidence)[:LEADERS]
         by_gain = sorted(scores, key=lambda n: scores[n].degrees - scores[n].gain)[:2]
         names = dict.fromkeys([*order, *by_gain, *[n for n in leading if n in scores][:WITHOUT]])
-        fitted = [self._one(n, scores[n], tested.at, under, current, base, chosen) for n in names]
+        tried = [self._one(n, scores[n], tested.at, under, current, base, chosen) for n in names]
+        fitted = [e for e in tried if e is not None]
         count = {e.effects[-1]: len(self.layout.columns[e.effects[-1]]) for e in fitted}
         return sorted(fitted, key=lambda e: e.fitted.cost + count[e.effects[-1]])
 
@@ -245,23 +247,25 @@ class ForceSearch:
         current: Hypothesis,
         base: list[str],
         chosen: list[str],
-    ) -> FittedHypothesis:
-        """Return an effect fitted from what its test estimates, or from nearer its null where that goes astray."""
+    ) -> FittedHypothesis | None:
+        """Return an effect fitted from what its test estimates, or from nearer its null; None where every fit fails."""
         self.say(f"fitting {name} beside the force")
         known, start = parameters_of(at.model, [name]), initial_guess(self.layout, name, score.estimate)
         shape, best = shapes(self.layout, name), None
         for share in (1.0, 0.3, 0.05):
             guess = at.model.rebuilt(at.model.copied_effects())
             set_parameters(guess, [name], np.where(shape, start, known + share * (start - known)))
-            found = fit_hypothesis(
-                self.layout, under, base, [*chosen, name], start=current.explanation.fitted,
-                guess=replace(at, model=guess), sigma=self.sigma, iterations=STEPS,
-            )  # fmt: skip
+            try:
+                found = fit_hypothesis(
+                    self.layout, under, base, [*chosen, name], start=current.explanation.fitted,
+                    guess=replace(at, model=guess), sigma=self.sigma, iterations=STEPS,
+                )  # fmt: skip
+            except FitError:
+                continue
             if best is None or found.fitted.cost < best.fitted.cost:
                 best = found
             if best.fitted.cost <= current.explanation.fitted.cost:
                 break
-        assert best is not None
         return best
 
     def _without(self, after: Hypothesis, current: Hypothesis, under: Windows) -> FittedHypothesis:

@@ -13,7 +13,7 @@ from auvnn.estimation.one_step_error import fit_one_step
 from auvnn.estimation.prediction_error import Fitted
 from auvnn.estimation.priors import set_parameters
 from auvnn.logs import Log
-from auvnn.metrics.one_step import Derivative
+from auvnn.metrics.derivative import Derivative
 
 Array = NDArray[np.float64]
 # Neighbouring stretches are correlated; so many groups of them stand for independent ones.

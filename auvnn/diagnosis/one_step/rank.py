@@ -28,7 +28,7 @@ from auvnn.diagnosis.one_step.refit import OneStepRefit, RefittedEffect
 from auvnn.diagnosis.one_step.weighted_fit import standard_error
 from auvnn.effects import effect_class
 from auvnn.logs import Log
-from auvnn.metrics.one_step import choose_derivative
+from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]

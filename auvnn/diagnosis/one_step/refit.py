@@ -15,7 +15,7 @@ from auvnn.effects import effect_class
 from auvnn.errors import InputError
 from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
 from auvnn.logs import Log
-from auvnn.metrics.one_step import Derivative
+from auvnn.metrics.derivative import Derivative
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]

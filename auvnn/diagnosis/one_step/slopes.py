@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.effects.base import HOOKS as ALL_HOOKS
-from auvnn.effects.base import Extent
+from auvnn.effects.hooks import Extent
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.logs import Log
 from auvnn.logs.signals.derivatives import LocalPolynomial
-from auvnn.metrics.one_step import Derivative, OneStepReplay
+from auvnn.metrics.derivative import Derivative
+from auvnn.metrics.one_step import OneStepReplay
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.estimation.scaling import unit_of
 from auvnn.logs import Log
 
 Array = NDArray[np.float64]
@@ -46,7 +47,7 @@ def _solved(square: Array, right: Array, precision: Array, mean: Array) -> Array
     if not len(right):
         return np.zeros(0)
     square, right = square + np.diag(precision), right + precision * mean
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(square), 1e-300))
+    scale = unit_of(square)
     return scale * np.linalg.lstsq(square * np.outer(scale, scale), scale * right, rcond=1e-13)[0]
 
 

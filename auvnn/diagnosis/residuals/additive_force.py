@@ -19,9 +19,9 @@ from auvnn.diagnosis.hypotheses.layout import Layout, shapes
 from auvnn.diagnosis.residuals.input_forces import AXES, InputForces
 from auvnn.diagnosis.score_tests.score import variance_inflation
 from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
+from auvnn.estimation.scaling import unit_of
 from auvnn.estimation.sensitivity import Response
 from auvnn.metrics.windows import Windows
-from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
 # Directions of a force of which the log says less than this, beside the best known one, are not asked for.
@@ -37,12 +37,14 @@ class AdditiveForce:
         input: name, as `depends_on` has it.
         p_value: of there being no such force, corrected for all inputs and degrees of freedom; at most one.
         needless: names that explain nothing beyond chance once this force is in the model.
+        share: of the error above noise that the force would explain, 0 to 1.
     """
 
     axis: str
     input: str
     p_value: float
     needless: tuple[str, ...]
+    share: float = 0.0
 
 
 def additive_force_test(
@@ -76,15 +78,24 @@ def additive_force_test(
         for sums, statistics in zip(by_axis, part, strict=True):
             sums.add(statistics)
     scale = np.array([p.scale for p in probe.parameters_of]).reshape(6, per_axis)
-    p_values = {
+    tested = {
         (i, n): _tested(sums, n, scale[i, own - known])
         for i, sums in enumerate(by_axis)
         for n, own in blocks.items()
     }
+    p_values = {key: p_value for key, (p_value, _) in tested.items()}
     i, best = min(p_values, key=lambda key: p_values[key])
     size = scale[i, blocks[best] - known]
     needless = tuple(n for n in names if _need(by_axis[i], layout, blocks[best], size, n) > alpha)
-    return AdditiveForce(AXES[i], best, min(1.0, p_values[i, best] * len(p_values)), needless)
+    count, usable = fitted.statistics.count.sum(0), np.isfinite(sigma)
+    spent = 12 * len(fitted.statistics.cost) * count / max(count.sum(), 1.0)
+    left = (
+        (fitted.statistics.channel.sum(0)[usable] / sigma[usable] ** 2 - (count - spent)[usable])
+        .clip(0.0)
+        .sum()
+    )
+    share = float(np.clip(tested[i, best][1] / left, 0.0, 1.0)) if left > 0 else 0.0
+    return AdditiveForce(AXES[i], best, min(1.0, p_values[i, best] * len(p_values)), needless, share)
 
 
 def _by_part(
@@ -96,7 +107,7 @@ def _by_part(
     """
     fitted = explanation.fitted
     model, known = fitted.model, len(fitted.theta)
-    asked = GreyBox(model.vehicle, [*model.copied_effects(), probe], model.damping, model.actuation)
+    asked = model.beside(probe)
     columns = [np.concatenate([np.arange(known), known + probe.columns(i)]) for i in range(6)]
     begin = 0
     for answer in linearise(asked, windows, fitted.initial, [*explanation.names, str(probe.name)]):
@@ -105,7 +116,7 @@ def _by_part(
         each = [
             Response(answer.error, answer.state, answer.parameters[..., c], answer.force) for c in columns
         ]
-        yield [normal_equations(part, [one], sigma)[0] for one in each]
+        yield [normal_equations(part, [one], sigma)[0].finite() for one in each]
 
 
 class _ForceSums:
@@ -162,8 +173,8 @@ class _ForceSums:
         return np.concatenate(self._own[key])
 
 
-def _tested(sums: _ForceSums, key: str, scale: Array) -> float:
-    """Return the p-value of one force, what was fitted taking its share first."""
+def _tested(sums: _ForceSums, key: str, scale: Array) -> tuple[float, float]:
+    """Return the p-value of one force, what was fitted taking its share first, and the fall of the squared error."""
     own, inside = sums.blocks[key], sums.inside
     inner = sums.products(inside, inside) + np.diag(sums.precision)
     carry = np.linalg.lstsq(inner, sums.products(inside, own), rcond=1e-12)[0].T
@@ -174,7 +185,7 @@ def _tested(sums: _ForceSums, key: str, scale: Array) -> float:
     values, vectors = np.linalg.eigh(information)
     seen = values > SEEN * max(float(values.max()), 1.0)
     if not seen.any():
-        return 1.0
+        return 1.0, 0.0
     along = (vectors.T @ gradient)[seen] / values[seen]
     # A force that shows in few windows makes their scores differ; that is no noise, and is taken out first.
     step = scale * (vectors[:, seen] @ along)
@@ -185,7 +196,8 @@ def _tested(sums: _ForceSums, key: str, scale: Array) -> float:
     by_window = sums.slope[:, own] - moved_own - (sums.slope[:, inside] - moved_inside) @ carry.T
     degrees = int(seen.sum())
     factor = variance_inflation(by_window * scale, information, sums.run, 1 + degrees)
-    return float(chi2.sf(float((along**2 * values[seen]).sum()) / factor, degrees))
+    fall = float((along**2 * values[seen]).sum())
+    return float(chi2.sf(fall / factor, degrees)), fall
 
 
 def _need(sums: _ForceSums, layout: Layout, own: NDArray[np.int64], scale: Array, name: str) -> float:
@@ -201,7 +213,7 @@ def _need(sums: _ForceSums, layout: Layout, own: NDArray[np.int64], scale: Array
     # Of the force as little is assumed as keeps what the log does not see at nought.
     precision = np.concatenate([sums.precision, 1e-4 * scale**-2.0])
     inner = sums.products(free, free) + np.diag(precision)
-    unit = 1.0 / np.sqrt(np.maximum(np.diag(inner), 1e-300))
+    unit = unit_of(inner)
     covariance = np.linalg.pinv(inner * unit[:, None] * unit, hermitian=True) * unit[:, None] * unit
     away = np.concatenate([sums.away, np.zeros(len(own))])
     step = covariance @ (sums.slope.sum(0)[free] - precision * away)

@@ -11,7 +11,6 @@ from auvnn.diagnosis.residuals.input_forces import AXES, InputForces
 from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
 from auvnn.estimation.priors import Priors
 from auvnn.metrics.windows import Windows
-from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
 # Share of what is unexplained, below which a dependence is not worth a word; standard errors of its gain, below which
@@ -41,9 +40,10 @@ def attribute_residual(explanation: FittedHypothesis, windows: Windows) -> dict[
         return found
     probe = InputForces(fitted.model, windows)
     model = fitted.model
-    asked = GreyBox(model.vehicle, [*model.copied_effects(), probe], model.damping, model.actuation)
+    asked = model.beside(probe)
     names = [*explanation.names, str(probe.name)]
     sums, _, _ = normal_equations(windows, linearise(asked, windows, fitted.initial, names), fitted.sigma)
+    sums = sums.finite()
     known = len(fitted.theta)
     scale = np.array([p.scale for p in probe.parameters_of])
     chosen = list(range(known))

@@ -9,7 +9,7 @@ Biometrics Bulletin 2(6) 110-114 (the approximate distribution of a sum of weigh
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import torch
@@ -19,6 +19,7 @@ from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.residuals.input_forces import AXES
+from auvnn.diagnosis.residuals.unnamed_size import Size, sizes
 from auvnn.effects import Body, Effect, Moment, Parameter
 from auvnn.estimation.normal_equations import linearise, normal_equations
 from auvnn.metrics.windows import Windows
@@ -77,12 +78,14 @@ class Unnamed:
         p_values: (6,) of each.
         energy: (6,) the same above chance, in units that are the same before and after an effect is added.
         acts_in: degrees of freedom with the logarithm of the odds that a force acts there, beside those before it.
+        sizes: degree of freedom to how large the force in it is; see `unnamed_size`.
     """
 
     z: Array
     p_values: Array
     energy: Array
     acts_in: dict[str, float]
+    sizes: dict[str, Size] = field(default_factory=dict)
 
     @property
     def p_value(self) -> float:
@@ -113,9 +116,10 @@ def variance_component_test(explanation: FittedHypothesis, windows: Windows, sig
     model = fitted.model
     times = windows.times[:, windows.warmup :]
     probe = VarianceComponents(model, float((times[:, -1] - times[:, 0]).max()))
-    asked = GreyBox(model.vehicle, [*model.copied_effects(), probe], model.damping, model.actuation)
+    asked = model.beside(probe)
     names = [*explanation.names, str(probe.name)]
     sums, _, _ = normal_equations(windows, linearise(asked, windows, fitted.initial, names), sigma)
+    sums = sums.finite()
     known = len(fitted.theta)
     # What is known takes its share first: the fit weighed the channels otherwise.
     prior = fitted.priors.precision
@@ -132,9 +136,11 @@ def variance_component_test(explanation: FittedHypothesis, windows: Windows, sig
         found.append(moment_matched_test(slope[:, own], sums.hessian[:, known + own[:, None], known + own]))
     z, p_values, energy = (np.array(x) for x in zip(*found, strict=True))
     scale = np.array([p.scale for p in probe.parameters_of])
-    return Unnamed(
-        z, p_values, energy, acting(slope * scale, sums.hessian[:, known:, known:] * np.outer(scale, scale))
-    )
+    slope, hessian = slope * scale, sums.hessian[:, known:, known:] * np.outer(scale, scale)
+    acts_in = acting(slope, hessian)
+    period = float((times[:, -1] - times[:, 0]).max())
+    found_sizes = sizes(slope, hessian, list(acts_in), scale.reshape(6, -1)[:, 0], period)
+    return Unnamed(z, p_values, energy, acts_in, found_sizes)
 
 
 def acting(slope: Array, hessian: Array) -> dict[str, float]:

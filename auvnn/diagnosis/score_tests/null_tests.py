@@ -99,7 +99,7 @@ class NullTests:
             ),
             found.fitted.sigma,
         )
-        return sums, at, asked
+        return sums.finite(), at, asked
 
     def _closer(
         self,

@@ -193,7 +193,7 @@ class Probed:
         model = self.layout.model
         answered = linearise(model, windows, at.fitted.initial, model.effect_names)
         sums, _, _ = normal_equations(windows, answered, at.fitted.sigma)
-        return self.score(sums, base, name, free)[0]
+        return self.score(sums.finite(), base, name, free)[0]
 
     def labels(self, name: str) -> list[str]:
         """Return under which names the layout knows an effect: its own, or those of its stand-ins."""
@@ -271,5 +271,5 @@ def probed(
             at += size
     if not starts:
         return Probed(layout, {})
-    whole = GreyBox(model.vehicle, effects, model.damping, model.actuation)
+    whole = model.sharing(effects)
     return Probed(Layout(whole, tuple(columns), columns, layout.nuisance, means, layout.spreads), starts)

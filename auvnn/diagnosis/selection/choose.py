@@ -6,7 +6,8 @@ Forward, one effect at a time; and backward: what was taken before must still be
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from auvnn.diagnosis.score_tests.score import Score, variance_inflation
 from auvnn.diagnosis.selection.model_comparison import ALPHA_NEEDED, ODDS, ModelComparison
 from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
 from auvnn.effects import effect_class
+from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.metrics.windows import Windows
 
@@ -39,12 +41,14 @@ class Choice:
         best: the explanation that is taken; None where none pays.
         tried: all that were refitted.
         rivals: where ambiguous, the explanations between which the log cannot decide; the first is the one taken.
+        failed: effects whose fit failed, and why, in words.
     """
 
     verdict: str
     best: FittedHypothesis | None
     tried: list[FittedHypothesis]
     rivals: list[FittedHypothesis]
+    failed: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,24 @@ class Chooser:
         # Evidence counts an effect of many parameters low while it is small; a test that is clear even among
         # all the others lets it be judged by what it does on runs left out.
         clear = {s.effect for s in significant if s.p_value < ALPHA / len(scores)}
-        tried = [self._refitted(s, at, base, chosen, current) for s in leading]
+        tried, failed = [], {}
+        for candidate in leading:
+            try:
+                tried.append(self._refitted(candidate, at, base, chosen, current))
+            except (FitError, np.linalg.LinAlgError) as problem:
+                failed[candidate.effect] = f"its fit failed: {problem}"
+        found = self._among(tried, clear, at, base, current)
+        return replace(found, failed=failed)
+
+    def _among(
+        self,
+        tried: list[FittedHypothesis],
+        clear: set[str],
+        at: Layout,
+        base: list[str],
+        current: FittedHypothesis,
+    ) -> Choice:
+        """Weigh explanations that have been fitted, and take the one that explains best."""
         if not tried:
             return Choice("unknown", None, [], [])
         factor = min(self._factor(e) for e in tried)
@@ -130,10 +151,15 @@ class Chooser:
         ]
         return sorted(more, key=lambda s: s.degrees - s.gain)[:1]
 
-    def _settled(self, best: FittedHypothesis, at: Layout, base: list[str]) -> FittedHypothesis:
+    def _settled(self, best: FittedHypothesis, at: Layout, base: Sequence[str]) -> FittedHypothesis:
         """Return an explanation refitted with the weights that follow from the errors that it leaves."""
         guess = replace(at, model=best.fitted.model)
-        return fit_hypothesis(self.layout, self.windows, base, best.effects, start=best.fitted, guess=guess)
+        try:
+            return fit_hypothesis(
+                self.layout, self.windows, base, best.effects, start=best.fitted, guess=guess
+            )
+        except FitError:
+            return best
 
     def _instead(
         self, taken: FittedHypothesis, base: Sequence[str], name: str, other: FittedHypothesis
@@ -171,7 +197,11 @@ class Chooser:
         name = group[0].effects[-1]
         others = tuple(e for e in taken.effects if e != name)
         first = replace(taken, effects=(*others, name))
-        members = [first, *(self._instead(taken, base, name, e) for e in group[1:])]
+        members = [first]
+        for other in group[1:]:
+            # One that cannot be fitted beside what was found since is no rival any more.
+            with suppress(FitError):
+                members.append(self._instead(taken, base, name, other))
         factor = min(self._factor(e) for e in members)
         best, *more = sorted(
             (log_evidence(self.layout, e, factor) for e in members), key=lambda e: -e.evidence
@@ -181,13 +211,7 @@ class Chooser:
         left.sort(key=lambda e: e.effects[-1] not in plainer)
         if left[0].effects[-1] == name:
             return left
-        guess = replace(self.layout, model=left[0].fitted.model)
-        return [
-            fit_hypothesis(
-                self.layout, self.windows, base, left[0].effects, start=left[0].fitted, guess=guess
-            ),
-            *left[1:],
-        ]
+        return [self._settled(left[0], self.layout, list(base)), *left[1:]]
 
     def _joined(
         self, best: FittedHypothesis, other: FittedHypothesis, at: Layout, base: list[str], factor: float
@@ -196,18 +220,14 @@ class Chooser:
 
         Of two effects that are both missing, one alone may do as badly as the other.
         """
-        both = self.rivals.together(best, other, at, base)
+        try:
+            both = self.rivals.together(best, other, at, base)
+        except FitError:
+            return None
         gain = log_evidence(self.layout, both, factor).evidence - best.evidence
         if gain < ODDS or not improves_predictive_density(both, best):
             return None
-        return fit_hypothesis(
-            self.layout,
-            self.windows,
-            base,
-            both.effects,
-            start=both.fitted,
-            guess=replace(at, model=both.fitted.model),
-        )
+        return self._settled(both, at, base)
 
     def withdrawn(self, taken: FittedHypothesis, base: Sequence[str]) -> tuple[FittedHypothesis, list[str]]:
         """Return the explanation without those effects that it no longer needs, and their names.
@@ -225,16 +245,20 @@ class Chooser:
             self.say(f"asking whether {name} is still needed")
             model = taken.fitted.model.rebuilt(taken.fitted.model.copied_effects())
             set_parameters(model, [name], self.layout.means[name])
-            without = fit_hypothesis(
-                self.layout,
-                self.windows,
-                base,
-                left,
-                start=taken.fitted,
-                guess=replace(self.layout, model=model),
-                sigma=taken.fitted.sigma,
-                iterations=6,
-            )
+            try:
+                without = fit_hypothesis(
+                    self.layout,
+                    self.windows,
+                    base,
+                    left,
+                    start=taken.fitted,
+                    guess=replace(self.layout, model=model),
+                    sigma=taken.fitted.sigma,
+                    iterations=6,
+                )
+            except FitError:
+                # What cannot be fitted without it needs it.
+                continue
             factor = self._factor(taken)
             needed = (
                 log_evidence(self.layout, taken, factor).evidence
@@ -242,24 +266,32 @@ class Chooser:
             )
             if not needed or not improves_predictive_density(taken, without):
                 gone.append(name)
-                taken = fit_hypothesis(
-                    self.layout,
-                    self.windows,
-                    base,
-                    left,
-                    start=without.fitted,
-                    guess=replace(self.layout, model=without.fitted.model),
-                )
+                taken = self._settled(without, self.layout, base)
         return taken, gone
 
-    def without(self, taken: FittedHypothesis, base: Sequence[str], names: Sequence[str]) -> FittedHypothesis:
-        """Return the explanation refitted without some of its effects."""
+    def without(
+        self,
+        taken: FittedHypothesis,
+        base: Sequence[str],
+        names: Sequence[str],
+        sigma: Array | None = None,
+    ) -> FittedHypothesis:
+        """Return the explanation refitted without some of its effects.
+
+        Args:
+            taken: the explanation.
+            base: effects that are free whatever is chosen.
+            names: effects to do without.
+            sigma: weights to keep, so that the two can be compared; those that follow from the errors by default.
+        """
         model = taken.fitted.model.rebuilt(taken.fitted.model.copied_effects())
         for name in names:
             set_parameters(model, [name], self.layout.means[name])
         left = tuple(e for e in taken.effects if e not in names)
         guess = replace(self.layout, model=model)
-        return fit_hypothesis(self.layout, self.windows, base, left, start=taken.fitted, guess=guess)
+        return fit_hypothesis(
+            self.layout, self.windows, base, left, start=taken.fitted, guess=guess, sigma=sigma
+        )
 
     def _refitted(
         self, candidate: Score, at: Layout, base: list[str], chosen: list[str], current: FittedHypothesis
@@ -269,22 +301,30 @@ class Chooser:
         guess = at.model.rebuilt(at.model.copied_effects())
         known = parameters_of(at.model, [name])
         start, shape = initial_guess(self.layout, name, candidate.estimate), shapes(self.layout, name)
+        found: FittedHypothesis | None = None
+        problem: FitError | None = None
         for share in SHARES:
             begin = np.where(shape, start, known + share * (start - known))
             set_parameters(guess, [name], begin)
-            found = fit_hypothesis(
-                self.layout,
-                self.windows,
-                base,
-                [*chosen, name],
-                start=current.fitted,
-                guess=replace(at, model=guess),
-                sigma=current.fitted.sigma,
-                iterations=6,
-            )
+            try:
+                found = fit_hypothesis(
+                    self.layout,
+                    self.windows,
+                    base,
+                    [*chosen, name],
+                    start=current.fitted,
+                    guess=replace(at, model=guess),
+                    sigma=current.fitted.sigma,
+                    iterations=6,
+                )
+            except FitError as fault:
+                problem = fault
+                continue
             # It holds the fit without the effect: one that is worse than that has gone astray.
             if found.fitted.cost <= current.fitted.cost:
                 break
+        if found is None:
+            raise problem or FitError(f"{name} has nowhere to begin")
         return found
 
     def _without(
@@ -297,15 +337,18 @@ class Chooser:
         effect = after.effects[-1]
         if effect not in base:
             return current
-        return fit_hypothesis(
-            self.layout,
-            self.windows,
-            [n for n in base if n != effect],
-            after.effects[:-1],
-            start=current.fitted,
-            sigma=current.fitted.sigma,
-            iterations=6,
-        )
+        try:
+            return fit_hypothesis(
+                self.layout,
+                self.windows,
+                [n for n in base if n != effect],
+                after.effects[:-1],
+                start=current.fitted,
+                sigma=current.fitted.sigma,
+                iterations=6,
+            )
+        except FitError:
+            return current
 
     @staticmethod
     def _factor(explanation: FittedHypothesis) -> float:

@@ -11,6 +11,7 @@ from scipy.stats import chi2
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, log_evidence
 from auvnn.diagnosis.hypotheses.layout import Layout
 from auvnn.effects import effect_class
+from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.metrics.windows import Windows
 
@@ -70,7 +71,10 @@ class ModelComparison:
         extra = len(self.layout.columns[other.effects[-1]])
         if best.misfit - other.misfit <= chi2.isf(ALPHA_REFUTED, extra):
             return False
-        both = log_evidence(self.layout, self.together(other, best, at, base), factor)
+        try:
+            both = log_evidence(self.layout, self.together(other, best, at, base), factor)
+        except FitError:
+            return False
         own = len(self.layout.columns[best.effects[-1]])
         return bool(other.misfit - both.misfit < chi2.isf(ALPHA_NEEDED, own))
 

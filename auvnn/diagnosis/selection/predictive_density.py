@@ -8,6 +8,7 @@ from scipy.linalg import cho_solve
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds
 from auvnn.estimation.priors import limits
+from auvnn.estimation.scaling import unit_of
 
 Array = NDArray[np.float64]
 
@@ -57,9 +58,11 @@ def cross_validated_log_density(explanation: FittedHypothesis) -> Array:
 def _solved(square: Array, right: Array) -> tuple[Array, float]:
     """Return the solution of a symmetric system, and the logarithm of its determinant."""
     # In units of each parameter's own: what is hardly known must not pass for rounding beside what is well known.
-    unit = 1.0 / np.sqrt(np.maximum(np.diag(square), 1e-300))
+    unit = unit_of(square)
+    dead = np.flatnonzero(unit == 0.0)
     even, right = square * unit[:, None] * unit, right * unit
-    scale = 2.0 * float(np.log(unit).sum())
+    even[dead, dead] = 1.0
+    scale = 2.0 * float(np.log(unit[unit > 0.0]).sum())
     try:
         factor = np.linalg.cholesky(even)
     except np.linalg.LinAlgError:

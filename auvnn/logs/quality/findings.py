@@ -13,6 +13,7 @@ from auvnn.logs.quality.channel_quality import Channel, frozen
 from auvnn.logs.quality.excitation import Excitation
 from auvnn.logs.quality.finding import Finding
 from auvnn.logs.quality.kinematics import Agreement
+from auvnn.logs.quality.run_findings import by_run
 from auvnn.logs.quality.vertical import Vertical
 from auvnn.logs.reading.repair import Level
 from auvnn.logs.signals.lags import Lag
@@ -46,6 +47,7 @@ def collect(
         *_signals(log, channels),
         *_attitude(log, order),
         *sensors.agreement(kinematics, order, clocks or {}, vertical),
+        *by_run(log, kinematics),
         *sensors.restarts(log),
         *sensors.levers(log, kinematics),
         *sensors.stretches(log),

@@ -33,6 +33,7 @@ class Quality(Answer):
         condition: of [nu, |nu| nu] over the excited components.
         runs: samples, duration, rate, jitter and gaps of every run.
         actuators: what the log says of a model's actuators, where it was asked; plain data.
+        files: what the log's files hold, where it was asked: topics, fields, rates, the mapping proposed; plain data.
     """
 
     kind: ClassVar[str] = "quality"
@@ -45,6 +46,7 @@ class Quality(Answer):
     condition: float
     runs: list[dict[str, float]] = field(default_factory=list)
     actuators: dict[str, Any] | None = None
+    files: list[dict[str, Any]] | None = None
 
     def with_actuators(self, checked: Any) -> Quality:
         """Return the report with what a check of a model's actuators said, its warnings among the findings."""
@@ -66,13 +68,14 @@ class Quality(Answer):
         """Findings that ask for care."""
         return self.of_level("warning")
 
-    def refuse_errors(self) -> None:
-        """Raise where the log must not be fitted.
+    def refuse_errors(self, force: bool = False) -> None:
+        """Raise where the log must not be fitted: contradictions, and logs in which nothing moves or is driven.
 
         Raises:
             InputError: there is a finding of level "error"; the message names the first and its cure.
         """
-        self._refuse(self.errors)
+        if not force:
+            self._refuse(self.errors, "; force=true fits it all the same")
 
     @property
     def contradictions(self) -> list[Finding]:
@@ -145,6 +148,7 @@ class Quality(Answer):
                 "repairs": [r.to_dict() for r in log.repairs],
                 "kinematics": {name: a.to_dict() for name, a in self.kinematics.items()},
                 **({} if self.actuators is None else {"actuators": self.actuators}),
+                **({} if self.files is None else {"files": self.files}),
                 "excitation": {
                     "condition": self.condition,
                     "directions": {name: e.to_dict() for name, e in self.excitation.items()},
@@ -182,4 +186,8 @@ def _assess(log: Log) -> Quality:
     clocks = kinematics.clocks(log, agreement) if order is None else {}
     depth = vertical.check_vertical(log)
     found = findings.collect(log, channels, agreement, directions, order, clocks, depth)
+    if log.unsealed:
+        few = ", ".join(path.name for path in log.unsealed[:3]) + (", ..." if len(log.unsealed) > 3 else "")
+        words = f"no checksum in or beside {few}: damage that leaves numbers readable cannot be seen"
+        found.append(Finding("info", "checksum", words, "seal the log as it is: auvnn check seal=true"))
     return Quality(log, channels, found, agreement, directions, condition, runs)

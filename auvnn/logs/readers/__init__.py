@@ -17,6 +17,17 @@ READERS = Catalogue(
     "log format",
     {
         "parquet": "auvnn.logs.readers.parquet:ParquetReader",
+        "mcap": "auvnn.logs.readers.mcap:McapReader",
+        "rosbag2-sqlite3": "auvnn.logs.readers.ros2_sqlite:Ros2SqliteReader",
+        "rosbag1": "auvnn.logs.readers.ros1:Ros1Reader",
+        "dataflash": "auvnn.logs.readers.dataflash:DataFlashReader",
+        "tlog": "auvnn.logs.readers.tlog:TlogReader",
+        "ulog": "auvnn.logs.readers.ulog:UlogReader",
+        "imc": "auvnn.logs.readers.imc:ImcReader",
+        "matlab": "auvnn.logs.readers.matlab:MatlabReader",
+        "hdf5": "auvnn.logs.readers.hdf5:Hdf5Reader",
+        "slocum": "auvnn.logs.readers.slocum:SlocumReader",
+        "alog": "auvnn.logs.readers.alog:AlogReader",
         "csv": "auvnn.logs.readers.csv:CsvReader",
     },
     "auvnn.readers",
@@ -26,13 +37,6 @@ _FOREIGN = {
     b"\x1f\x8b": "a gzip archive: unpack it first",
     b"\x28\xb5\x2f\xfd": "a zstd archive: unpack it first",
     b"PK\x03\x04": "a zip archive or a spreadsheet: unpack it, or export the sheet as CSV",
-    b"\x89MCAP": "an MCAP recording: export its topics as CSV or Parquet",
-    b"\x89HDF": "HDF5 (or MATLAB v7.3): export the arrays as CSV or Parquet",
-    b"MATLAB": "a MATLAB file: export the arrays as CSV or Parquet",
-    b"#ROSBAG": "a ROS 1 bag: export its topics as CSV or Parquet",
-    b"SQLite format 3": "a SQLite file (a ROS 2 bag?): export its topics as CSV or Parquet",
-    b"\xa3\x95": "an ArduPilot DataFlash log: export its messages as CSV or Parquet",
-    b"ULog": "a PX4 ULog: export its topics as CSV or Parquet",
     b"ARROW1": "a Feather file: save it as Parquet",
 }
 
@@ -52,8 +56,9 @@ def choose(path: Path) -> tuple[Reader, list[Repair]]:
     for reader in fitting:
         if suffix in reader.suffixes:
             return reader, []
+    certain = [reader for reader in fitting if reader.name != "csv"]
     for magic, what in _FOREIGN.items():
-        if head.startswith(magic):
+        if head.startswith(magic) and not certain:
             raise InputError(f"{path}: is {what}")
     if not fitting:
         what = "zeros only" if not head.strip(b"\0") else "neither text nor a known format"

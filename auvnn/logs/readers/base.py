@@ -6,12 +6,15 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.logs.reading.repair import Repair
+
+if TYPE_CHECKING:
+    from auvnn.logs.reading.mapping import Mapping
 
 
 @dataclass
@@ -43,6 +46,9 @@ class Table:
         text: columns that are not numbers.
         seconds: names of columns that already hold seconds, because the file stored dates or durations.
         repairs: what the reader mended or noted.
+        rest: what is left of the mapping to be done with the rows; None for the mapping that was given.
+        sha256: of the file's bytes, where the reader had all of them; empty elsewhere.
+        checked: whether the file carries checksums of all its numbers, and they were compared.
     """
 
     columns: dict[str, NDArray[Any]]
@@ -50,6 +56,9 @@ class Table:
     text: dict[str, Text] = field(default_factory=dict)
     seconds: set[str] = field(default_factory=set)
     repairs: list[Repair] = field(default_factory=list)
+    rest: Mapping | None = None
+    sha256: str = ""
+    checked: bool = False
 
     @property
     def names(self) -> list[str]:
@@ -62,6 +71,8 @@ class Reader(ABC):
 
     name: ClassVar[str]
     suffixes: ClassVar[tuple[str, ...]]
+    in_parts: ClassVar[bool] = True
+    """Whether some of its rows can be read without the others."""
 
     @abstractmethod
     def recognises(self, head: bytes) -> bool:
@@ -82,6 +93,28 @@ class Reader(ABC):
             InputError: as `read`.
         """
         return self.read(path)
+
+    def mapped(self, path: Path, plan: Mapping, share: float = 1.0, until: float | None = None) -> Table:
+        """Return the table under canonical names, the whole of it or about a share from its beginning.
+
+        Args:
+            path: the file.
+            plan: the mapping.
+            share: of the file to read.
+            until: s after the first stamp; what comes later may be left out already here.
+
+        Raises:
+            InputError: as `read`, or what the mapping names is not there.
+        """
+        return plan.apply(self.read(path) if share >= 1.0 else self.read_head(path, share), str(path))
+
+    def mapped_rows(self, path: Path, plan: Mapping, first: int, count: int) -> Table:
+        """Return some of the rows under canonical names.
+
+        Raises:
+            InputError: as `mapped`.
+        """
+        return plan.apply(self.read_rows(path, first, count), str(path))
 
     def rows(self, path: Path) -> int:
         """Return how many rows the file has; a format that does not say reads all of it.
@@ -104,6 +137,14 @@ class Reader(ABC):
         columns = {name: column[part] for name, column in whole.columns.items()}
         text = {name: column[part] for name, column in whole.text.items()}
         return Table(columns, len(range(*part.indices(whole.rows))), text, set(whole.seconds), [])
+
+    def verify(self, path: Path) -> None:
+        """Compare the file with what it states of itself, before it is read in parts, which cannot show that.
+
+        Raises:
+            InputError: it is damaged.
+        """
+        return
 
     def first_stamp(self, path: Path, column: str) -> float | None:
         """Return the date in a column's first row, s since 1970; None where the column holds no dates.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 
 import numpy as np
 import polars as pl
@@ -15,6 +16,7 @@ MISSING = ("", "-", "--", "nan", "na", "n/a", "#n/a", "null", "none", "inf", "+i
 _INFINITE = re.compile(r"[+-]?inf(inity)?", re.IGNORECASE)
 _MAX_BAD = 0.01  # above this share of unreadable cells a column is text, not a damaged number
 _MAX_LABELS = 10_000
+MOST_COLUMNS = 20_000
 _EXACT = 2**53  # integers beyond it do not fit a float64
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 
@@ -23,11 +25,15 @@ def clean_names(names: list[str], where: str) -> tuple[list[str], list[Repair]]:
     """Return the column names without blanks around them and without control characters.
 
     Raises:
-        InputError: a name occurs twice.
+        InputError: a name occurs twice, or there are more than any log has.
     """
+    if len(names) > MOST_COLUMNS:
+        raise InputError(
+            f"{where}: has {len(names)} columns; a log has at most {MOST_COLUMNS}: is this its header line?"
+        )
     cleaned = [_CONTROL.sub("?", name).strip() for name in names]
     strange = sum(_CONTROL.search(name) is not None for name in names)
-    twice = sorted({n for n in cleaned if n and cleaned.count(n) > 1})
+    twice = sorted(n for n, times in Counter(cleaned).items() if n and times > 1)
     if twice:
         raise InputError(
             f"{where}: the columns {', '.join(map(repr, twice))} occur twice; rename one of each"

@@ -7,17 +7,18 @@ others and every checksum with its page. The structures are those of the parquet
 
 from __future__ import annotations
 
-import mmap
 import zlib
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from auvnn.errors import InputError
+from auvnn.logs.readers.file_bytes import FileBytes
 from auvnn.logs.readers.thrift import Cursor, Struct, ThriftError
 
 MAGIC = b"PAR1"
 _MAX_ROWS = 2**40
+_HEADER = 2048
 _DATA, _DICTIONARY, _DATA_V2 = 0, 2, 3
 # By their numbers in the format; LZO is in the specification and nearly nobody reads it.
 _CODECS = {0: "none", 1: "snappy", 2: "gzip", 3: "LZO", 4: "brotli", 5: "lz4", 6: "zstd", 7: "lz4_raw"}
@@ -33,16 +34,35 @@ class Contents:
         flat: names of the columns that hold one value per row.
         nested: names of those that hold lists or records.
         bytes: size of all pages when unpacked.
+        groups: of each row group, the number of its rows.
+        places: of each flat column, the range of its bytes in each row group.
+        footer: first byte of the table of contents.
+        notes: what the writer noted, by key.
+        summed: whether every page carries a checksum, all of which have been compared.
     """
 
     rows: int
     flat: list[str]
     nested: list[str]
     bytes: int
+    groups: tuple[int, ...] = ()
+    places: dict[str, list[tuple[int, int]]] = field(default_factory=dict)
+    footer: int = 0
+    notes: dict[str, str] = field(default_factory=dict)
+    summed: bool = False
+
+    def ranges(self, first: int, count: int, size: int, columns: Sequence[str]) -> list[tuple[int, int]]:
+        """Return the ranges of bytes, in a file of some size, that a decoder needs for some rows of some columns."""
+        found, at = [(0, len(MAGIC)), (self.footer, size)], 0
+        for k, rows in enumerate(self.groups):
+            if at < first + count and first < at + rows:
+                found += [self.places[name][k] for name in columns]
+            at += rows
+        return found
 
 
 def check(path: Path) -> Contents:
-    """Return what a Parquet file holds, after its counts and checksums have been compared.
+    """Return what a Parquet file holds, after its counts and checksums have been compared; it is not mapped.
 
     Raises:
         InputError: it is cut short or damaged.
@@ -50,13 +70,22 @@ def check(path: Path) -> Contents:
     where = str(path)
     try:
         with path.open("rb") as stream:
-            size = stream.seek(0, 2)
-            if size < 12:
-                raise InputError(f"{where}: is cut short: {size} bytes are no Parquet file; copy it again")
-            with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-                return _check(data, size, where)
+            return check_bytes(FileBytes(stream, where), where)
     except OSError as problem:
         raise InputError(f"{where}: cannot be read: {problem}") from None
+
+
+def check_bytes(data: bytes | FileBytes, where: str) -> Contents:
+    """Return the same of the bytes of a file.
+
+    Raises:
+        InputError: as `check`.
+    """
+    size = len(data)
+    if size < 12:
+        raise InputError(f"{where}: is cut short: {size} bytes are no Parquet file; copy it again")
+    try:
+        return _check(data, size, where)
     except InputError:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, IndexError) as problem:
@@ -64,33 +93,41 @@ def check(path: Path) -> Contents:
         raise InputError(f"{where}: is a damaged Parquet file ({problem}); copy it again") from None
 
 
-def _check(data: Any, size: int, where: str) -> Contents:
-    if data[size - 4 : size] == b"PARE":
+def _check(data: bytes | FileBytes, size: int, where: str) -> Contents:
+    tail = data[size - 8 : size]
+    if tail[4:] == b"PARE":
         raise InputError(f"{where}: is an encrypted Parquet file; save it without encryption")
-    if data[size - 4 : size] != MAGIC:
+    if tail[4:] != MAGIC:
         raise InputError(f"{where}: is cut short: the table of contents at its end is missing; copy it again")
-    footer = int.from_bytes(data[size - 8 : size - 4], "little")
-    start = size - 8 - footer
+    start = size - 8 - int.from_bytes(tail[:4], "little")
     if start < 4:
         raise ThriftError("its table of contents is larger than the file")
-    meta = Cursor(data, start, size - 8).struct()
+    footer = data[start : size - 8]
+    meta = Cursor(footer, 0, len(footer)).struct()
     rows, groups = meta[3], meta[4]
     if not 0 <= rows < _MAX_ROWS or sum(group[3] for group in groups) != rows:
         raise ThriftError("the number of rows is not that of its parts")
-    total = 0
+    total, summed = 0, True
+    places: dict[str, list[tuple[int, int]]] = {}
     for group in groups:
         for chunk in group[1]:
             _refuse_codec(chunk, where)
-            total += _check_chunk(data, chunk, group[3], start)
-        _let_go(data)
+            unpacked, every = _check_chunk(data, chunk, group[3], start)
+            total, summed = total + unpacked, summed and every
+            meta_of = chunk[3]
+            begin = min(p for p in (meta_of[9], meta_of.get(11, 0)) if p > 0)
+            if not 0 <= meta_of[7] <= start - begin:
+                raise ThriftError("a column lies outside the file")
+            if len(meta_of[3]) == 1:
+                places.setdefault(meta_of[3][0].decode(), []).append((begin, begin + meta_of[7]))
     flat, nested = _columns(meta[2])
-    return Contents(rows, flat, nested, total)
-
-
-def _let_go(data: Any) -> None:
-    """Give back the pages of a file that have been looked at: of a file of gigabytes they would count as ours."""
-    if isinstance(data, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
-        data.madvise(mmap.MADV_DONTNEED)
+    notes = {
+        e[1].decode("utf-8", "replace"): e.get(2, b"").decode("utf-8", "replace") for e in meta.get(5, [])
+    }
+    if any(len(places.get(name, [])) != len(groups) for name in flat):
+        raise ThriftError("a column is missing in a part of the file")
+    return Contents(rows, flat, nested, total, tuple(int(group[3]) for group in groups), places, start, notes,
+                    summed)  # fmt: skip
 
 
 def _refuse_codec(chunk: Struct, where: str) -> None:
@@ -127,7 +164,8 @@ def _after(schema: list[Struct], i: int) -> int:
     return i
 
 
-def _check_chunk(data: Any, chunk: Struct, rows: int, end: int) -> int:
+def _check_chunk(data: bytes | FileBytes, chunk: Struct, rows: int, end: int) -> tuple[int, bool]:
+    """Return the size of a column when unpacked, and whether all its pages carry checksums."""
     meta = chunk[3]
     values, unpacked = meta[5], meta[6]
     flat = len(meta[3]) == 1
@@ -135,24 +173,37 @@ def _check_chunk(data: Any, chunk: Struct, rows: int, end: int) -> int:
         raise ThriftError("a column has another number of values than rows")
     dictionary = meta.get(11, 0)
     place = min(p for p in (meta[9], dictionary) if p > 0)
-    seen = 0
+    seen, summed = 0, True
     while seen < values:
         if not 4 <= place < end:
             raise ThriftError("a page lies outside the file")
-        cursor = Cursor(data, place, end)
-        header = cursor.struct()
-        count = _check_page(data, header, cursor.place, end, unpacked)
+        header, behind = _page_header(data, place, end)
+        count = _check_page(data, header, behind, end, unpacked)
+        summed = summed and 4 in header
         if header[1] in (_DATA, _DATA_V2):
             if count == 0:
                 raise ThriftError("a page is empty")
             seen += count
-        place = cursor.place + header[3]
+        place = behind + header[3]
     if seen != values:
         raise ThriftError("the pages of a column hold another number of values than the column")
-    return int(unpacked)
+    return int(unpacked), summed
 
 
-def _check_page(data: Any, header: Struct, place: int, end: int, most: int) -> int:
+def _page_header(data: bytes | FileBytes, place: int, end: int) -> tuple[Struct, int]:
+    """Return the header of the page that begins at a place, and the place behind it."""
+    for most in (_HEADER, end - place):  # a header holds statistics, which may be long texts
+        part = data[place : min(place + most, end)]
+        cursor = Cursor(part, 0, len(part))
+        try:
+            return cursor.struct(), place + cursor.place
+        except ThriftError:
+            if place + most >= end:
+                raise
+    raise ThriftError("a page has no header")
+
+
+def _check_page(data: bytes | FileBytes, header: Struct, place: int, end: int, most: int) -> int:
     """Return the number of values that a page header promises, after all its numbers have been compared."""
     unpacked, packed = header[2], header[3]
     if not (0 <= packed <= end - place and 0 <= unpacked <= max(most, packed)):

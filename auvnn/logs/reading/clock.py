@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 SORT_LIMIT = 1.0  # s; a larger step back is a clock that was set or a recording that was restarted
 _SLOWEST, _FASTEST = 5.0, 1e-5  # s per sample beyond which the unit is doubted
 _UNIX = 1e8  # s; stamps beyond it are dates
+_SHUFFLED = 0.25  # share of steps back that no recording has
 _OVERLAP = 0.6  # share of the median step below which two sorted stamps count as interleaved
 
 
@@ -84,6 +85,12 @@ def _plausible(t: Array, where: str) -> None:
         raise InputError(
             f"{where}: {len(steps) - len(forward)} of {len(steps)} time steps are zero at t = {t[0]:.6g} s: "
             "a date stored in 32 bits resolves 128 s; store t as float64, or count it from the start"
+        )
+    back = -steps[steps < 0.0]
+    if len(back) > _SHUFFLED * len(steps) and float(np.median(back)) > SORT_LIMIT:
+        raise InputError(
+            f"{where}: the rows are not in the order of time: {len(back)} of {len(steps)} steps go back, half of them by "
+            f"more than {float(np.median(back)):.3g} s; sort the file by t, or give each recording its own run number"
         )
     step = float(np.median(forward))
     if step > _SLOWEST:

@@ -17,7 +17,9 @@ _FIRST = 64_000_000  # bytes of the file with which to begin
 _MORE = 4.0
 
 
-def read_table(reader: Reader, path: Path, plan: Mapping, max_duration: float | None) -> Table:
+def read_table(
+    reader: Reader, path: Path, plan: Mapping, max_duration: float | None
+) -> tuple[Table, int | None]:
     """Return a file's table under canonical names, the whole of it or its first seconds.
 
     Gaps do not count as time, nor do steps back. Of a long file ever larger parts are read until one is long
@@ -29,31 +31,36 @@ def read_table(reader: Reader, path: Path, plan: Mapping, max_duration: float | 
         plan: the mapping.
         max_duration: s to keep; None for all.
 
+    Returns:
+        The table, and the number of bytes that were read for it; None where that was the whole file.
+
     Raises:
         InputError: the file cannot be read.
         ConfigError: `max_duration` is no positive number.
     """
     where = str(path)
     if max_duration is None:
-        return plan.apply(reader.read(path), where)
+        return reader.mapped(path, plan), None
     number = isinstance(max_duration, (int, float)) and not isinstance(max_duration, bool)
     if not number or not 0.0 < max_duration < np.inf:
         raise ConfigError(f"max_duration={max_duration} must be a number of seconds above zero")
     try:
-        share = min(1.0, _FIRST / max(path.stat().st_size, 1))
+        size = path.stat().st_size
+        share = min(1.0, _FIRST / max(size, 1)) if reader.in_parts else 1.0
     except OSError as problem:
         raise InputError(f"{where}: cannot be read: {problem}") from None
     while True:
-        table = plan.apply(reader.read_head(path, share), where)
+        table = reader.mapped(path, plan, share, max_duration)
+        read = None if share >= 1.0 else int(share * size)
         if "t" not in table.columns:
-            return table  # the check of what is required has better words for it
+            return table, read  # the check of what is required has better words for it
         elapsed = _elapsed(plan.seconds(table.columns["t"], "t" in table.seconds))
         if share >= 1.0 or elapsed[-1] > max_duration:
             break
         share = min(1.0, _MORE * share)
     rows = int(np.searchsorted(elapsed, max_duration, side="right"))
     if rows == table.rows and share >= 1.0:
-        return table
+        return table, read
     kept = 100.0 * share * rows / table.rows
     words = (
         f"the first {max_duration:g} s read, about {kept:.2g} % of the file; the rest left out (max_duration)"
@@ -62,7 +69,7 @@ def read_table(reader: Reader, path: Path, plan: Mapping, max_duration: float | 
     table.text = {name: column[:rows] for name, column in table.text.items()}
     table.rows = rows
     table.repairs.append(Repair(words, where, rows, "info"))
-    return table
+    return table, read
 
 
 def _elapsed(t: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,6 +10,9 @@ followed by `from: [u_0, u_1], by: primary`, or, where each core has rows of its
 
 A `delay` says by how many seconds a column lags behind the time it is stamped with (`auvnn check` measures it for
 the velocities): once the runs are told apart, each of them takes its values from that much later in the record.
+
+What recordings of many topics need beside this (`unit`, `mix`, `over`, `difference`, `in`, `pressure`, and the
+sections `topics`, `rows`, `commands`, `heading`, `definitions`) is read and explained in `mapping_more`.
 """
 
 from __future__ import annotations
@@ -28,12 +31,13 @@ from auvnn.config import read_yaml
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs.channels import EULER, FIXED, QUATERNION, RESET, is_canonical
 from auvnn.logs.readers.base import Table
-from auvnn.logs.reading import cores
+from auvnn.logs.reading import cores, mapping_more
+from auvnn.logs.reading.mapping_more import Commands, Heading, More, TopicRule
 from auvnn.logs.reading.repair import Repair
 from auvnn.logs.reading.validity import Validity
 
-_KEYS = ("columns", "frame", "angles", "rates", "quaternion", "time", "run", "core")
-_COLUMN_KEYS = ("from", "scale", "offset", "curve", "delay", "value", "valid", "by")
+_KEYS = ("columns", "frame", "angles", "rates", "quaternion", "time", "run", "core", *mapping_more.SECTIONS)
+_COLUMN_KEYS = ("from", "scale", "offset", "curve", "delay", "value", "valid", "by", *mapping_more.KEYS)
 _TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _RATES = ("p", "q", "r", "dp", "dq", "dr")
 _NO_SIGNAL = 65535.0
@@ -54,6 +58,7 @@ class Column:
     cores: tuple[str, ...] = ()
     by: str | None = None
     valid: Validity | None = None
+    more: More = field(default_factory=More)
 
 
 @dataclass(frozen=True)
@@ -71,6 +76,11 @@ class Mapping:
         run: column that numbers or names the runs, None for `run`, "file" for one run per file.
         core: columns that hold a row's core and the core in use, where each core has rows of its own.
         where: the mapping's file, for messages.
+        topics: how each topic of a recording is stamped and framed, by its name.
+        rows: topic whose times the rows have; None to choose.
+        commands: what holds between two commands.
+        heading: what is added to the measured heading.
+        definitions: folder of `.msg` files, for bags without definitions.
     """
 
     columns: dict[str, Column] = field(default_factory=dict)
@@ -83,6 +93,11 @@ class Mapping:
     run: str | None = None
     where: str = "mapping"
     core: tuple[str, str] | None = None
+    topics: dict[str, TopicRule] = field(default_factory=dict)
+    rows: str | None = None
+    commands: Commands = field(default_factory=Commands)
+    heading: Heading | None = None
+    definitions: str | None = None
 
     @classmethod
     def read(cls, source: str | Path | MappingType[str, Any] | Mapping | None) -> Mapping:
@@ -111,7 +126,7 @@ class Mapping:
         result = Table({}, table.rows, {}, set(), list(table.repairs))
         used: set[str] = set()
         for name, column in self.columns.items():
-            if column.source is None:
+            if column.source is None and not column.more.mix:
                 result.columns[name] = np.full(table.rows, column.value)
                 continue
             if column.by is not None:
@@ -120,12 +135,21 @@ class Mapping:
                 values = cores.chosen(each, chosen, name, column.by, where)
                 used |= {*column.cores, column.by}
                 cores.note_switches(result, chosen, column.by, where)
+            elif column.more.mix:
+                each = [self._source(table, name, c, where) for c, _ in column.more.mix]
+                values = self.mixed(each, column, name, where, result)
+                used |= {c for c, _ in column.more.mix}
             else:
+                assert column.source is not None
                 values = self._source(table, name, column.source, where)
                 used.add(column.source)
+                if column.more.over is not None:
+                    values = column.more.speed(values, self._source(table, name, column.more.over, where))
+                    used.add(column.more.over)
             if column.source in table.seconds:
                 result.seconds.add(name)
-            values = self._convert(values, column, name, where, result)
+            if not column.more.mix:
+                values = self._convert(values, column, name, where, result)
             if column.valid is not None:
                 values, note = column.valid.mask(values, table, name, where, self.where)
                 result.repairs += note
@@ -159,9 +183,25 @@ class Mapping:
         raise InputError(f"{where}: {self.where} takes '{name}' from a column that is not there: "
                          f"{unknown_name('column', source, table.names)}")  # fmt: skip
 
-    def _convert(
+    def mixed(
+        self, each: list[NDArray[Any]], column: Column, name: str, where: str, result: Table
+    ) -> NDArray[np.float64]:
+        """Return the weighed sum of inputs that have passed the column's curve, (N,), cut to [-1, 1] for a thruster."""
+        inside = [self._convert(raw, column, name, where, result, last=False) for raw in each]
+        total = sum(weight * x for (_, weight), x in zip(column.more.mix, inside, strict=True))
+        total = np.asarray(total) * column.scale + column.offset
+        return np.clip(total, -1.0, 1.0) if name.startswith("thruster_") else total
+
+    def convert(
         self, raw: NDArray[Any], column: Column, name: str, where: str, result: Table
     ) -> NDArray[Any]:
+        """Return a column's values in its own unit: curve, scale, offset and unit applied; notes go to `result`."""
+        return self._convert(raw, column, name, where, result)
+
+    def _convert(
+        self, raw: NDArray[Any], column: Column, name: str, where: str, result: Table, last: bool = True
+    ) -> NDArray[Any]:
+        raw = column.more.in_si(raw)
         if column.neutral is None and column.scale == 1.0 and column.offset == 0.0:
             return raw
         values = raw.astype(np.float64)
@@ -177,14 +217,16 @@ class Mapping:
                 words = f"commands of '{name}' beyond neutral plus or minus span cut to [-1, 1]"
                 result.repairs.append(Repair(words, where, beyond, "warning", "give the curve its true span"))
                 values = np.clip(values, -1.0, 1.0)
-        return values * column.scale + column.offset
+        return values * column.scale + column.offset if last else values
 
     def _units(self, table: Table) -> None:
         degree = math.pi / 180.0
         fins = tuple(n for n in table.columns if n.startswith("fin_") and is_canonical(n))
         for unit, names in ((self.angles, EULER + fins), (self.rates, _RATES)):
             for name in names if unit == "deg" else ():
-                if name in table.columns:
+                # A column that states its own unit is in radians by now.
+                own = name in self.columns and self.columns[name].more.factor is not None
+                if name in table.columns and not own:
                     table.columns[name] = table.columns[name] * degree
         if self.quaternion == "xyzw" and all(n in table.columns for n in QUATERNION):
             x, y, z, w = (table.columns[n] for n in QUATERNION)
@@ -218,6 +260,7 @@ def _build(data: dict[str, Any], where: str) -> Mapping:
         run=_run(data.get("run"), where),
         where=where,
         core=_core(data.get("core"), where),
+        **mapping_more.sections(data, where),
     )
 
 
@@ -259,7 +302,8 @@ def _column(name: str, value: Any, where: str) -> Column:
         if len(value) > 1:
             raise ConfigError(f"{here}: 'value' is a constant and stands alone")
         return Column(None, value=_number(value["value"], f"{here}: value"))
-    source, by = value.get("from", name), value.get("by")
+    more = mapping_more.of_column(value, name, here)
+    source, by = value.get("from", None if more.mix else name), value.get("by")
     several: tuple[str, ...] = ()
     if by is not None:
         if not (isinstance(source, list) and source and all(isinstance(s, str) for s in source)):
@@ -267,7 +311,7 @@ def _column(name: str, value: Any, where: str) -> Column:
         if not isinstance(by, str):
             raise ConfigError(f"{here}: 'by' must name the column that says which core is in use, not {by!r}")
         several, source = tuple(source), source[0]
-    if not isinstance(source, str):
+    if not isinstance(source, str) and not more.mix:
         raise ConfigError(f"{here}: 'from' must be a column's name, not {source!r}")
     valid = Validity.read(value["valid"], f"{here}: valid") if "valid" in value else None
     numbers: dict[str, float] = {
@@ -292,7 +336,7 @@ def _column(name: str, value: Any, where: str) -> Column:
             numbers[key] = _number(curve[key], f"{here}: curve: {key}")
         if numbers["span"] == 0.0:
             raise ConfigError(f"{here}: curve: span must not be 0")
-    return Column(source, **numbers, cores=several, by=by, valid=valid)
+    return Column(source, **numbers, cores=several, by=by, valid=valid, more=more)
 
 
 def _section(data: dict[str, Any], key: str, where: str) -> dict[str, Any]:

@@ -53,7 +53,7 @@ def check_plausible(run: Run, where: str) -> tuple[Run, list[Repair]]:
 
 
 def _units(run: Run, where: str) -> None:
-    typical = [float(np.nanquantile(np.abs(column), 0.99)) for column in run.nu.T]
+    typical = [float(np.nanquantile(np.abs(c), 0.99)) if np.isfinite(c).any() else 0.0 for c in run.nu.T]
     for name, value in zip(VELOCITY[3:], typical[3:], strict=True):
         if value > _MAX_RATE:
             raise InputError(f"{where}: '{name}' reaches {value:.4g} rad/s: in degrees? Mapping: rates: deg")
@@ -67,7 +67,7 @@ def _units(run: Run, where: str) -> None:
 
 
 def _commands(run: Run, where: str) -> None:
-    if run.thrusters is None:
+    if run.thrusters is None or not np.isfinite(run.thrusters).any():
         return
     largest = float(np.nanmax(np.abs(run.thrusters)))
     if largest > 1.0 + _COMMAND_SLACK:
@@ -87,6 +87,8 @@ def _missing(run: Run, where: str) -> None:
         needed += list(zip(WRENCH, run.wrench.T, strict=True))
     for name, column in needed:
         share = float(np.isnan(column).mean())
+        if share == 1.0 and name in (*VELOCITY, "attitude"):
+            continue  # not measured at all, which a log may do without
         if share > _MAX_MISSING:
             raise InputError(
                 f"{where}: {100 * share:.0f} % of the required channel '{name}' is missing (50 % may be): "

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from auvnn.errors import InputError
 from auvnn.logs.readers import READERS, choose
+from auvnn.logs.readers.ros2_folder import ros2_files
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.logs.reading.reading import Collector, collect
 from auvnn.logs.run import Run
+from auvnn.logs.seal import compare, file_hash, sealed
 
 Array = NDArray[np.float64]
 
@@ -43,6 +45,17 @@ def rows_in(path: Path) -> int:
     return choose(path)[0].rows(path)
 
 
+def verify(path: Path) -> None:
+    """Compare a file that is to be read in parts with its own hash, and with its seal.
+
+    Raises:
+        InputError: it differs from what was written, or sealed.
+    """
+    choose(path)[0].verify(path)
+    if sealed(path) is not None:
+        compare(path, file_hash(path))
+
+
 def read_portion(path: Path, mapping: Mapping, first: int, count: int) -> Portion:
     """Read `count` rows of a file from row `first` on.
 
@@ -52,7 +65,7 @@ def read_portion(path: Path, mapping: Mapping, first: int, count: int) -> Portio
     reader, _ = choose(path)
     collector = Collector()
     with np.errstate(all="ignore"):
-        table = mapping.apply(reader.read_rows(path, first, count), str(path))
+        table = reader.mapped_rows(path, mapping, first, count)
         if table.rows == 0:
             raise InputError(f"{path}: has no row {first}")
         name = mapping.run if mapping.run not in (None, "file") else "run"
@@ -81,7 +94,9 @@ def log_files(places: Iterable[str | Path]) -> list[Path]:
     known = tuple(s for name in READERS.names() for s in READERS.get(name).suffixes)
     found: list[Path] = []
     for place in map(Path, places):
-        if place.is_dir():
+        if place.is_dir() and (place / "metadata.yaml").is_file():
+            found += ros2_files(place)
+        elif place.is_dir():
             inside = sorted(p for p in place.iterdir() if p.is_file() and p.suffix.lower() in known)
             if not inside:
                 raise InputError(
@@ -89,9 +104,11 @@ def log_files(places: Iterable[str | Path]) -> list[Path]:
                 )
             found += inside
         elif not place.exists() and any(sign in str(place) for sign in "*?["):
-            root = Path(place.anchor) if place.is_absolute() else Path()
-            pattern = str(place.relative_to(root)) if place.is_absolute() else str(place)
-            inside = sorted(p for p in root.glob(pattern) if p.is_file())
+            # A folder whose own name holds such signs is there, and is no pattern.
+            root, parts = Path(place.anchor), list(place.parts[1 if place.is_absolute() else 0 :])
+            while parts and (root / parts[0]).exists():
+                root = root / parts.pop(0)
+            inside = sorted(p for p in root.glob(str(Path(*parts))) if p.is_file())
             if not inside:
                 raise InputError(f"{place}: no file matches this pattern")
             found += inside
@@ -113,6 +130,8 @@ def is_large(paths: Sequence[Path]) -> bool:
     rows = 0
     for path in paths:
         reader, _ = choose(path)
+        if not reader.in_parts:
+            continue  # topics are merged as a whole
         rows += reader.rows(path) if reader.name == "parquet" else path.stat().st_size // ROW_BYTES
         if rows > LARGE:
             return True
@@ -129,7 +148,18 @@ def kind_of(paths: Sequence[Path], mapping: Any = None) -> str:
     Raises:
         InputError: they cannot be read.
     """
-    return read_portion(paths[0], Mapping.read(mapping), 0, _FIRST).runs[0].kind
+    return kinds_of(paths, mapping)[0]
+
+
+def kinds_of(paths: Sequence[Path], mapping: Any = None) -> tuple[str, ...]:
+    """Return what commands a log has, by the first rows of its first file, the kind that is taken by default first.
+
+    Raises:
+        InputError: they cannot be read.
+    """
+    run = read_portion(paths[0], Mapping.read(mapping), 0, _FIRST).runs[0]
+    there = {"thrusters": run.thrusters is not None, "wrench": run.wrench is not None}
+    return (run.kind, *(k for k, known in there.items() if known and k != run.kind))
 
 
 # s since 1970 beyond which a stamp is a date.
@@ -147,7 +177,7 @@ def start_of(path: Path, mapping: Mapping) -> float | None:
     stamp = None if source is None else reader.first_stamp(path, source)
     if stamp is not None:
         return stamp
-    table = mapping.apply(reader.read_rows(path, 0, 1), str(path))
+    table = reader.mapped_rows(path, mapping, 0, 1)
     if "t" not in table.columns or table.rows == 0:
         return None
     first = float(mapping.seconds(table.columns["t"], "t" in table.seconds)[0])

@@ -24,11 +24,23 @@ from auvnn.logs.channels import (
     numbered,
 )
 from auvnn.logs.readers import Table, choose
-from auvnn.logs.reading import attitude, clock, delays, frames, masks, plausible, required
+from auvnn.logs.readers.ros2_folder import ros2_files
+from auvnn.logs.reading import (
+    attitude,
+    clock,
+    delays,
+    frames,
+    in_world,
+    masks,
+    plausible,
+    required,
+    several_rates,
+)
 from auvnn.logs.reading.head import read_table
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.logs.reading.repair import Repair
-from auvnn.logs.run import Run
+from auvnn.logs.run import MIN_SAMPLES, Run
+from auvnn.logs.seal import compare, file_hash, sealed
 
 Array = NDArray[np.float64]
 
@@ -43,6 +55,7 @@ class Reading:
     repairs: tuple[Repair, ...]
     sha256: str
     unknown: tuple[str, ...]
+    unsealed: tuple[Path, ...]
 
 
 @dataclass
@@ -63,7 +76,8 @@ def read(
         InputError: a file cannot be read or its content must not be trusted.
         ConfigError: the mapping is wrong, or no file is named.
     """
-    paths = [Path(p) for p in ([path] if isinstance(path, (str, Path)) else path)]
+    named = [Path(p) for p in ([path] if isinstance(path, (str, Path)) else path)]
+    paths = [f for p in named for f in (ros2_files(p) if (p / "metadata.yaml").is_file() else [p])]
     if not paths:
         raise ConfigError("no log file is named; log= takes a path or a list of paths")
     doubled = {str(p) for p in paths if paths.count(p) > 1}
@@ -71,18 +85,24 @@ def read(
         raise ConfigError(f"log files named twice: {', '.join(sorted(doubled))}")
     plan = Mapping.read(mapping)
     collector = Collector()
-    hashes = []
+    hashes: list[str] = []
+    unsealed: list[Path] = []
     for file in paths:
         before = _stamp(file)
         reader, notes = choose(file)
         collector.repairs.extend(notes)
         with np.errstate(all="ignore"):
-            table = read_table(reader, file, plan, max_duration)
-        hashes.append(file_hash(file))
+            table, read = read_table(reader, file, plan, max_duration)
+        if read is None:
+            hashes.append(table.sha256 or file_hash(file))
+        else:
+            # Of a file that is far longer no more is read for this than for its first seconds.
+            hashes.append(file_hash(file, read))
         if _stamp(file) != before:
             raise InputError(
                 f"{file}: changed while it was read; wait until the recording or the copy is done"
             )
+        collector.repairs.extend(_compared(file, hashes[-1], read is None, table, unsealed))
         collector.repairs.extend(table.repairs)
         first = len(collector.runs)
         # Damaged numbers may overflow on their way; what comes of it is masked and counted.
@@ -96,8 +116,23 @@ def read(
     digest = hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest()
     name = paths[0].stem if len(paths) == 1 else f"{paths[0].stem} and {len(paths) - 1} more"
     return Reading(
-        tuple(collector.runs), name, tuple(paths), tuple(collector.repairs), digest, tuple(collector.unknown)
-    )
+        tuple(collector.runs), name, tuple(paths), tuple(collector.repairs), digest, tuple(collector.unknown),
+        tuple(unsealed),
+    )  # fmt: skip
+
+
+def _compared(file: Path, digest: str, whole: bool, table: Table, unsealed: list[Path]) -> list[Repair]:
+    """Compare a file with its seal, and note a seal that could not be compared, or that nothing can be.
+
+    Raises:
+        InputError: the file is not what was sealed.
+    """
+    if not whole:
+        words = "sealed, but only its beginning was read: the seal was not compared"
+        return [Repair(words, str(file), 1, "info")] if sealed(file) is not None else []
+    if not compare(file, digest) and not table.checked:
+        unsealed.append(file)
+    return []
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
@@ -106,19 +141,6 @@ def _stamp(path: Path) -> tuple[int, int] | None:
     except (OSError, ValueError):
         return None
     return state.st_size, state.st_mtime_ns
-
-
-def file_hash(path: Path) -> str:
-    """Return the SHA-256 of a file's bytes.
-
-    Raises:
-        InputError: it cannot be read.
-    """
-    try:
-        with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError as problem:
-        raise InputError(f"{path}: disappeared while it was read: {problem}") from None
 
 
 def _number_apart(collector: Collector, first: int, file: Path, several: bool) -> None:
@@ -137,6 +159,7 @@ def _number_apart(collector: Collector, first: int, file: Path, several: bool) -
 def collect(table: Table, plan: Mapping, file: Path, collector: Collector) -> None:
     """Turn a table into runs: told apart, in order of time, mended and checked."""
     where = str(file)
+    plan = table.rest or plan
     required.check_required(table, where)
     collector.repairs.extend(required.notes(table, where))
     label_column = plan.run if plan.run not in (None, "file") else "run"
@@ -149,6 +172,7 @@ def collect(table: Table, plan: Mapping, file: Path, collector: Collector) -> No
     highest = max(number for number, _ in groups)
     for number, rows in groups:
         here = where if len(groups) == 1 else f"{where}, run {number}"
+        rows = _without_repeats(table, t[rows], rows, here, collector.repairs)
         stretches, notes = clock.order_in_time(t[rows], here)
         collector.repairs.extend(notes)
         for i, stretch in enumerate(stretches):
@@ -162,8 +186,34 @@ def collect(table: Table, plan: Mapping, file: Path, collector: Collector) -> No
             columns["t"] = t[pick]
             columns, notes = delays.undo_delays(columns, plan, here)
             collector.repairs.extend(notes)
+            columns, notes = several_rates.settle(columns, plan, here)
+            collector.repairs.extend(notes)
             run = _run(number if i == 0 else highest, columns, outside, plan, here, collector.repairs)
             collector.runs.append(run)
+
+
+def _without_repeats(
+    table: Table, t: Array, rows: NDArray[np.intp], where: str, repairs: list[Repair]
+) -> NDArray[np.intp]:
+    """Return the rows but those that are, stamp and values, an earlier row again: blocks that were written twice."""
+    if not (np.diff(t[np.isfinite(t)]) < 0.0).any():
+        return rows  # nothing is written twice where time only runs on, and most logs end here
+    _, first, inverse = np.unique(t, return_index=True, return_inverse=True, equal_nan=False)
+    earlier = first[inverse]
+    again = np.flatnonzero(earlier < np.arange(len(t)))
+    for column in table.columns.values():
+        one, other = column[rows[earlier[again]]], column[rows[again]]
+        same = (
+            one == other if column.dtype.kind != "f" else (one == other) | (np.isnan(one) & np.isnan(other))
+        )
+        again = again[same]
+    if len(again) < MIN_SAMPLES:
+        return rows
+    words = "rows that are earlier ones again, stamps and values, left out (a block written twice?)"
+    repairs.append(
+        Repair(words, where, len(again), "warning", "export the log again if rows are missing elsewhere")
+    )
+    return np.delete(rows, again)
 
 
 def _groups(table: Table, name: str, where: str, collector: Collector) -> list[tuple[int, NDArray[np.intp]]]:
@@ -212,13 +262,15 @@ def _run(
         return np.stack([columns.get(n, missing) for n in names], axis=1)
 
     velocity = block(VELOCITY)
-    assert velocity is not None  # required.check has seen these columns
+    if velocity is None:
+        velocity = np.full((len(columns["t"]), 6), np.nan)
     raw = block(QUATERNION) if all(n in columns for n in QUATERNION) else None
     if raw is not None:
         quaternion, notes = attitude.from_quaternions(raw, where)
     else:
         angles = block(EULER)
-        assert angles is not None
+        if angles is None:
+            angles = np.full((len(columns["t"]), 3), np.nan)
         quaternion, notes = attitude.from_angles(angles, columns["t"], velocity[:, 5], where)
     repairs.extend(notes)
     acceleration, wrench, position = block(ACCELERATION), block(WRENCH), block(POSITION)
@@ -237,6 +289,8 @@ def _run(
         reset=columns.get(RESET),
         extra={n: columns[n] for n in outside},
     )
+    run, notes = in_world.settle(run, plan, where)
+    repairs.extend(notes)
     for mend in (plausible.check_plausible, masks.apply):
         run, notes = mend(run, where)
         repairs.extend(notes)

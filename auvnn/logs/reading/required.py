@@ -10,15 +10,22 @@ from auvnn.logs.reading.suggest import actuator_columns, hint
 
 
 def check_required(table: Table, where: str) -> None:
-    """Check that time, attitude, velocity and a command are there, and no group is incomplete.
+    """Check that time, a command and enough of the motion are there, and no group is incomplete.
+
+    A vehicle without a DVL has no u, v, w, a glider no rates, a tracked vehicle positions alone: what was not measured
+    counts as missing throughout. Where one column of a group is there, the others must be.
 
     Raises:
         InputError: naming every missing column, with the columns of the file that it might be.
     """
     names = table.names
-    missing = [n for n in ("t", *VELOCITY) if n not in names]
+    missing = [n for n in ("t",) if n not in names]
     attitude = _attitude(names)
-    missing += [n for n in attitude if n not in names]
+    groups = [g for g in (VELOCITY[:3], VELOCITY[3:], attitude) if any(n in names for n in g)]
+    seen = groups or any(n in names for n in POSITION)
+    if not seen or missing:
+        groups = [VELOCITY, attitude]  # nothing of it has its name: say all that it might be
+    missing += [n for g in groups for n in g if n not in names]
     thrusters = numbered("thruster", names)
     some_wrench = [n for n in WRENCH if n in names]
     if some_wrench:

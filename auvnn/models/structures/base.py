@@ -48,17 +48,23 @@ class Structure(GreyBox):
         """Return the structure's name and options as an entry of a model file, and the weights of what it learns."""
         return {STRUCTURE: {"name": self.structure, **self.structure_options()}}, self.learned.state_dict()
 
-    def rebuilt(self, effects: Iterable[Effect], vehicle: Vehicle | None = None) -> GreyBox:
-        """Return the same structure, its learned parts copied, with other effects or other numbers."""
+    def _like(self, effects: Iterable[Effect], vehicle: Vehicle, actuation: str, *, shared: bool) -> GreyBox:
+        """Return the same structure with other effects or other numbers, its learned parts shared or copied."""
         from auvnn.models.structures import build_structure
 
         made = build_structure(
-            self.structure, vehicle or self.vehicle, effects=list(effects), actuation=self.actuation,
-            **self.structure_options(),
-        )  # fmt: skip
+            self.structure, vehicle, effects=list(effects), actuation=actuation, **self.structure_options()
+        )
         assert isinstance(made, Structure)
-        made.learned.load_state_dict(copy.deepcopy(self.learned.state_dict()))
+        if shared:
+            made.take(self)
+        else:
+            made.learned.load_state_dict(copy.deepcopy(self.learned.state_dict()))
         return made.to(self._known("mass"))
+
+    def take(self, other: Structure) -> None:
+        """Use the learned parts of another model of the same structure instead of one's own."""
+        self.learned = other.learned
 
 
 def learned_parameters(model: GreyBox) -> list[nn.Parameter]:

@@ -91,6 +91,11 @@ class OneNetwork(Structure):
         network = cast(Networks, self.learned["damping"])
         return {"networks": "one", "hidden": network.hidden}
 
+    def take(self, other: Structure) -> None:
+        """Use the network of another model, through the same module: the two then count as one."""
+        super().take(other)
+        self.damping = other.damping
+
 
 class _Damping(nn.Module):
     """From a velocity to the wrench against it, through a network that is owned elsewhere."""

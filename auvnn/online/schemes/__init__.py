@@ -9,7 +9,7 @@ ONLINE_SCHEMES = Catalogue(
     {
         "rls": "auvnn.online.schemes.rls:RLS",
         "sgd": "auvnn.online.schemes.sgd:SGD",
-        "replay": "auvnn.online.schemes.replay:Replay",
+        "replay": "auvnn.online.schemes.replay:ExperienceReplay",
     },
     "auvnn.online_schemes",
 )

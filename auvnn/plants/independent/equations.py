@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.plants.independent.fins import Fins
-from auvnn.plants.independent.hull import build, grasp
+from auvnn.plants.independent.hull import build, curved, grasp
 from auvnn.plants.independent.loads import LOADS, Instant
 from auvnn.plants.independent.sizes import sphere_radius
 from auvnn.plants.independent.thrust import Actuators
@@ -82,14 +82,16 @@ class Equations:
         laws: Laws = USUAL,
     ) -> None:
         """Work out what does not change."""
-        self.laws = laws
+        self.laws, self.curve = laws, curved(laws, vehicle, effects)
         self.vehicle, self.effects, self.actuators, self.bottom = vehicle, effects, actuators, bottom
         self.hull = build(vehicle, effects)
         self.loads = [(name, LOADS[name], values) for name, values in effects.items() if name in LOADS]
         self.strangers = [(n, STRANGERS.get(n), values) for n, values in strangers.items()]
         self.fins = None
         if vehicle.fins:
-            self.fins = Fins(vehicle, effects.get("fin_stall", {}).get("factor", 1.0), laws.separation)
+            self.fins = Fins(
+                vehicle, effects.get("fin_stall", {}).get("factor", 1.0), laws.separation, effects
+            )
         self.moves = any(n in effects for n in ("ocean_current", "current_shear", "waves"))
         self.held = grasp(effects["payload"]["time"], vehicle) if "payload" in effects else None
         self.radius = sphere_radius(vehicle)
@@ -136,11 +138,11 @@ class Equations:
         if self.drags[0]:
             out -= nu @ hull.linear.T
         if self.drags[1]:
-            out -= self.laws.powers(nu) @ hull.quadratic.T
+            out -= self.curve.powers(nu) @ hull.quadratic.T
         for place, axes, linear, quadratic in hull.parts:
             arm = np.broadcast_to(place, flow.shape)
             own = np.concatenate([(flow + cross(turn, arm)) @ axes, turn @ axes], axis=-1)
-            law = -linear * own - quadratic * self.laws.powers(own)
+            law = -linear * own - quadratic * self.curve.powers(own)
             force, moment = law[:, :3] @ axes.T, law[:, 3:] @ axes.T
             out += np.concatenate([force, moment + cross(arm, force)], axis=-1)
         return out

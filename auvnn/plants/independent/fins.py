@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,10 +24,23 @@ class Fins:
         vehicle: whose fins.
         factor: on all stall angles.
         separation: share of the lift that is c_La a cos(a) / sqrt(1 + (a / a_0)^4) instead: it stalls gently.
+        effects: on the fins: their gain, offset and drag.
     """
 
-    def __init__(self, vehicle: Vehicle, factor: float = 1.0, separation: float = 0.0) -> None:
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        factor: float = 1.0,
+        separation: float = 0.0,
+        effects: Mapping[str, Mapping[str, float]] | None = None,
+    ) -> None:
         """Collect geometry."""
+        given = effects or {}
+        names = [f"fin_{i + 1}" for i in range(len(vehicle.fins))]
+        self.gain = np.array([given.get("fin_gain", {}).get(n, 1.0) for n in names])
+        self.offset = np.array([given.get("fin_offset", {}).get(n, 0.0) for n in names])
+        drag = given.get("fin_drag", {})
+        self.zero_lift, self.induced = drag.get("zero_lift", 0.0), drag.get("induced", 0.0)
         self.separation = separation
         fins = vehicle.fins
         self.place, self.axis = np.array([f.position for f in fins]), np.array([f.axis for f in fins])
@@ -46,7 +61,7 @@ class Fins:
             turn: angular rate, (R, 3).
             angles: rad, (R, m), or None for zero.
         """
-        angle = np.zeros((len(flow), len(self.size))) if angles is None else angles
+        angle = self.offset + (np.zeros((len(flow), len(self.size))) if angles is None else angles)
         chord = np.cos(angle)[..., None] * self.ahead + np.sin(angle)[..., None] * self.across
         local = flow[:, None] + cross(
             np.broadcast_to(turn[:, None], chord.shape), self.place[None] + 0 * chord
@@ -64,5 +79,8 @@ class Fins:
             gentle = self.slope * attack * np.cos(attack) / np.sqrt(1.0 + (attack / self.stall) ** 4)
             lift = lift + self.separation * (gentle - lift)
         speed = np.sqrt((local * local).sum(-1))
-        force = (self.size * lift * speed)[..., None] * cross(axis, local)
+        force = (self.gain * self.size * lift * speed)[..., None] * cross(axis, local)
+        if self.zero_lift or self.induced:
+            # Against the flow, with the lift coefficient as stated: a wake takes from the lift, not from the drag.
+            force = force - (self.size * (self.zero_lift + self.induced * lift**2) * speed)[..., None] * local
         return force.sum(1), cross(self.place[None] + 0 * force, force).sum(1)

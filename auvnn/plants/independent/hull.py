@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.plants.independent.sizes import usual_speeds
 from auvnn.plants.independent.vectors import cross_matrix
+from auvnn.plants.laws import Laws
 from auvnn.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -155,6 +157,15 @@ def build(vehicle: Vehicle, effects: Mapping[str, Values]) -> Hull:
     if "flooding" in effects:
         hull.lumps.append(Lump(effects["flooding"]["rate"], hull.cg, share=lambda t: (t, 1.0)))
     return hull
+
+
+def curved(laws: Laws, vehicle: Vehicle, effects: Mapping[str, Values]) -> Laws:
+    """Return the laws with the exponents that an effect gives the drag, beside those of the world."""
+    if "drag_curve" not in effects:
+        return laws
+    own = _each(effects["drag_curve"], AXES)
+    speed = usual_speeds(vehicle)
+    return replace(laws, exponent=own if laws.exponent is None else laws.exponent + own - 2.0, speed=speed)
 
 
 def _load(values: Values, vehicle: Vehicle) -> Lump:

@@ -134,15 +134,22 @@ def compressible(values: Values, at: Instant) -> Load:
 
 
 def tether(values: Values, at: Instant) -> Load:
-    """A straight cable: it pulls when taut, half of it hangs on the vehicle, and it drags along."""
-    away = at.place - np.array([values["north"], values["east"], values["down"]])
+    """A straight cable: it pulls when taut, half of it hangs on the vehicle, and it drags along; where it is fast."""
+    arm = np.broadcast_to([values.get(n, 0.0) for n in "xyz"], at.place.shape)
+    away = (
+        at.place
+        + np.einsum("rij,rj->ri", at.rotation, arm)
+        - np.array([values["north"], values["east"], values["down"]])
+    )
     length = np.linalg.norm(away, axis=-1, keepdims=True)
     taut = np.maximum(length - values["slack"], 0.0)
     towards = -away / np.maximum(length, 1e-9)
     pull = values["stiffness"] * taut * towards
     pull[:, 2:] += 0.5 * values["weight"] * length
-    speed = np.linalg.norm(at.flow, axis=-1, keepdims=True)
-    return at.to_body(pull) - values["drag"] * length * speed * at.flow, np.zeros_like(at.v)
+    through = at.flow + cross(at.turn, arm)
+    speed = np.linalg.norm(through, axis=-1, keepdims=True)
+    force = at.to_body(pull) - values["drag"] * length * speed * through
+    return force, cross(arm, force)
 
 
 def froude_krylov(values: Values, at: Instant) -> Load:

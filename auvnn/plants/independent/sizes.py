@@ -45,3 +45,12 @@ def full_effort(vehicle: Vehicle) -> Array:
     force = 0.1 * vehicle.weight
     usual = np.repeat([force, 0.5 * force * vehicle.length], 3)
     return np.where(effort > 1e-3 * usual, effort, usual)
+
+
+def usual_speeds(vehicle: Vehicle) -> Array:
+    """Return the speeds at which drag of another exponent equals the stated one, m/s and rad/s, (6,).
+
+    Froude numbers of 0.16 along and, as the turn rate times the length, 0.128 around.
+    """
+    wave = np.sqrt(vehicle.gravity * vehicle.length)
+    return np.repeat([0.16 * wave, 0.128 * wave / vehicle.length], 3)

@@ -159,6 +159,16 @@ class Actuators:
                 if not self.wrench:
                     along = along + turn @ self.turns
                 thrust = thrust - values["coefficient"] * np.abs(command / self.full) * along
+            elif name == "thrust_advance":
+                # The same as J / (1 + |J|) with J = V / (c V_1), and nought where neither turns nor flows anything.
+                along = flow @ self.forces
+                if not self.wrench:
+                    along = along + turn @ self.turns
+                turning = command / self.full
+                whole = np.abs(turning) * values["speed"] + np.abs(along)
+                with np.errstate(invalid="ignore", divide="ignore"):
+                    fallen = np.where(whole > 0.0, along * np.sign(turning) / whole, 0.0)
+                thrust = thrust * (1.0 - values["loss"] * fallen)
             elif name == "voltage_droop" and voltage is not None and self.vehicle.reference_voltage:
                 share = np.maximum(voltage / self.vehicle.reference_voltage, 1e-3)
                 thrust = thrust * np.power(share, values["exponent"])[:, None]

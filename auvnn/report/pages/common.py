@@ -12,7 +12,8 @@ from auvnn.report.html import HtmlTable
 from auvnn.report.panels import NoData
 from auvnn.report.plots.measured_against_model import rms
 from auvnn.report.style import MOTIONS, VELOCITY, WRENCH
-from auvnn.report.words import count, finite, interval, number
+from auvnn.report.view import View
+from auvnn.report.words import count, finite, interval, listing, number
 
 CHANNELS = tuple(symbol for symbol, _ in VELOCITY)
 AXES = tuple(symbol for symbol, _ in WRENCH)
@@ -78,6 +79,40 @@ def rollout_table(rollout: Mapping[str, Any]) -> HtmlTable:
         "the total if the initial velocity simply stayed."
     )
     return HtmlTable("Free-running error by horizon", head, rows, caption)
+
+
+def baseline_words(view: View) -> list[str]:
+    """Return where the model stands beside a plain regression and persistence, in one or two sentences."""
+    line = view.mapping("baseline")
+    loses = line.get("loses") or {}
+    if finite(line.get("total")) is None:
+        return []
+    out = [
+        f"A plain regression of the acceleration, run freely over the same windows, errs by {number(line['total'], 2)}."
+    ]
+    for key, what in (("baseline", "the plain regression"), ("persistence", "holding the initial velocity")):
+        channels = [channel_words(c) for c in loses.get(key) or ()]
+        if channels:
+            out.append(f"The model loses to {what} in {listing(channels)}.")
+    return out
+
+
+def baseline_table(view: View) -> HtmlTable:
+    """Return the errors of model, regression and persistence by channel."""
+    line = view.mapping("baseline")
+    rows = []
+    for name, entry in (
+        ("model", line.get("model")),
+        ("plain regression", line),
+        ("velocity held", line.get("persistence")),
+    ):
+        if isinstance(entry, Mapping) and finite(entry.get("total")) is not None:
+            rows.append([name, *(number(entry.get(c)) for c in CHANNELS), number(entry.get("total"))])
+    caption = (
+        "Free-running error over the same windows. The regression has no physics: the acceleration by least squares on "
+        f"velocities, their squares, commands, the direction of gravity and one ({line.get('how', 'fitted to the log')})."
+    )
+    return HtmlTable("Beside what needs no model", ["", *CHANNELS, "total"], rows, caption)
 
 
 def one_step_table(one_step: Mapping[str, Any]) -> HtmlTable:

@@ -47,6 +47,7 @@ class ComparisonPage(Page):
             out.append("No stretch of the log was long enough, or moved enough, to let the model run free.")
         else:
             out.append(say.verdict(common.horizon_words(horizon or ""), error, held))
+        out += common.baseline_words(view)
         lost = sum(int(finite(e.get("diverged")) or 0) for e in rollout.values())
         if lost:
             out.append(
@@ -131,6 +132,7 @@ class ComparisonPage(Page):
         ]
         return [
             HtmlTable("Where the error sits", ["channel", "where", "share of the error"], failures, words=2),
+            common.baseline_table(view),
             common.rollout_table(view.mapping("rollout")),
             common.one_step_table(view.mapping("one_step")),
             _wrench_table(view.mapping("residual_wrench")),

@@ -32,6 +32,7 @@ class DiagnosisPage(Page):
             return f"What is missing: {listing(missing)}"
         return {
             "ambiguous": f"What is missing: {listing(missing, 'or')}",
+            "partial": f"Something is missing, a part of which can be predicted by {listing(view.texts('nearest'))}",
             "unknown": "Something is missing, and nothing in the catalogue explains it",
             "adequate": "Nothing is missing that this log could show",
         }.get(verdict, "What is missing")
@@ -47,7 +48,7 @@ class DiagnosisPage(Page):
         by_name = {str(c.get("effect")): c for c in candidates}
         leading = [by_name[m] for m in missing if m in by_name]
         left = finite(view.get("unexplained"))
-        out = [_first_sentence(verdict, missing)]
+        out = [_first_sentence(verdict, missing), *common.baseline_words(view)[1:]]
         if verdict in ("named", "ambiguous"):
             out += [_candidate_words(c) for c in leading[:3]]
             out += _rival_words(candidates, missing)
@@ -55,6 +56,8 @@ class DiagnosisPage(Page):
         if further:
             out.append(f"Besides, it lacks {listing(further)}.")
             out += [_candidate_words(by_name[m]) for m in further[:3] if m in by_name]
+        told = [str(w) for w in view.texts("judged_words")]
+        out += told
         if left is not None and left < 0.01 and verdict != "adequate":
             out.append("Next to nothing of the residual is left unexplained.")
         elif left is not None and verdict != "adequate":
@@ -67,7 +70,7 @@ class DiagnosisPage(Page):
             out.append(f"That nothing at all is missing has p = {p_value(overall)}.".replace("p = <", "p <"))
         if verdict in ("unknown", "adequate"):
             out += _best_of_the_rest(candidates)
-        if verdict == "unknown":
+        if verdict in ("unknown", "partial"):
             out += _force_words(view)
             out += _dependence_words(view.mapping("depends_on"))
         after = view.mapping("next_experiment")
@@ -116,6 +119,7 @@ class DiagnosisPage(Page):
             ]
             cells = [percent(c.get("explained")), number(c.get("cv_before")), number(c.get("cv_after"))]
             remark = f"not judged: needs {listing(c['needs'])}" if c.get("needs") else ", ".join(alike)
+            remark = str(c["reason"]) if c.get("reason") else remark
             rows.append([str(c.get("effect")), remark, str(rank), p_value(c.get("p_value")), *cells])
         steps = [
             [str(i), str(s.get("verdict", "")), listing(map(str, s.get("effects") or [])) or "–"]
@@ -144,6 +148,7 @@ class DiagnosisPage(Page):
         return [
             HtmlTable("Steps of the search", ["step", "verdict", "effects"], steps, words=3),
             *_whole_log(view),
+            common.baseline_table(view),
             HtmlTable("All candidates", head, rows, caption, words=2),
             HtmlTable("Parameters of every candidate", *_parameter_columns(fitted), folded=True, words=2),
             HtmlTable(
@@ -234,6 +239,7 @@ def _first_sentence(verdict: str, missing: list[str]) -> str:
     return {
         "named": f"The model lacks {listing(missing)}.",
         "ambiguous": f"The model lacks something, and this log cannot tell which: {listing(missing, 'or')}.",
+        "partial": "The model lacks something that no effect of the catalogue explains as a whole.",
         "unknown": "The model lacks something that nothing in the catalogue explains.",
         "adequate": "Nothing is missing that this log could show: what the model does not explain looks "
         "like noise.",
@@ -294,7 +300,7 @@ def _force_words(view: View) -> list[str]:
     """Say where the force without a name acts, and which names come nearest."""
     out = []
     nearest, axes = view.texts("nearest"), list(view.mapping("acts_in"))
-    if nearest:
+    if nearest and view.text("verdict") != "partial":
         one = len(nearest) == 1
         out.append(
             f"{listing(nearest)} {'comes' if one else 'come'} nearest, and {'leaves' if one else 'leave'} too much of "

@@ -48,6 +48,7 @@ class ImprovementPage(Page):
         fall, std = finite(gain.get("value")), finite(gain.get("std"))
         errors = {stage: _main_error(view, stage) for stage in STAGES}
         out = [_verdict(effects, bool(view.get("accepted")), fall, std), *_error_words(view, effects, errors)]
+        out += common.baseline_words(view)
         out += _floor_words(steps, errors)
         fitted = view.mapping("parameters")
         if fitted:
@@ -123,6 +124,7 @@ class ImprovementPage(Page):
             _stage_table(view, "rollout", "Free-running error over {} by channel", "nrmse"),
             _stage_table(view, "one_step", "R² of the acceleration, one step ahead", "r2"),
             HtmlTable("Error step by step", ["step", "error"], steps),
+            common.baseline_table(view),
         ]
 
     def assumed(self, view: View) -> list[tuple[str, str]]:

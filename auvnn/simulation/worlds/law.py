@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 
 from auvnn.plants import Motion, Plant, PlantTask
 from auvnn.plants.independent.fins import Fins
+from auvnn.plants.independent.sizes import usual_speeds
 from auvnn.plants.independent.thrust import Actuators
 from auvnn.plants.laws import Laws, Wander
 from auvnn.simulation.worlds.world import World
@@ -21,8 +22,6 @@ Array = NDArray[np.float64]
 
 # Longest distance between knots of a force that wanders, s; a tenth of the shortest correlation time is as long.
 SPACING = 0.025
-# Speeds at which drag of another exponent equals the stated one, for a vehicle of one metre, m/s and rad/s.
-SPEED, TURN = 0.5, 0.4
 
 
 def drawn_laws(world: World, vehicle: Vehicle, actuation: str, generator: np.random.Generator) -> Laws:
@@ -32,7 +31,7 @@ def drawn_laws(world: World, vehicle: Vehicle, actuation: str, generator: np.ran
     place, count = generator.uniform(size=6), len(vehicle.thrusters) if actuation == "thrusters" else 6
     phase = generator.uniform(0.0, 2.0 * np.pi, count)
     low, high = shape.exponent
-    speed = np.array([SPEED * np.sqrt(vehicle.length)] * 3 + [TURN / np.sqrt(vehicle.length)] * 3)
+    speed = usual_speeds(vehicle)
     return Laws(
         exponent=None if low == high == 2.0 else low + (high - low) * place,
         speed=speed,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,10 +51,11 @@ class Sensing:
         self.draws = Draws(noise, rows, generators)
         if sensors.correlation > 0.0:
             self.draws.blocks = {
-                k: (_remembered(u, step, sensors.correlation), *s) for k, (u, *s) in self._blocks()
+                k: (_remembered(u, step, sensors.correlation), size, share)
+                for k, (u, size, share) in self._blocks()
             }
         self.recorded = Draws(noise, 1, [np.random.default_rng(0)])
-        self.recorded.blocks = {k: (u.copy(), *s) for k, (u, *s) in self._blocks()}
+        self.recorded.blocks = {k: (u.copy(), size, share) for k, (u, size, share) in self._blocks()}
         self.hold = max(1, round(1.0 / (sensors.velocity_rate * step))) if sensors.velocity_rate > 0.0 else 1
         azimuth = common.uniform(0.0, 2.0 * np.pi)
         self.tilt = sensors.tilt * np.array([np.cos(azimuth), np.sin(azimuth)])
@@ -87,7 +89,7 @@ class Sensing:
         late = self.sensors.jitter * generator.standard_normal(rows)
         self.late[run] = np.clip(late, -0.45 * self.step, 0.45 * self.step)
 
-    def _since(self, rows: Array) -> Array:
+    def _since(self, rows: Any) -> Any:
         """Return of each row what the last measurement of velocities had, (R, T, ...)."""
         return rows[:, (np.arange(rows.shape[1]) // self.hold) * self.hold]
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import itertools
-import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -16,98 +14,14 @@ from auvnn.catalogue import unknown_name
 from auvnn.effects import EFFECTS
 from auvnn.errors import ConfigError
 from auvnn.simulation.noise import make_noise
+from auvnn.studies.benchmark.case import CLOSED, JOIN, KINDS, LOOPS, NOTHING, Case, apart
+from auvnn.studies.benchmark.designs import balanced
 from auvnn.studies.benchmark.strangers import stranger_names
 from auvnn.vehicle import Vehicle, load_vehicle
 
-NOTHING = "nothing"
-JOIN = "+"
-# Manoeuvres under a controller that sees what the sensors report.
-CLOSED = ("survey", "reciprocal", "dives")
-LOOPS = ("open", "closed")
-KINDS = ("effect", "several", "stranger", "nothing")
 # A stream of random numbers that no log uses: which effects are hidden together must not change their logs.
 TOGETHER = 202
-# Between the seeds of different effects.
-APART = 100_000
 TRIES = 1000
-
-
-@dataclass(frozen=True)
-class Case:
-    """One log of the benchmark.
-
-    Attributes:
-        vehicle: built-in name.
-        hidden: effect, several joined by "+", a stranger to the catalogue, or "nothing".
-        size: small, medium or large, one for each of several effects joined by "+", or what it costs of the 5 s error,
-            such as "40%"; "none" with nothing hidden.
-        noise: condition.
-        excitation: manoeuvre.
-        coefficients: "exact" or "drawn".
-        seed: of everything.
-        runs: of the log that is diagnosed.
-        duration: of each run, s.
-        rate: samples per second.
-        plant: what moves: "own", the package's equations, or the name of an independent implementation.
-        accelerations: whether they are logged; None as the noise condition says.
-        held_out: further runs of the same plant, on which the models are compared; none if 0.
-        ties: whether it is worked out which other effects could pass for the hidden one on this log.
-        candidates: names that the diagnosis may give; None for the whole catalogue.
-        kind: "effect", "several", "stranger" or "nothing".
-        part: of a plan.
-        world: what departs from the model's assumptions; the usual one if empty.
-        oracle: whether it is worked out what an oracle sees that knows the world's law.
-    """
-
-    vehicle: str
-    hidden: str
-    size: str
-    noise: str
-    excitation: str
-    coefficients: str
-    seed: int
-    runs: int
-    duration: float
-    rate: float
-    plant: str = "own"
-    accelerations: bool | None = None
-    held_out: int = 0
-    ties: bool = False
-    candidates: tuple[str, ...] | None = None
-    kind: str = "effect"
-    part: str = ""
-    world: str = ""
-    oracle: bool = False
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """What is hidden, one name each; empty with nothing."""
-        return () if self.kind == "nothing" else tuple(self.hidden.split(JOIN))
-
-    @property
-    def sizes(self) -> tuple[str, ...]:
-        """The size of each hidden effect."""
-        return () if self.kind == "nothing" else tuple(self.size.split(JOIN))
-
-    @property
-    def loop(self) -> str:
-        """Whether a controller closes the loop."""
-        return "closed" if self.excitation in CLOSED else "open"
-
-    def to_row(self) -> dict[str, Any]:
-        """Return the case as the beginning of its row."""
-        row = asdict(self)
-        row["candidates"] = None if self.candidates is None else list(self.candidates)
-        return {**row, "effects": list(self.effects), "loop": self.loop}
-
-    @classmethod
-    def of_row(cls, row: Mapping[str, Any]) -> Case:
-        """Return the case that a row is about; a key that is not there has its default."""
-        known = {f.name: row[f.name] for f in fields(cls) if f.name in row}
-        if known.get("candidates") is not None:
-            known["candidates"] = tuple(known["candidates"])
-        return cls(**known)
-
 
 # What may stand in a part of a plan, or beside it on the command line.
 KEYS = (
@@ -231,8 +145,6 @@ def _balanced(
     worlds: Sequence[Any],
 ) -> list[Case]:
     """Return a part's logs where they are to be balanced: see `designs`."""
-    from auvnn.studies.benchmark.designs import balanced
-
     plant, noise = (
         str((_several(options, k) or [d])[0]) for k, d in (("plants", "own"), ("noises", "realistic"))
     )
@@ -255,14 +167,6 @@ def _balanced(
         _several(options, "loops") or list(LOOPS), variants, _count(options, "seed") + _count(options, "shift"),
         lambda name, vehicle: name in able[vehicle], shared, [str(e) for e in _several(options, "excitations")],
     )  # fmt: skip
-
-
-def apart(name: str) -> int:
-    """Return how far an effect's seeds are from the others': logs that share their noise would err together.
-
-    It follows from the name alone, so that no log changes with what else is asked for.
-    """
-    return APART * (1 + zlib.crc32(name.encode()) % 9973)
 
 
 def _manoeuvres(options: Mapping[str, Any]) -> list[Any]:
@@ -335,3 +239,18 @@ def together(names: Sequence[str], sizes: Sequence[str], count: int, seed: int) 
             chosen = [str(s) for s in generator.choice(list(sizes), count)]
             return JOIN.join(drawn), JOIN.join(chosen)
     raise ConfigError(f"effects={list(names)}: there are no {count} among them that can be hidden together")
+
+
+__all__ = [
+    "CLOSED",
+    "JOIN",
+    "KEYS",
+    "KINDS",
+    "LOOPS",
+    "NOTHING",
+    "Case",
+    "apart",
+    "cases",
+    "targets",
+    "together",
+]

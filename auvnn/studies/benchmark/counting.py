@@ -141,8 +141,9 @@ def false_share(row: Row) -> float:
 
 
 def right_verdict(row: Row) -> bool:
-    """Whether the verdict is the one that is right where nothing can be named: adequate, or unknown."""
-    return row["verdict"] == {"nothing": "adequate", "stranger": "unknown"}.get(kind_of(row))
+    """Whether the verdict is one that is right where nothing can be named: adequate; unknown, or partial."""
+    right = {"nothing": ("adequate",), "stranger": ("unknown", "partial")}
+    return row["verdict"] in right.get(kind_of(row), ())
 
 
 def right_axis(row: Row) -> bool:

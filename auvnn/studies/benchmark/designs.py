@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from auvnn.errors import ConfigError
-from auvnn.studies.benchmark.cases import CLOSED, Case, apart
+from auvnn.studies.benchmark.case import CLOSED, Case, apart
 
 # A stream of random numbers that no log uses.
 BALANCED = 204
@@ -68,9 +68,9 @@ def balanced(
         for k in range(per_effect):
             # Of logs with nothing hidden, every combination in turn; of an effect's few, all kinds change at once.
             turns = (k, k // len(able), k // (len(able) * len(loops)), 0) if nothing else (k, k, k, k)
-            vehicle, loop, variant, cost = (
-                x[orders[i][turns[i] % len(x)]] for i, x in enumerate((able, loops, variants, costs or [0.0]))
-            )
+            at = [int(order[turn % len(order)]) for order, turn in zip(orders, turns, strict=True)]
+            vehicle, loop, variant = able[at[0]], loops[at[1]], variants[at[2]]
+            cost = costs[at[3]] if costs else 0.0
             size = "none" if nothing else f"{100.0 * float(cost):g}%"
             kind = "nothing" if nothing else "effect"
             own = {**shared, **variant}

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.diagnosis.hypotheses.layout import FREE, Layout, has_stated_uncertainty, lay_out
+from auvnn.diagnosis.hypotheses.layout import FREE, Layout, lay_out
 from auvnn.diagnosis.score_tests.probes import Probed, extent_of, probed
 from auvnn.estimation.normal_equations import TRUST, linearise, motion, normal_equations
 from auvnn.estimation.priors import bounded_step, set_parameters
@@ -72,7 +72,7 @@ class Information:
         return min(self._distance(hidden, name) for name in self.starts.get(rival, [rival]))
 
     def _distance(self, hidden: str, rival: str) -> float:
-        layout, uncertain = self.layout, has_stated_uncertainty(self.layout.model)
+        layout = self.layout
         mine = layout.columns[hidden]
         described = layout.described(hidden)
         away = np.array(
@@ -90,7 +90,7 @@ class Information:
             high.append(np.array([p.high for p in parts]) - now)
         for name in held:
             size = len(layout.columns[name])
-            spread = uncertain[name] * np.maximum(np.abs(layout.means[name]), 1e-3)
+            spread = layout.spreads[name]
             precision.append(spread**-2.0)
             low.append(np.full(size, -np.inf))
             high.append(np.full(size, np.inf))

@@ -88,7 +88,8 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
     simulated = time.monotonic()
     begun["made"] = True
     candidates = None if case.candidates is None else list(case.candidates)
-    found = diagnose(model, log, candidates, advice=False, whiteness=False)
+    # Rates are those of evidence alone: what does not matter is for users to decide.
+    found = diagnose(model, log, candidates, advice=False, whiteness=False, tolerance=0.0, costs=False)
     diagnosed = time.monotonic()
     row: dict[str, Any] = {
         "verdict": found.verdict,
@@ -96,6 +97,7 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
         "p_value": found.global_p_value,
         "unexplained": found.unexplained,
         "nearest": found.nearest,
+        "left": getattr(found, "left", None),
         "steps": [s["verdict"] for s in found.steps],
         "found": [{"verdict": s["verdict"], "effects": list(s["effects"])} for s in found.steps],
         "truth": hidden,
@@ -124,6 +126,8 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
             row["fall"] = fall(model, made.plant, log, held, names_to_add(found.steps))
         if case.ties:
             row.update(_ties(case, model, log, made.truth, found))
+        if case.oracle:
+            row.update(_seen(case, model, log, made, found))
     else:
         row["errors"] = {}
     return {
@@ -158,6 +162,22 @@ def _costly(case: Case, model: Any, name: str, size: str) -> dict[str, float]:
     world = {"name": case.world, "control_rate": 0.0} if case.world else None
     how = {**conditions(case), "rate": max(case.rate, SIZING_RATE), "coefficients": case.coefficients}
     return costly(model, name, 0.01 * float(size[:-1]), plant=case.plant, world=world, **how)
+
+
+def _seen(case: Case, model: Any, log: Any, made: Any, found: Any) -> dict[str, Any]:
+    """Return what the hidden effect costs, and what an oracle sees of it that knows the world's law.
+
+    Rivals are the names of the first step that are not hidden, and the three that lead the table.
+    """
+    from auvnn.studies.benchmark.costs import cost_of
+    from auvnn.studies.benchmark.oracle import Oracle
+
+    hidden = {name: made.truth["hidden"][name] for name in case.effects}
+    first = next((list(s["effects"]) for s in found.steps if s["effects"]), [])
+    rivals = dict.fromkeys([*first, *[c["effect"] for c in found.candidates[:3]]])
+    known = [n for n in rivals if n not in hidden and n in EFFECTS]
+    oracle = Oracle(model, made, case.runs, list(hidden))
+    return {"cost": cost_of(model, log, hidden), "oracle": oracle.distances(known)}
 
 
 def _ties(case: Case, model: Any, log: Any, truth: Mapping[str, Any], found: Any) -> dict[str, Any]:

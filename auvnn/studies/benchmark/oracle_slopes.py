@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,8 @@ Values = Mapping[str, Mapping[str, float]]
 STEP = 1e-4
 # The filter's own step, s: a log with rare rows is filtered in between.
 FINE = 0.05
+# Effects by which the thrust changes while a command is held.
+REMEMBERING = ("thruster_lag", "thrust_overshoot", "actuation_delay")
 
 
 @dataclass(frozen=True)
@@ -46,16 +49,17 @@ class Course:
         dt = float(task.t[1] - task.t[0])
         each = max(1, round(FINE / dt))
         rows = np.arange(0, len(task.t), each)
-        few = {
-            n: None if getattr(motion, n) is None else getattr(motion, n)[:runs]
-            for n in ("eta", "nu", "nu_dot", "position", "quaternion", "velocity", "rate", "command", "fins")
-        }
+        m = motion
+        few = Motion(
+            m.eta[:runs], m.nu[:runs], m.nu_dot[:runs], m.position[:runs], m.quaternion[:runs], m.velocity[:runs],
+            m.rate[:runs], m.command[:runs], None if m.fins is None else m.fins[:runs],
+        )  # fmt: skip
         task = replace(
             task,
             laws=replace(task.laws, wander=None),
             voltage=None if task.voltage is None else task.voltage[:runs],
         )
-        return cls(task, Motion(**few), rows, each * dt)
+        return cls(task, few, rows, each * dt)
 
     @property
     def runs(self) -> int:
@@ -90,6 +94,7 @@ def accelerations(course: Course, effects: Values, kicks: Array | None = None) -
     changes = np.zeros((1, 12)) if kicks is None else kicks
     turns = Rotation.from_rotvec(changes[:, 3:6]).as_matrix()
     many = len(changes)
+    memory = any(name in REMEMBERING for name in effects)
     out = np.empty((many, *speeds.shape))
     done = -1
 
@@ -99,12 +104,13 @@ def accelerations(course: Course, effects: Values, kicks: Array | None = None) -
     for j in range(len(course.rows) - 1):
         moment = float(task.t[course.rows[j]]) + 0.5 * course.step
         row = int(np.searchsorted(task.t, moment + 1e-9, side="right")) - 1
-        while done < row:
+        last = int(course.rows[j + 1]) - 1
+        while done < last:
             done += 1
             actuators.hold(
                 motion.command[:, done], float(task.t[done]), float(task.t[min(done + 1, len(task.t) - 1)])
             )
-        thrust = actuators.between(moment, moment + 2e-9)(moment)
+        thrust = _mean(actuators, moment - 0.5 * course.step, moment + 0.5 * course.step, memory)
         place = (places[None, :, j] + changes[:, None, :3]).reshape(-1, 3)
         rotation = (rotations[None, :, j] @ turns[:, None]).reshape(-1, 3, 3)
         nu = (speeds[None, :, j] + changes[:, None, 6:]).reshape(-1, 6)
@@ -116,6 +122,28 @@ def accelerations(course: Course, effects: Values, kicks: Array | None = None) -
         )
         out[:, :, j] = rate.reshape(many, count, 6)
     return out[0] if kicks is None else out
+
+
+def _mean(actuators: Actuators, begin: float, end: float, memory: bool) -> Array:
+    """Return the mean thrust over a step, which is what moves the vehicle, (R, n).
+
+    Between two commands the thrust is sampled more densely just after the first, where a short lag acts.
+    """
+    moments = [begin, *(b for b in actuators.begins[-32:] if begin + 1e-9 < b < end - 1e-9)]
+    moments = [*sorted({*moments, *actuators.breaks(begin, end)}), end]
+    total = np.zeros(())
+    for a, b in pairwise(moments):
+        signal = actuators.between(a, b)
+        if memory:
+            parts = [w * 2.0 * x * signal(a + (b - a) * x * x) for x, w in zip(*_POINTS, strict=True)]
+            total = total + (b - a) * sum(parts, np.zeros(()))
+        else:
+            total = total + (b - a) * signal(0.5 * (a + b))
+    return total / (end - begin)
+
+
+_GAUSS = np.polynomial.legendre.leggauss(6)
+_POINTS = (0.5 * (_GAUSS[0] + 1.0), 0.5 * _GAUSS[1])
 
 
 def transitions(course: Course, effects: Values, correlation: Array) -> Array:
@@ -150,7 +178,8 @@ def lightness(course: Course, effects: Values) -> Array:
     task = course.task
     actuators = Actuators(task.vehicle, task.actuation, effects, task.laws)
     equations = Equations(task.vehicle, effects, task.strangers, actuators, task.bottom, task.laws)
-    return np.asarray(np.linalg.inv(equations.matrix(0.5 * float(task.t[-1]), np.ones((1, 1))).reshape(6, 6)))
+    matrix = equations.matrix(0.5 * float(task.t[-1]), np.ones((1, 1))).reshape(6, 6)
+    return np.linalg.inv(matrix).astype(np.float64)
 
 
 def reports(course: Course, effects: Values) -> tuple[Array, Array, Array]:

@@ -10,7 +10,7 @@ from scipy.stats import binomtest
 
 from auvnn.catalogue import unknown_name
 from auvnn.errors import ConfigError
-from auvnn.studies.benchmark import counting
+from auvnn.studies.benchmark import counting, worlds
 from auvnn.studies.benchmark.counting import Row, kind_of
 
 Z95 = 1.96
@@ -69,6 +69,7 @@ RATES: dict[str, Callable[[Sequence[Row]], list[bool]]] = {
     ],
     "not_made": lambda rows: [not counting.was_made(r) for r in rows],
     "faults": lambda rows: [r["verdict"] == "fault" for r in rows],
+    **worlds.RATES,
 }
 
 
@@ -82,6 +83,7 @@ def falls(rows: Sequence[Row]) -> list[float]:
 NUMBERS: dict[str, Callable[[Sequence[Row]], list[float]]] = {
     "median_fall": falls,
     "false_discovery_rate": lambda rows: [counting.false_share(r) for r in rows if r["verdict"] != "fault"],
+    **worlds.NUMBERS,
 }
 
 

@@ -27,7 +27,7 @@ from auvnn.log_chunks.samples import (
 from auvnn.logs.leakage import refuse_shared, rows_of
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.logs.reading.portions import log_files
-from auvnn.metrics.one_step import Derivative, chosen_derivative
+from auvnn.metrics.derivative import Derivative, chosen_derivative
 from auvnn.training.train import STOPPING
 
 # Samples of the test that are looked for in the log that is fitted.

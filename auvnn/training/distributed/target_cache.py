@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from auvnn.executors.packing import pack
 from auvnn.log_chunks.samples import Piece, inside, run_of
 from auvnn.logs.reading.mapping import Mapping
-from auvnn.metrics.one_step import Derivative
+from auvnn.metrics.derivative import Derivative
 from auvnn.models import GreyBox
 from auvnn.training.targets import Targets
 

@@ -24,8 +24,9 @@ from auvnn.diagnosis.score_tests.score import score
 from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.sufficient_statistics import ScoreMoments, add_parts, fit_initial_states, reduce_windows
 from auvnn.executors import executor_for
-from auvnn.log_chunks import windows as parts_
-from auvnn.log_chunks.windows import Plan, WindowCut, plan_files
+from auvnn.log_chunks import scan as parts_
+from auvnn.log_chunks.scan import Plan, WindowCut
+from auvnn.log_chunks.windows import plan_files
 from auvnn.logs import Log
 from auvnn.logs.reading.mapping import Mapping
 from auvnn.metrics.windows import cut_windows

@@ -8,7 +8,6 @@ import torch
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.refine_step import refine_step
-from auvnn.diagnosis.search import Search
 from auvnn.estimation.normal_equations import TRUST, motion
 from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.windows import VELOCITY
@@ -51,17 +50,12 @@ def test_noise_hides_what_steps_get_wrong_and_they_stay(model, windows):
 
 
 def test_a_search_goes_on_with_shorter_steps(model, windows, monkeypatch):
-    from auvnn.diagnosis import diagnose
+    from auvnn.diagnosis.diagnose import searched
 
     def halved(model, windows, initial, sigma):
         return windows if windows.max_step < 0.05 else type(windows)(**{**vars(windows), "max_step": 0.025})
 
-    seen = []
-    monkeypatch.setattr("auvnn.diagnosis.search.refine_step", halved)
-    monkeypatch.setattr(Search, "_rest", lambda self, current: seen.append(self) or "adequate")
+    monkeypatch.setattr("auvnn.diagnosis.stages.look.refine_step", halved)
     log = make_log(model, runs=2, duration=8.0, noise=1.0)
-    assert diagnose(model, log, ["net_buoyancy"], whiteness=False).verdict == "adequate"
-    (search,) = seen
-    assert {search.windows.max_step, search.chooser.windows.max_step, search.tests.windows.max_step} == {
-        0.025
-    }
+    found, search = searched(model, log, ["net_buoyancy"], whiteness=False)
+    assert found.verdict == "adequate" and search.state.windows.max_step == 0.025

@@ -25,10 +25,10 @@ def said(hidden, seed=1, rms=RMS):
 def test_an_effect_is_named_and_the_force_beside_it_told():
     found = said({"net_buoyancy": {"force": 8.0}})
     assert found.verdict == "named" and found.missing == ["net_buoyancy"]
-    assert {"X", "Y", "Z"} <= found.left.keys()
+    assert {"X", "Y", "Z"} <= found.stochastic["force"].keys()
     for axis in "XYZ":
-        assert found.left[axis]["rms"] == pytest.approx(4.0, rel=0.3)
-        assert 0.4 < found.left[axis]["correlation_time"] < 2.5
+        assert found.stochastic["force"][axis]["rms"] == pytest.approx(4.0, rel=0.3)
+        assert 0.4 < found.stochastic["force"][axis]["correlation_time"] < 2.5
     assert any("stochastic force" in line for line in found.story)
     parameters = found.candidates[0]["parameters"]["force"]
     assert parameters["value"] == pytest.approx(8.0, abs=4 * parameters["std"])
@@ -37,10 +37,10 @@ def test_an_effect_is_named_and_the_force_beside_it_told():
 @pytest.mark.long
 def test_a_force_alone_has_no_name():
     found = said({}, seed=2)
-    assert found.missing == [] and found.verdict == "unknown" and found.left
+    assert found.missing == [] and found.verdict == "unknown" and found.stochastic["force"]
 
 
 @pytest.mark.long
 def test_without_a_force_the_answer_is_the_plain_search():
     found = said({"net_buoyancy": {"force": 8.0}}, rms=np.zeros(6))
-    assert found.missing == ["net_buoyancy"] and found.left == {}
+    assert found.missing == ["net_buoyancy"] and "force" not in found.stochastic

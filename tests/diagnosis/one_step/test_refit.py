@@ -10,7 +10,8 @@ from auvnn.diagnosis.one_step.rank import Ranked, _plainer_first
 from auvnn.diagnosis.one_step.refit import OneStepRefit
 from auvnn.diagnosis.one_step.slopes import AccelerationSlopes, extent_of_log
 from auvnn.diagnosis.one_step.weighted_fit import FIFTHS, left_out, parts, solve, weights
-from auvnn.metrics.one_step import Derivative, accelerations, choose_derivative
+from auvnn.metrics.derivative import Derivative, choose_derivative
+from auvnn.metrics.one_step import accelerations
 from auvnn.models import from_vehicle
 from tests.small_logs import make_log, small_vehicle
 

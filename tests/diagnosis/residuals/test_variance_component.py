@@ -94,20 +94,26 @@ def test_nothing_is_adequate_while_a_force_is_left(model):
     json.dumps(data, allow_nan=False)
 
 
-def test_a_name_that_explains_a_part_is_the_nearest_and_not_the_cause(model):
+def test_a_name_that_explains_a_part_predicts_and_is_not_the_cause(model):
     """A steady push besides: a constant force explains that, and is not what comes and goes."""
     truth = pushed(model, 12.0).with_effects({"constant_force": {"X": 8.0}})
     log = make_log(truth, runs=2, duration=15.0, noise=1.0)
     found = diagnose(model, log, ["constant_force"], whiteness=False)
-    assert (found.verdict, found.missing, found.nearest) == ("unknown", [], ["constant_force"])
-    assert found.steps == [{"verdict": "unknown", "effects": [], "p_value": found.steps[0]["p_value"]}]
+    assert (found.verdict, found.missing, found.nearest) == ("partial", [], ["constant_force"])
+    assert found.steps == [{"verdict": "partial", "effects": [], "p_value": found.steps[0]["p_value"]}]
     # What the nearest leaves is what nothing in the catalogue explains.
     assert 0.1 < found.unexplained < 1.0
-    assert any("constant_force comes nearest, and leaves too much of it" in line for line in tell(found))
+    assert any(line.startswith("constant_force predicts a part of what is missing") for line in tell(found))
     assert not any(line.startswith("Missing") for line in tell(found))
+    one = found.joint["constant_force"]
+    assert one["parameters"]["X"]["value"] == pytest.approx(8.0, abs=2.0)
+    shares = one["explained_by_dof"]
+    assert max(shares, key=shares.get) == "X" and 0.1 < shares["X"] < 0.9
+    assert one["gain"]["value"] > one["gain"]["std"] > 0.0
+    assert found.left["X"]["rms"] > 10 * found.left["X"]["detectable"]
 
 
-@pytest.mark.parametrize(("p_value", "verdict"), [(0.005, "unknown"), (0.02, "named")])
+@pytest.mark.parametrize(("p_value", "verdict"), [(0.005, "partial"), (0.02, "named")])
 def test_a_name_is_refuted_on_weaker_grounds_than_adequacy(model, monkeypatch, p_value, verdict):
     """As if half of the force were left after the name, with a p-value between the two levels, or above both."""
     log = make_log(model.with_effects({"net_buoyancy": {"force": 6.0}}), runs=2, duration=12.0, noise=1.0)
@@ -117,10 +123,12 @@ def test_a_name_is_refuted_on_weaker_grounds_than_adequacy(model, monkeypatch, p
         energy = 1.0 if explanation.effects else 2.0
         return Unnamed(np.zeros(6), p_values, np.array([energy, 0, 0, 0, 0, 0]), {"X": 1.0})
 
-    monkeypatch.setattr("auvnn.diagnosis.search.variance_component_test", half_left)
+    monkeypatch.setattr("auvnn.diagnosis.stages.what_is_left.variance_component_test", half_left)
     found = diagnose(model, log, ["net_buoyancy"], advice=False, whiteness=False)
-    assert (found.verdict, found.unexplained) == (verdict, pytest.approx(0.5))
-    assert found.nearest == (["net_buoyancy"] if verdict == "unknown" else [])
+    assert found.verdict == verdict
+    # Where what is left cannot be told from noise, no share of it is unexplained.
+    assert (found.unexplained > 0.0) == (verdict == "partial")
+    assert found.nearest == (["net_buoyancy"] if verdict == "partial" else [])
 
 
 def test_a_withdrawn_name_is_not_among_the_nearest(model, monkeypatch):

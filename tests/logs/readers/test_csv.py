@@ -187,7 +187,7 @@ def test_many_broken_rows_are_refused(tmp_path: Path) -> None:
         (b"t,,u\n1,2,3\n", "column 2 has no name"),
         (b"\x1f\x8b\x08\x00abcdefgh", "gzip"),
         (b"PK\x03\x04" + b"abcdefgh" * 3, "spreadsheet"),
-        (b"\x89MCAP0\r\n" + b"\0" * 40, "MCAP"),
+        (b"\x89MCAP0\r\n" + b"\0" * 40, "mcap recording and holds no messages"),
     ],
 )
 def test_what_is_no_table_is_refused(content: bytes, word: str, tmp_path: Path) -> None:

@@ -67,7 +67,8 @@ def test_nothing_is_overwritten_by_accident(tmp_path: Path) -> None:
     assert path.read_bytes() == before
     make_log(2).write(path, overwrite=True)
     assert path.read_bytes() != before
-    assert [p.name for p in tmp_path.iterdir()] == ["log.csv"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["log.csv", "log.csv.sha256"]
+    assert Log.read(path).samples > 0, "the seal is that of the new file"
     with pytest.raises(ConfigError, match=r"\.parquet or \.csv"):
         log.write(tmp_path / "log.mat")
 

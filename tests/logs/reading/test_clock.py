@@ -119,7 +119,9 @@ def test_any_stamps_give_order_or_a_reason(stamps: list[float]) -> None:
 
 def test_a_split_run_gets_a_number_of_its_own(tmp_path: Path) -> None:
     table = frame(make_run(100))
-    twice = pl.concat([table, table]).with_columns(pl.Series("run", [1] * 200))
+    twice = pl.concat([table, table.with_columns(pl.col("u") + 0.01)]).with_columns(
+        pl.Series("run", [1] * 200)
+    )
     other = frame(make_run(100, phase=1)).with_columns(pl.Series("run", [2] * 100))
     path = tmp_path / "log.csv"
     pl.concat([twice, other]).write_csv(path)

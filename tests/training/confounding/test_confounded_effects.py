@@ -11,7 +11,7 @@ import torch
 
 from auvnn.answers import plain
 from auvnn.damping.bank import DampingBank
-from auvnn.metrics.one_step import choose_derivative
+from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
 from auvnn.training import train
 from auvnn.training.confounding.confounded_effects import _power, confounded_effects, traces

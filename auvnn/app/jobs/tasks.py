@@ -1,0 +1,158 @@
+"""What the child process can do: the same Python calls as the commands, each answer in a folder of its own."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from auvnn.answers import Answer, plain, write_text
+from auvnn.app.source import split
+from auvnn.comparison import compare
+from auvnn.comparison.compare import write_predictions
+from auvnn.diagnosis import diagnose
+from auvnn.errors import AuvnnError
+from auvnn.improvement import add
+from auvnn.logs import Log
+from auvnn.metrics.noise_floor import noise_floor
+from auvnn.metrics.rollouts import HORIZONS, NAMES, roll, scale_of
+from auvnn.models import GreyBox, load
+
+Say = Callable[[str], None]
+
+
+class Tasks:
+    """Does orders; remembers the last log and the answers whose reports are still to be drawn."""
+
+    def __init__(self) -> None:
+        torch.set_num_threads(1)
+        self._log: tuple[str, Log, Log | None] | None = None
+        self._pending: list[tuple[Answer, Path]] = []
+
+    def do(self, order: dict[str, Any], say: Say) -> dict[str, Any]:
+        """Do what an order says and return a summary; the answer is in the folder `out` then, or nothing is.
+
+        Args:
+            order: `kind`, `log` (files, mapping, max_duration, test), `model`, `out`, and what the kind takes.
+            say: told in words what is being done.
+
+        Raises:
+            AuvnnError: what the user gave cannot be used.
+        """
+        kinds = {
+            "compare": self._compare,
+            "diagnose": self._diagnose,
+            "add": self._add,
+            "example": self._example,
+        }
+        out = Path(order["out"])
+        beside = out.with_name(f".{out.name}.part")
+        shutil.rmtree(beside, ignore_errors=True)
+        beside.mkdir(parents=True)
+        try:
+            summary, answer = kinds[order["kind"]](order, beside, say)
+            beside.rename(out)
+        except BaseException:
+            shutil.rmtree(beside, ignore_errors=True)
+            raise
+        if answer is not None:
+            self._pending.append((answer, out / "report.html"))
+        return plain(summary)
+
+    def draw_one(self) -> Iterator[str]:
+        """Draw one report that is still to be drawn, if any, and yield its path."""
+        if self._pending:
+            answer, path = self._pending.pop(0)
+            if path.parent.is_dir():
+                answer.report(path)
+                yield str(path)
+
+    def draw_all(self) -> Iterator[str]:
+        """Draw all reports that are still to be drawn: a stopped job must not take them along."""
+        while self._pending:
+            yield from self.draw_one()
+
+    def _logs(self, order: dict[str, Any], say: Say) -> tuple[Log, Log | None]:
+        wanted = order["log"]
+        key = json.dumps(wanted, sort_keys=True)
+        if self._log is None or self._log[0] != key:
+            say("reading the log")
+            log = Log.read(wanted["files"], wanted["mapping"] or None, max_duration=wanted["max_duration"])
+            if wanted["test"]:
+                self._log = (key, log, Log.read(wanted["test"], wanted["mapping"] or None))
+            else:
+                self._log = (key, *split(log)[:2])
+        return self._log[1], self._log[2]
+
+    def _model(self, order: dict[str, Any], log: Log) -> GreyBox:
+        return load(order["model"], actuation=log.kind)
+
+    def _compare(self, order: dict[str, Any], out: Path, say: Say) -> tuple[dict[str, Any], Answer]:
+        log, _ = self._logs(order, say)
+        model = self._model(order, log)
+        say("one step ahead, and free running from 0.5 s to the whole run")
+        comparison = compare(model, log)
+        say("the noise floor by horizon")
+        scale = scale_of(log)
+        floors: dict[str, float | None] = {}
+        for horizon in HORIZONS:
+            rolled = roll(model, log, horizon, scale, engine="firm")
+            floors[horizon] = (
+                None if rolled is None else noise_floor(model, rolled, log, scale, engine="firm")
+            )
+        more = {
+            "regimes": comparison.regimes,
+            "wrench_floor": comparison.noise_floor,
+            "floors": floors,
+            "scale": dict(zip(NAMES, scale.std, strict=True)),
+        }
+        _write(comparison, out, more)
+        write_predictions(comparison.series, out / "predictions.parquet")
+        five = comparison.rollout.get("5", {})
+        return {
+            "total": five.get("total"),
+            "persistence": five.get("persistence"),
+            "floor": floors.get("5"),
+        }, comparison
+
+    def _diagnose(self, order: dict[str, Any], out: Path, say: Say) -> tuple[dict[str, Any], Answer]:
+        log, _ = self._logs(order, say)
+        diagnosis = diagnose(self._model(order, log), log, progress=say, force=bool(order.get("force")))
+        _write(diagnosis, out, {"story": diagnosis.story})
+        return {"verdict": diagnosis.verdict, "missing": diagnosis.missing}, diagnosis
+
+    def _add(self, order: dict[str, Any], out: Path, say: Say) -> tuple[dict[str, Any], Answer]:
+        log, test = self._logs(order, say)
+        model = self._model(order, log)
+        if test is None:
+            raise AuvnnError("the log is too short to hold a part of it out: name a further log to judge by")
+        better = add(model, log, order["effects"], test=test, progress=say, force=bool(order.get("force")))
+        better.model.save(out / "model")
+        more = {"held_out_words": order["log"]["words"], "effects_in_model": better.model.effect_names}
+        _write(better, out, more)
+        parts = ("t", "measured", "before", "refitted", "after")
+        arrays: dict[str, Any] = {
+            f"{s['run']}:{key}": np.asarray(s[key], float) for s in better.series for key in parts
+        }
+        with (out / "series.npz").open("wb") as stream:
+            np.savez(stream, **arrays)
+        return {"accepted": better.accepted, "waterfall": better.waterfall, "gain": better.gain}, better
+
+    def _example(self, order: dict[str, Any], out: Path, say: Say) -> tuple[dict[str, Any], Answer | None]:
+        from auvnn.studies.demo import VEHICLE, made_logs
+
+        say("simulating four runs of 60 s in a current that the model does not know")
+        made, _, _ = made_logs(load(VEHICLE))
+        path = out / "demo.parquet"
+        made.log.write(path)
+        return {"file": str(Path(order["out"]) / path.name), "model": VEHICLE}, None
+
+
+def _write(answer: Answer, out: Path, more: dict[str, Any]) -> None:
+    answer.write(out, report=False)
+    write_text(out / "more.json", json.dumps(plain(more), allow_nan=False))

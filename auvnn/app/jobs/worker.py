@@ -1,0 +1,71 @@
+"""The child process that does what takes long: orders in, reports out, by lines of JSON."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import sys
+import threading
+import warnings
+from typing import Any
+
+from auvnn.errors import AuvnnError, one_line
+
+
+def main() -> None:
+    """Take orders until standard input closes."""
+    # Reports have a channel of their own: what a library prints must not get between them.
+    channel = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    lock = threading.Lock()
+
+    def report(**words: Any) -> None:
+        with lock, contextlib.suppress(OSError):
+            channel.write(json.dumps(words, allow_nan=False) + "\n")
+            channel.flush()
+
+    orders: queue.Queue[dict[str, Any]] = queue.Queue()
+
+    def listen() -> None:
+        for line in sys.stdin:
+            orders.put(json.loads(line))
+        # The server is gone: nobody waits for what is being done.
+        os._exit(0)
+
+    threading.Thread(target=listen, daemon=True).start()
+    warnings.simplefilter("ignore")
+    from auvnn.app.jobs.tasks import Tasks
+
+    tasks = Tasks()
+    while True:
+        try:
+            order = orders.get(timeout=0.2)
+        except queue.Empty:
+            # Reports are drawn while nobody waits for anything.
+            for drawn in tasks.draw_one():
+                report(drawn=drawn)
+            continue
+        number = order["job"]
+        try:
+            for drawn in tasks.draw_all():
+                report(drawn=drawn)
+            summary = tasks.do(
+                order, lambda words, job=number: report(job=job, progress=one_line(words, 200))
+            )
+            report(job=number, done=summary)
+        except AuvnnError as error:
+            report(job=number, error=one_line(error))
+        except Exception as error:
+            import traceback
+
+            traceback.print_exc()
+            words = (
+                f"a fault of the program, not of your input ({type(error).__name__}: {one_line(error, 300)})"
+            )
+            report(job=number, error=words, fault=True)
+
+
+if __name__ == "__main__":
+    main()

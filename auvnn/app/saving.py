@@ -1,0 +1,92 @@
+"""What the user takes home: the model, the report, the logs, and what does the same without the page."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import time
+from pathlib import Path
+
+from auvnn.answers import write_text
+from auvnn.app.script import commands, python
+from auvnn.app.session import Session
+from auvnn.errors import ConfigError, InputError
+
+PATIENCE = 120.0  # s
+ANSWERS = ("comparison", "diagnosis", "improvement")
+
+
+def save(session: Session, folder: Path) -> list[str]:
+    """Write everything into a folder that is new or empty, and return what it holds then.
+
+    `model/` (where effects were kept), `log.parquet` and `test.parquet`, the answers with their reports, `commands.sh`
+    and `loop.py`. It is staged beside its place and moved there: either all of it is there, or nothing.
+
+    Args:
+        session: what was done.
+        folder: where to.
+
+    Raises:
+        ConfigError: the folder holds something, or there is nothing to save.
+        InputError: it cannot be written to.
+    """
+    folder = folder.expanduser().absolute()
+    told = session.told()
+    with session.lock:
+        session.refuse_busy()
+        source, history, answers = session.source, list(session.history), dict(session.answers)
+    assert source is not None and source.fit is not None
+    kept = history[-1].answer
+    # The report of the model that is saved, not of a later try that was not kept.
+    wanted = {k: kept if k == "improvement" and kept is not None else answers.get(k) for k in ANSWERS}
+    places = {kind: place for kind, place in wanted.items() if place is not None}
+    _drawn(session, list(places.values()))
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ConfigError(f"{folder}: is not empty; choose a new folder")
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        stage = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+    except OSError as problem:
+        raise InputError(f"{folder}: cannot be written ({os.strerror(problem.errno or 0)})") from None
+    try:
+        if history[-1].answer is not None:
+            shutil.copytree(history[-1].source, stage / "model")
+        source.fit.write(stage / "log.parquet")
+        if source.held is not None:
+            source.held.write(stage / "test.parquet")
+        for kind, place in places.items():
+            shutil.copy(place / f"{kind}.json", stage / f"{kind}.json")
+            if (place / "report.html").is_file():
+                name = "report.html" if kind == "improvement" else f"{kind}.html"
+                shutil.copy(place / "report.html", stage / name)
+        write_text(stage / "loop.py", python(told))
+        write_text(stage / "commands.sh", commands(told, folder))
+        os.chmod(stage, 0o755)
+        if folder.is_dir():
+            folder.rmdir()
+        stage.rename(folder)
+    except OSError as problem:
+        raise InputError(f"{folder}: cannot be written ({problem.strerror})") from None
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)
+    held = sorted(entry.name + "/" * entry.is_dir() for entry in folder.iterdir())
+    with session.lock:
+        session.saved.append(str(folder))
+        session.version += 1
+    return held
+
+
+def _drawn(session: Session, places: list[Path]) -> None:
+    """Wait until the child process, which has nothing else to do now, has drawn the reports."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end and session.child.alive:
+        if all((place / "report.html").is_file() for place in places):
+            return
+        time.sleep(0.1)
+
+
+def proposed(session: Session) -> Path:
+    """Return a folder that is free to save into."""
+    names = [session.out, *(session.out.with_name(f"{session.out.name}_{n}") for n in range(2, 1000))]
+    return next(p for p in names if not p.exists() or (p.is_dir() and not any(p.iterdir())))

@@ -1,0 +1,121 @@
+"""The stages of a search, each from one state to the next: fit of the null, one look after the other, groups again.
+
+A look is: score tests of all that remains, refit of the leaders, their comparison, acceptance of the one that explains
+best and pays on what is left out, and pruning of what is then no longer needed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from auvnn.diagnosis.answers.table import candidate_table, fill_candidate
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
+from auvnn.diagnosis.hypotheses.refine_step import refine_step
+from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
+from auvnn.diagnosis.selection.choose import ALPHA
+from auvnn.diagnosis.stages.state import Setting, State
+from auvnn.estimation.prediction_error import FitError
+from auvnn.metrics.windows import Windows
+
+# Once something is in the model the question is asked again, and each time chance gets another turn.
+ALPHA_NEXT = 0.01
+# "Something is missing, but nothing that has a name" is a claim of its own: where no effect pays on runs left
+# out, it takes stronger grounds than the test that opened the search.
+ALPHA_UNKNOWN = 0.001
+
+
+def fit_null(asked: Setting, windows: Windows) -> State:
+    """Fit what is uncertain alone."""
+    asked.say("fitting the uncertain coefficients")
+    first = fit_hypothesis(asked.layout, windows, asked.base, ())
+    first, windows = _finer(asked, first, windows)
+    return State(windows, first, first)
+
+
+def look(asked: Setting, state: State) -> State:
+    """Test all effects that remain, refit the leaders, take the one that explains best; see the module's text."""
+    chosen, first = list(state.chosen), state.first
+    remaining = [n for n in asked.usable if n not in {*chosen, *state.withdrawn, *state.in_groups}]
+    asked.say(f"testing {len(remaining)} effects at the null")
+    base = [*asked.base, *[c for c in chosen if c not in asked.base]]
+    tested = asked.tests(state.windows)(state.current, remaining, base, chosen, alike=not state.table)
+    p_value = tested.p_value
+    if not state.table:
+        similar = (remaining, tested.alike)
+        state = state.but(
+            p_value=p_value,
+            similar=similar,
+            table=candidate_table(asked.layout, tested.scores, state.current, similar, dict(asked.needs)),
+            silent=tuple(n for n in remaining if not tested.scores[n].degrees),
+        )
+    if p_value >= (ALPHA_NEXT if chosen else ALPHA) or not remaining or len(chosen) >= asked.most:
+        return state.step(rest(asked, state.current), [], p_value).but(ended=True)
+    chooser = asked.chooser(state.windows)
+    choice = chooser.choose(tested.scores, tested.at, base, chosen, state.current)
+    state = state.but(failed={**state.failed, **choice.failed})
+    if not chosen:
+        for explanation in choice.tried:
+            state = state.but(table=fill_candidate(asked.layout, state.table, explanation, first))
+    if choice.best is None:
+        verdict = "unknown" if p_value < ALPHA_UNKNOWN else rest(asked, state.current)
+        return state.step(verdict, [], p_value).but(ended=True)
+    new = [e for e in choice.best.effects if e not in chosen]
+    if choice.verdict == "ambiguous":
+        new = [e.effects[-1] for e in choice.rivals]
+        state = state.but(groups=(*state.groups, tuple(choice.rivals)))
+    state = state.step(choice.verdict, new, p_value)
+    current, gone = choice.best, []
+    if chosen:
+        current, gone = chooser.withdrawn(choice.best, asked.base)
+    if gone:
+        state, gone = state.without_groups(gone)
+        state = state.step("withdrawn", gone, p_value).but(withdrawn=(*state.withdrawn, *gone))
+    chosen = current.effects
+    current, windows = _finer(asked, current, state.windows)
+    return state.but(current=current, windows=windows, chosen=tuple(chosen))
+
+
+def regroup(asked: Setting, state: State) -> State:
+    """Look at each group again beside what was found after it, and take what is to be taken then.
+
+    The errors of what had not been found yet may have hidden the difference.
+    """
+    chooser, last = asked.chooser(state.windows), state.current
+    groups, steps = list(state.groups), [dict(s) for s in state.steps]
+    for k, group in enumerate(state.groups):
+        names = [e.effects[-1] for e in group]
+        if {*last.effects} == {*group[0].effects}:
+            continue
+        asked.say(f"asking again which of {', '.join(names)} it is")
+        left = chooser.regrouped(last, asked.base, group)
+        last, groups[k] = left[0], tuple(left)
+        if last.effects[-1] != names[0]:
+            # What stopped the search was said of another member.
+            steps[-1]["verdict"] = rest(asked, last)
+        step = next(s for s in steps if s["effects"] == names)
+        step["effects"] = [e.effects[-1] for e in left]
+        if len(left) == 1:
+            step["verdict"] = "named"
+    open_ = tuple(group for group in groups if len(group) > 1)
+    return state.but(current=last, groups=open_, steps=tuple(steps))
+
+
+def rest(asked: Setting, current: FittedHypothesis) -> str:
+    """Return the verdict where no effect is asked for any more."""
+    return "unknown" if is_autocorrelated(current, asked.floor) else "adequate"
+
+
+def _finer(asked: Setting, found: FittedHypothesis, windows: Windows) -> tuple[FittedHypothesis, Windows]:
+    """Return a fit with steps so short that what the integrator gets wrong has no say in what follows."""
+    shorter = refine_step(found.fitted.model, windows, found.fitted.initial, found.fitted.sigma)
+    if shorter is windows:
+        return found, windows
+    asked.say("fitting again with shorter steps")
+    guess = replace(asked.layout, model=found.fitted.model)
+    try:
+        again = fit_hypothesis(
+            asked.layout, shorter, asked.base, found.effects, start=found.fitted, guess=guess
+        )
+    except FitError:
+        return found, windows
+    return again, shorter

@@ -1,0 +1,185 @@
+"""What a search is asked, and where it stands: both complete from the start, and never changed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.diagnosis.answers.tolerance import Tolerance
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.layout import Layout
+from auvnn.diagnosis.residuals.additive_force import AdditiveForce
+from auvnn.diagnosis.residuals.variance_component import Unnamed
+from auvnn.diagnosis.score_tests.null_tests import NullTests
+from auvnn.diagnosis.selection.choose import Chooser
+from auvnn.logs import Log
+from auvnn.metrics.windows import Windows
+from auvnn.models import GreyBox
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is asked of a log.
+
+    Attributes:
+        model: as the user gave it.
+        log: measurements.
+        layout: the model with everything that is uncertain or asked for, and what was stated of it.
+        usable: effects that can be asked for.
+        needs: effects that were wanted, and the channels that the log lacks for them.
+        base: effects that are free whatever is found.
+        floor: (18,) no channel is trusted beyond.
+        most: look for at most this many effects.
+        tolerance: what does not matter.
+        costs: whether to work out what each name costs.
+        advice: whether to work out what to drive next, for an ambiguous answer.
+        whiteness: whether to test what is left for correlations.
+        absorbed: what the learned damping may have taken in that is no damping; None without any.
+        notes: what to say of the model and the log besides.
+        say: told in words what is being done.
+    """
+
+    model: GreyBox
+    log: Log
+    layout: Layout
+    usable: tuple[str, ...]
+    needs: Mapping[str, list[str]]
+    base: tuple[str, ...]
+    floor: Array
+    most: int
+    tolerance: Tolerance
+    costs: bool
+    advice: bool
+    whiteness: bool
+    absorbed: Any
+    notes: tuple[str, ...]
+    say: Callable[[str], None]
+
+    def chooser(self, windows: Windows) -> Chooser:
+        """Return who weighs explanations of these windows."""
+        return Chooser(self.layout, windows, self.say)
+
+    def tests(self, windows: Windows) -> NullTests:
+        """Return who tests effects at their nulls on these windows."""
+        return NullTests(self.layout, windows, self.say)
+
+
+@dataclass(frozen=True)
+class State:
+    """Where a search stands; every stage returns a new one.
+
+    Attributes:
+        windows: of the log, with steps as short as they have turned out to be needed.
+        first: the fit of what is uncertain alone.
+        current: the fit with what has been found.
+        chosen: effects found.
+        groups: explanations between which the log cannot decide, each by its last effect; the first of each group
+            stands for it in the fit.
+        withdrawn: effects that had stood in for something else; they are not asked for again.
+        steps: what was found one after the other, as the answer has it.
+        table: the candidates, by effect.
+        failed: effects whose fit failed, and why.
+        p_value: that nothing is missing at all.
+        similar: effects, and how much they look like one another at the first look.
+        silent: effects of which the log says nothing.
+        ended: whether there is nothing more to ask for.
+        left: the force that is left once the search has ended; None where there is none.
+        traced: the force of a measured input that it looks most like, where that was asked.
+        remainder: what any force could still explain, significant or not.
+        negligible: whether a force is left that does not matter.
+        nearest: names that explain a part of it and are not the cause.
+        partial: whether these stay in the fit because they predict.
+        unexplained: share of what looked like a force that nothing explains.
+        notes: what could not be worked out, in words.
+    """
+
+    windows: Windows
+    first: FittedHypothesis
+    current: FittedHypothesis
+    chosen: tuple[str, ...] = ()
+    groups: tuple[tuple[FittedHypothesis, ...], ...] = ()
+    withdrawn: tuple[str, ...] = ()
+    steps: tuple[dict[str, Any], ...] = ()
+    table: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    failed: Mapping[str, str] = field(default_factory=dict)
+    p_value: float = 1.0
+    similar: tuple[list[str], Array] = field(default_factory=lambda: ([], np.eye(0)))
+    silent: tuple[str, ...] = ()
+    ended: bool = False
+    left: Unnamed | None = None
+    traced: AdditiveForce | None = None
+    remainder: Unnamed | None = None
+    negligible: bool = False
+    nearest: tuple[str, ...] = ()
+    partial: bool = False
+    unexplained: float = 1.0
+    notes: tuple[str, ...] = ()
+
+    def but(self, **changes: Any) -> State:
+        """Return the state with some things changed."""
+        return replace(self, **changes)
+
+    def step(self, verdict: str, effects: list[str], p_value: float) -> State:
+        """Return the state with a further step."""
+        return self.but(steps=(*self.steps, {"verdict": verdict, "effects": effects, "p_value": p_value}))
+
+    @property
+    def in_groups(self) -> list[str]:
+        """The members of all groups between which the log cannot decide."""
+        return [e.effects[-1] for group in self.groups for e in group]
+
+    def without_groups(self, names: list[str]) -> tuple[State, list[str]]:
+        """Return the state without the groups for which some names stand, and these names with all members."""
+        gone = [group for group in self.groups if group[0].effects[-1] in names]
+        members = [e.effects[-1] for group in gone for e in group[1:]]
+        kept = tuple(group for group in self.groups if not any(group is g for g in gone))
+        return self.but(groups=kept), [*names, *members]
+
+
+@dataclass(frozen=True)
+class Searched:
+    """A search that has come to its end: what was asked, and where it stood."""
+
+    setting: Setting
+    state: State
+
+    @property
+    def layout(self) -> Layout:
+        """What was stated."""
+        return self.setting.layout
+
+    @property
+    def usable(self) -> tuple[str, ...]:
+        """Effects that could be asked for."""
+        return self.setting.usable
+
+    @property
+    def base(self) -> tuple[str, ...]:
+        """Effects that were free whatever was found."""
+        return self.setting.base
+
+    @property
+    def floor(self) -> Array:
+        """(18,) no channel is trusted beyond."""
+        return self.setting.floor
+
+    @property
+    def extent(self) -> Any:
+        """How far the log reaches."""
+        return self.setting.tests(self.state.windows).extent
+
+    @property
+    def first(self) -> FittedHypothesis:
+        """The fit of what is uncertain alone."""
+        return self.state.first
+
+    @property
+    def silent(self) -> tuple[str, ...]:
+        """Effects of which the log says nothing."""
+        return self.state.silent

@@ -1,0 +1,161 @@
+"""What the hooks of effects are given and return: parameters, the body, the moment, sensors, actuators."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One physical parameter of an effect.
+
+    Attributes:
+        name: as in the public contract.
+        unit: SI; "1" for a pure number.
+        null: the value at which the effect vanishes exactly (all parameters at their null).
+        scale: a plausible size of the departure from the null: the prior's standard deviation.
+        low: smallest admissible value.
+        high: largest admissible value.
+        probes: values at which to linearise instead, where the slope at the null says nothing.
+        shape: whether it says how the effect acts and not how much (an onset, a frequency, a place): with all
+            others at their nulls the effect vanishes whatever its value, so that nothing tells it there.
+    """
+
+    name: str
+    unit: str
+    null: float
+    scale: float
+    low: float
+    high: float
+    probes: tuple[float, ...] = ()
+    shape: bool = False
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How far a log reaches: what the starting values of shapes depend on.
+
+    Attributes:
+        begin: earliest time, s.
+        duration: from there to the latest time, s.
+        longest: duration of the longest run, s.
+        distance: median and largest distance from the origin of the positions, m; zeros without positions.
+    """
+
+    begin: float
+    duration: float
+    longest: float
+    distance: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Body:
+    """What the body is at one moment; tensors in SI, leading shapes broadcast against the state's.
+
+    Attributes:
+        mass: kg.
+        weight: N.
+        buoyancy: N.
+        cg: centre of gravity from the body origin, m, (..., 3).
+        cb: centre of buoyancy, m, (..., 3).
+        inertia: about the centre of gravity, kg m2, (..., 3, 3).
+        added_mass: (..., 6, 6), positive for ordinary bodies.
+        linear: linear damping, (..., 6, 6), or None.
+        quadratic: quadratic damping, (..., 6, 6), or None.
+        element_linear: linear coefficients of displaced elements, (..., e, 6), or None.
+        element_quadratic: quadratic coefficients of displaced elements, (..., e, 6), or None.
+        weight_centre: where the weight acts, m, (..., 3), where that is not the centre of gravity: mass that weighs
+            nothing in water moves the one and not the other. None is the centre of gravity.
+    """
+
+    mass: Tensor
+    weight: Tensor
+    buoyancy: Tensor
+    cg: Tensor
+    cb: Tensor
+    inertia: Tensor
+    added_mass: Tensor
+    linear: Tensor | None
+    quadratic: Tensor | None
+    element_linear: Tensor | None
+    element_quadratic: Tensor | None
+    weight_centre: Tensor | None = None
+
+    @property
+    def hangs(self) -> Tensor:
+        """Where the weight acts, m, (..., 3)."""
+        return self.cg if self.weight_centre is None else self.weight_centre
+
+    def hung(self, weight: Tensor, at: Tensor) -> Body:
+        """Return the same body with a further weight, N, that acts at a point, m, (..., 3)."""
+        total = self.weight + weight
+        centre = self.hangs + (weight / total).unsqueeze(-1) * (at - self.hangs)
+        return replace(self, weight=total, weight_centre=centre)
+
+    def but(self, **changes: Tensor) -> Body:
+        """Return the same body with some of its properties changed."""
+        return replace(self, **changes)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a hook may know of the moment: state and inputs, (..., size) in SI, NED and FRD.
+
+    Attributes:
+        time: s since the start of the run, (...).
+        position: NED, m, (..., 3).
+        rotation: body to NED, (..., 3, 3).
+        nu: velocity of the body origin over ground, (..., 6).
+        nu_r: velocity through the water, (..., 6); equal to `nu` inside `water`.
+        nu_c_dot: acceleration of the water in body axes, (..., 6); zero inside `water`.
+        command: what was commanded over this interval, (..., n).
+        fins: fin angles, rad, (..., m), or None.
+        voltage: V, (...), or None.
+        altitude: m, (...), or None.
+        thrust: what the actuators give, N (or the wrench, where it is commanded), (..., n); in `wrench` only.
+        drag: everything that resists motion through the water, damping subnetworks included, as a wrench on
+            the body, N and N m, (..., 6); in `wrench` only.
+    """
+
+    time: Tensor
+    position: Tensor
+    rotation: Tensor
+    nu: Tensor
+    nu_r: Tensor
+    nu_c_dot: Tensor
+    command: Tensor
+    fins: Tensor | None = None
+    voltage: Tensor | None = None
+    altitude: Tensor | None = None
+    thrust: Tensor | None = None
+    drag: Tensor | None = None
+
+
+@dataclass(frozen=True)
+class Sensed:
+    """What sensors report, (..., size): position NED m, quaternion, velocity, its derivative or None."""
+
+    position: Tensor
+    quaternion: Tensor
+    nu: Tensor
+    nu_dot: Tensor | None = None
+
+
+@dataclass(frozen=True)
+class Response:
+    """An actuator's answer to a constant demand over one step, N, (..., n) each.
+
+    Attributes:
+        end: thrust at the end of the step.
+        mean: its average over the step.
+        slope: rise over the step of the straight line with the same mean and first moment, so that an
+            integrator that sees only this line gets impulse and timing right, however short the lag.
+        start: thrust just after the step began.
+    """
+
+    end: Tensor
+    mean: Tensor
+    slope: Tensor
+    start: Tensor

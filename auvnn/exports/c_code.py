@@ -1,0 +1,173 @@
+"""Graphs of scalar operations as C99: straight-line functions without memory of their own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from auvnn.compiled.scalars import FUNCTIONS
+from auvnn.exports.graph import Graph
+
+INFIX = {
+    "add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "ne": "!=",
+    "and": "&&", "or": "||",
+}  # fmt: skip
+WIDTH = 118
+INLINE = ("sqrt", "floor", "ceil")
+"""Functions that are an instruction on most processors."""
+MANY = 4
+"""Calls of one function that are made together: between two of them compilers can keep nothing in registers."""
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How numbers and functions are written.
+
+    Attributes:
+        prefix: of the helpers `largest` and `smallest`.
+        single: single precision.
+    """
+
+    prefix: str
+    single: bool
+
+    @property
+    def type(self) -> str:
+        """The type of a number."""
+        return "float" if self.single else "double"
+
+    def function(self, name: str) -> str:
+        """Return the name of a function of math.h."""
+        return {"abs": "fabs"}.get(name, name) + ("f" if self.single else "")
+
+    def number(self, value: float) -> str:
+        """Return a number, exactly or to the nearest that single precision has."""
+        if math.isnan(value):
+            return "NAN"
+        if math.isinf(value):
+            return "INFINITY" if value > 0 else "(-INFINITY)"
+        if self.single:
+            text = str(np.float32(value))
+            text = f"{text if any(c in text for c in '.en') else text + '.0'}f"
+        else:
+            text = repr(float(value))
+        return f"({text})" if text.startswith("-") else text
+
+    def statements(self, graph: Graph, targets: Mapping[str, Sequence[int]]) -> list[str]:
+        """Return the statements that compute a graph's nodes and leave them in arrays.
+
+        Args:
+            graph: the graph; its arguments are arrays of their names, those of size 0 dimensions plain numbers.
+            targets: array to the nodes that go into it.
+        """
+        s = graph.scalars
+        wanted = [n for nodes in targets.values() for n in nodes]
+        lines, done = [], set()
+        order, groups = grouped(graph, wanted)
+        for node in order:
+            name, operands = s.operation[node], s.operands[node]
+            if name in ("constant", "truth", "input") or node in done:
+                continue
+            if node in groups:
+                members = groups[node]
+                lines.append(f"{self.type} i{node}[{len(members)}], o{node}[{len(members)}];")
+                lines += [
+                    f"i{node}[{k}] = {self._name(graph, s.operands[m][0])};" for k, m in enumerate(members)
+                ]
+                lines.append(f"{self.prefix}_many_{name}(i{node}, o{node}, {len(members)});")
+                lines += [f"const {self.type} t{m} = o{node}[{k}];" for k, m in enumerate(members)]
+                done.update(members)
+                continue
+            given = [self._name(graph, n) for n in operands]
+            if name in INFIX:
+                text = f"{given[0]} {INFIX[name]} {given[1]}"
+            elif name == "neg":
+                text = f"-{given[0]}"
+            elif name == "not":
+                text = f"!{given[0]}"
+            elif name == "where":
+                text = f"{given[0]} ? {given[1]} : {given[2]}"
+            elif name in ("max", "min"):
+                text = f"{self.prefix}_{'largest' if name == 'max' else 'smallest'}({given[0]}, {given[1]})"
+            elif name in (*FUNCTIONS, "abs", "pow", "atan2"):
+                text = f"{self.function(name)}({', '.join(given)})"
+            else:
+                raise ValueError(f"no C for {name}")
+            kind = "int" if s.is_logical(node) else self.type
+            lines.append(f"const {kind} t{node} = {text};")
+        for array, nodes in targets.items():
+            lines += [f"{array}[{k}] = {self._name(graph, n)};" for k, n in enumerate(nodes)]
+        return lines
+
+    def _name(self, graph: Graph, node: int) -> str:
+        s = graph.scalars
+        value = s.value(node)
+        if isinstance(value, bool):
+            return "1" if value else "0"
+        if value is not None:
+            return self.number(value)
+        if s.operation[node] == "input":
+            name, index = s.operands[node]
+            return name if name in ("t", "h") else f"{name}[{index}]"
+        return f"t{node}"
+
+    def helpers(self, functions: set[str]) -> str:
+        """Return what the statements call; `functions` are those that are called on many numbers at once."""
+        t = self.type
+        many = [
+            f"static void {self.prefix}_many_{name}(const {t} *in, {t} *out, int count)\n"
+            f"{{\n    for (int i = 0; i < count; i++) out[i] = {self.function(name)}(in[i]);\n}}\n"
+            for name in sorted(functions)
+        ]
+        return "".join(many) + (
+            f"static inline {t} {self.prefix}_largest({t} a, {t} b) {{ return a > b || a != a ? a : b; }}\n"
+            f"static inline {t} {self.prefix}_smallest({t} a, {t} b) {{ return a < b || a != a ? a : b; }}\n"
+        )
+
+    def function_of(
+        self, head: str, graph: Graph, targets: Mapping[str, Sequence[int]], also: Sequence[str] = ()
+    ) -> str:
+        """Return a whole function; arguments (and those in `also`) that may be without use are named all the same."""
+        unused = [f"(void){name};" for name in (*graph.arguments, *also)]
+        return block(head, [*unused, *self.statements(graph, targets)])
+
+    def array(self, name: str, values: Iterable[float], qualifier: str = "static const") -> str:
+        """Return an array of numbers."""
+        texts = [self.number(float(v)) for v in values]
+        lines, line = [], "   "
+        for text in texts:
+            if len(line) + len(text) + 2 > WIDTH:
+                lines.append(line)
+                line = "   "
+            line += f" {text},"
+        return (
+            f"{qualifier} {self.type} {name}[{max(len(texts), 1)}] = {{\n"
+            + "\n".join([*lines, line])
+            + "\n};\n"
+        )
+
+
+def block(head: str, lines: Iterable[str]) -> str:
+    """Return a function from its head and its statements."""
+    return "\n".join([head, "{", *("    " + line for line in lines), "}", ""])
+
+
+def grouped(graph: Graph, wanted: Iterable[int]) -> tuple[list[int], dict[int, list[int]]]:
+    """Return the needed nodes in an order of computation, and by its first member each group of equal functions.
+
+    Functions that depend on equally many functions before them do not depend on one another.
+    """
+    s, depth = graph.scalars, {}
+    nodes = s.needed(wanted)
+    called = {n for n in nodes if s.operation[n] in FUNCTIONS and s.operation[n] not in INLINE}
+    for node in nodes:
+        depth[node] = max((depth[n] + (n in called) for n in s.inputs_of(node)), default=0)
+    order = sorted(nodes, key=lambda n: (depth[n], n in called, s.operation[n] if n in called else "", n))
+    found: dict[tuple[int, str], list[int]] = {}
+    for node in order:
+        if node in called:
+            found.setdefault((depth[node], s.operation[node]), []).append(node)
+    return order, {members[0]: members for members in found.values() if len(members) >= MANY}

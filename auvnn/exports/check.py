@@ -1,0 +1,50 @@
+"""Compare what leaves with the model, at random states, before anybody relies on it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+
+from auvnn.exports.graph import evaluate
+from auvnn.exports.system import System
+from auvnn.models.linearise import linearise
+
+COUNT = 200
+
+
+def relative(mine: Any, theirs: Any) -> float:
+    """Return the largest difference between two arrays (N, k), relative to the largest element of its column."""
+    mine, theirs = (np.asarray(x, dtype=float) for x in (mine, theirs))
+    if not mine.size:
+        return 0.0
+    size = np.abs(theirs).max(axis=0)
+    # A column of nothing but rounding has no size of its own.
+    return float((np.abs(mine - theirs).max(axis=0) / np.maximum(size, max(1e-9 * size.max(), 1e-300))).max())
+
+
+def agreement(system: System) -> dict[str, float]:
+    """Return how far the graphs of a system are from its model: derivative, step of the actuators, and Jacobian."""
+    a = {n: v for n, v in system.samples(COUNT, seed=7).items()}
+    with torch.no_grad():
+        rate = system.flow.rate(a["x"], a["u"], a["t"])
+        held = [system._advanced(x[13:], u, h) for x, u, h in zip(a["s"], a["u"], a["h"], strict=True)]
+        found = {
+            "rate": relative(evaluate(system.rate, a), rate),
+            "actuators": relative(
+                evaluate(system.actuator_step, {**a, "a": a["s"][:, 13:]}), torch.stack(held)
+            ),
+        }
+    n = system.flow.actuators.size
+    inputs = system.flow.split(a["u"])
+    given: dict[str, Any] = {"fins": inputs.fins, "voltage": inputs.voltage, "altitude": inputs.altitude}
+    slopes = linearise(system.model, a["x"], a["u"][:, :n], time=a["t"], **given)
+    mine = evaluate(system.jacobian, a)
+    split = system.flow.size**2
+    theirs = torch.cat([slopes.A.flatten(1), slopes.B.flatten(1)], dim=-1)
+    # Commands may lie on a kink, where both slopes are right: of the inputs the middle of the errors counts.
+    found["jacobian"] = relative(mine[:, :split], theirs[:, :split])
+    errors = np.abs(mine[:, split:] - theirs[:, split:].numpy()).max(axis=-1)
+    found["input_jacobian"] = float(np.median(errors) / max(float(theirs[:, split:].abs().max()), 1e-300))
+    return found

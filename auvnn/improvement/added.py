@@ -1,0 +1,78 @@
+"""The answer of `add`: `improvement.json` of the public contract."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from auvnn.answers import Answer, plain
+from auvnn.models import GreyBox
+
+
+@dataclass(kw_only=True)
+class Improvement(Answer):
+    """What adding effects did; `to_dict` is `improvement.json` of the public contract.
+
+    Attributes:
+        model: name of the model before.
+        accepted: whether the held-out error fell by more than its own uncertainty, and each effect beside the others
+            brings a fall of its own that is beyond its own uncertainty.
+        by_effect: effect to the fall of the held-out error that it brings beside the others, everything else refitted,
+            whether that is beyond its uncertainty, and what else to mind of it.
+        baseline: what a plain regression and holding the initial velocity reach on the held-out data.
+        better: the model with the effects.
+        refitted_model: the model as given, its uncertain coefficients refitted.
+        left_out: where one-step errors were fitted, their weighted size on runs of `log` left out in turn: before
+            and after, the fall and its standard error; None otherwise. It never saw the test log.
+        steps: the models of the waterfall one by one: their held-out figures, and what `left_out` is from each to
+            the next, by "run" and by "fifth" of every run.
+    """
+
+    kind = "improvement"
+    name: str
+    log: str
+    test: str
+    effects: list[str]
+    accepted: bool
+    before: dict[str, Any]
+    refitted: dict[str, Any]
+    after: dict[str, Any]
+    gain: dict[str, float]
+    waterfall: list[dict[str, Any]]
+    parameters: dict[str, dict[str, dict[str, Any]]]
+    coefficients: dict[str, dict[str, dict[str, Any]]]
+    held_out: str
+    model: GreyBox
+    refitted_model: GreyBox
+    warnings: list[str] = field(default_factory=list)
+    series: list[dict[str, Any]] = field(default_factory=list)
+    objective: str = "rollout"
+    left_out: dict[str, float] | None = None
+    steps: list[dict[str, Any]] = field(default_factory=list)
+    by_effect: dict[str, dict[str, Any]] = field(default_factory=dict)
+    baseline: dict[str, Any] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON answer."""
+        names = (
+            "log",
+            "test",
+            "effects",
+            "accepted",
+            "before",
+            "refitted",
+            "after",
+            "gain",
+            "waterfall",
+            "parameters",
+            "coefficients",
+            "held_out",
+            "objective",
+            "left_out",
+            "by_effect",
+            "baseline",
+            "warnings",
+        )
+        return plain(
+            {"schema": "auvnn/improvement/1", "model": self.name, **{n: getattr(self, n) for n in names}}
+        )

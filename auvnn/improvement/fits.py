@@ -1,0 +1,128 @@
+"""The fits behind `add`: the model as given, refitted, with one effect after the other, and without each of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from auvnn.diagnosis.fitters import fitter_for
+from auvnn.diagnosis.hypotheses.bake import with_fitted_parameters
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, determined
+from auvnn.diagnosis.hypotheses.layout import Layout, lay_out
+from auvnn.errors import InputError
+from auvnn.estimation.prediction_error import FitError
+from auvnn.logs import Log
+from auvnn.models import GreyBox
+
+GIVEN, REFITTED = "as given", "coefficients refitted"
+
+
+@dataclass(frozen=True)
+class Fits:
+    """What was fitted.
+
+    Attributes:
+        layout: what was stated.
+        steps: the models of the waterfall, by name of the step.
+        fits: those behind all steps but the first.
+        without: effect to the model with all others; only where there are several.
+    """
+
+    layout: Layout
+    steps: list[tuple[str, GreyBox]]
+    fits: list[FittedHypothesis]
+    without: dict[str, GreyBox]
+
+    @property
+    def final(self) -> GreyBox:
+        """The model with all effects."""
+        return self.steps[-1][1]
+
+    @property
+    def best(self) -> FittedHypothesis:
+        """The fit with all effects."""
+        return self.fits[-1]
+
+
+def fit_steps(
+    model: GreyBox,
+    log: Log,
+    names: Sequence[str],
+    *,
+    objective: str,
+    window: float | None,
+    derivative: dict[str, Any] | None,
+    say: Callable[[str], None],
+) -> Fits:
+    """Fit the uncertain coefficients alone, then with one effect after the other, then without each of them.
+
+    Args:
+        model: as known.
+        log: what to fit on.
+        names: effects to add.
+        objective: "rollout" or "one_step".
+        window: length of the windows that are fitted, s.
+        derivative: how accelerations are obtained.
+        say: told in words what is being done.
+
+    Raises:
+        ConfigError: the objective cannot fit one of the effects.
+        InputError: the log says nothing about an effect, or a fit has nowhere to begin.
+    """
+    layout = lay_out(model, list(names))
+    fitter = fitter_for(model, log, objective, window=window, derivative=derivative)
+    base = [n for n in layout.names if n not in names or n in layout.nuisance]
+    say("refitting the uncertain coefficients alone")
+    # A coefficient group that is itself to be added stays as stated in the model that is compared with.
+    nothing = fitter.fit(layout, [n for n in base if n not in names], (), None)
+    steps = [(GIVEN, model), (REFITTED, with_fitted_parameters(model, layout, nothing))]
+    fits = [nothing]
+    for count, name in enumerate(names, 1):
+        say(f"fitting with {', '.join(names[:count])}")
+        try:
+            found = fitter.fit(layout, base, names[:count], fits[-1])
+        except FitError as problem:
+            raise InputError(f"{name} cannot be added: {problem}") from None
+        fits.append(found)
+        steps.append((name, with_fitted_parameters(model, layout, found)))
+    without: dict[str, GreyBox] = {}
+    for name in names if len(names) > 1 else ():
+        others = [n for n in names if n != name]
+        if name == names[-1]:
+            # The last step but one is just that.
+            without[name] = steps[-2][1]
+            continue
+        say(f"fitting without {name}")
+        less = fitter.fit(layout, [n for n in base if n != name], others, fits[-1])
+        without[name] = with_fitted_parameters(model, layout, less)
+    return Fits(layout, steps, fits, without)
+
+
+def unseen(layout: Layout, found: FittedHypothesis, names: Sequence[str], log: Log) -> list[str]:
+    """Return a warning where the log says nothing about some parameters; refuse where it is all of an effect's.
+
+    Raises:
+        InputError: the log says nothing about an effect.
+    """
+    out, places = [], layout.places(found.names)
+    for name in names:
+        known = determined(found, places[name])
+        if known.all():
+            continue
+        dark = [
+            f"{name}.{p.name}"
+            for p, k in zip(layout.model.effect(name).parameters_of, known, strict=True)
+            if not k
+        ]
+        more = f" and {len(dark) - 8} more" if len(dark) > 8 else ""
+        labels = ", ".join(dark[:8]) + more
+        if not known.any():
+            raise InputError(
+                f"{log.name} says nothing about {labels}: nothing in it depends on {'it' if len(dark) == 1 else 'them'}; "
+                f"fit on a log with another motion, or leave {name} out"
+            )
+        out.append(
+            f"{log.name} says nothing about {labels}: they stay near where they were, without standard error"
+        )
+    return out

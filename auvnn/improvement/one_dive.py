@@ -1,0 +1,126 @@
+"""One dive of a fleet: the question, and the fit of one dive by itself."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from auvnn.diagnosis.answers.table import values
+from auvnn.diagnosis.hypotheses.candidates import (
+    HORIZON,
+    WARMUP,
+    candidates_for,
+    windows_for,
+)
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
+from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
+from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
+from auvnn.diagnosis.score_tests.probes import null_is_no_start
+from auvnn.diagnosis.score_tests.shape_search import search_shapes
+from auvnn.errors import AuvnnError, InputError, one_line
+from auvnn.estimation.normal_equations import TRUST, motion
+from auvnn.log_chunks.scan import WindowCut
+from auvnn.log_chunks.windows import plan_file, runs_of
+from auvnn.logs import Log
+from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.portions import is_large, start_of
+from auvnn.models import GreyBox
+
+_DAY = 86400.0
+
+
+_DATE = re.compile(
+    r"(?<!\d)(20\d\d)[-_]?([01]\d)[-_]?([0-3]\d)(?:[T_-]?([0-2]\d)[-_:]?([0-5]\d)(?:[-_:]?([0-5]\d))?)?"
+)
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of every dive.
+
+    Attributes:
+        model: as known.
+        effects: to be fitted, beside the uncertain coefficients.
+        mapping: of the columns.
+        window: length of the windows, s; None: 5, or less where the dive is short.
+        windows: at most so many of a dive, evenly spread.
+        force: go on with a log that contradicts itself.
+    """
+
+    model: GreyBox
+    effects: tuple[str, ...]
+    mapping: Mapping
+    window: float | None
+    windows: int
+    force: bool
+
+
+def dive(question: Question, path: Path) -> dict[str, Any] | str:
+    """Return one dive's values, or why there are none: whatever befalls a dive is its own affair."""
+    try:
+        return _fitted(question, path)
+    except AuvnnError as problem:
+        return one_line(problem)
+    except Exception as fault:
+        return f"{path}: a fault of the program ({type(fault).__name__}: {one_line(fault, 200)})"
+
+
+def _fitted(question: Question, path: Path) -> dict[str, Any]:
+    model, names = question.model, question.effects
+    log = _log(question, path)
+    log.quality().refuse_contradictions(question.force)
+    _, needs = candidates_for(model, log, names)
+    for name in names:
+        if needs[name]:
+            raise InputError(f"{path}: {name} needs {', '.join(needs[name])}, which are not there")
+    windows = windows_for(model, log, question.window)
+    if len(windows) < 4:
+        raise InputError(f"{path}: only {len(windows)} windows of free running: the dive is too short")
+    known, spread = with_drag_only(model, log)
+    layout = lay_out(known, names, spread)
+    base = [n for n in layout.names if n not in names or n in layout.nuisance]
+    found = fit_hypothesis(layout, windows, [n for n in base if n not in names], ())
+    for k in range(1, len(names) + 1):
+        looked = null_is_no_start(layout, names[k - 1])
+        guess = search_shapes(layout, windows, found, base).start(names[k - 1]) if looked else None
+        found = fit_hypothesis(layout, windows, base, names[:k], start=found.fitted, guess=guess)
+    start, source = start_of(path, question.mapping), "t"
+    if start is None:
+        start, source = _named(path), "name"
+    return {
+        "file": str(path),
+        "start": None if start is None else datetime.fromtimestamp(start, UTC).isoformat(timespec="seconds"),
+        "start_from": None if start is None else source,
+        "seconds": log.duration,
+        "samples": log.samples,
+        "windows": len(windows),
+        "verdict": "unknown" if is_autocorrelated(found, TRUST * motion(windows) + 1e-9) else "adequate",
+        "cv": found.cv,
+        "settled": found.fitted.converged,
+        "parameters": values(layout, found, names),
+        "coefficients": values(layout, found, [n for n in layout.nuisance if n not in names]),
+    }
+
+
+def _log(question: Question, path: Path) -> Log:
+    """Return a dive's log; of one that is long, stretches that are evenly spread."""
+    if not is_large([path]):
+        return Log.read(path, question.mapping)
+    horizon = HORIZON if question.window is None else float(question.window)
+    cut = WindowCut(horizon, WARMUP, question.model.actuation, question.mapping)
+    return Log.from_runs(runs_of(plan_file(cut, path).spread(question.windows), cut), path.stem)
+
+
+def _named(path: Path) -> float | None:
+    """Return the date in a file's name, s since 1970, None without one."""
+    match = _DATE.search(path.stem)
+    if match is None:
+        return None
+    try:
+        return datetime(*(int(g or 0) for g in match.groups()), tzinfo=UTC).timestamp()  # type: ignore[misc]
+    except ValueError:
+        return None

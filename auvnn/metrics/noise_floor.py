@@ -1,0 +1,47 @@
+"""The free-running error that nothing can improve on: noise of the outputs and of the start."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from auvnn.logs import Log
+from auvnn.metrics.free_run import initial_states, moved, predict
+from auvnn.metrics.noise import attitude_noise, white
+from auvnn.metrics.rollouts import Rolled, Scale
+from auvnn.models import GreyBox
+
+
+def noise_floor(
+    model: GreyBox, rolled: Rolled, log: Log, scale: Scale, seed: int = 0, engine: str = "torch"
+) -> float:
+    """Return the free-running error that a perfect model would show: noise of the outputs and of the start.
+
+    The model's own predictions stand for the truth; they are started again from states with noise as large
+    as the log's and compared with noisy copies of themselves.
+    """
+    noise_nu = np.mean([white(r, r.nu) for r in log.runs], axis=0)
+    angle = np.mean([attitude_noise(r) for r in log.runs], axis=0)
+    rng = np.random.default_rng(seed)
+    windows = rolled.windows
+    states = initial_states(model, windows)
+    kick = np.concatenate(
+        [
+            np.zeros((len(windows), 3)),
+            rng.normal(size=(len(windows), 3)) * angle,
+            rng.normal(size=(len(windows), 6)) * noise_nu,
+        ],
+        axis=1,
+    )
+    with torch.no_grad():
+        true = predict(model, windows, states, engine=engine)[1].numpy()
+        started = predict(model, windows, moved(states, torch.as_tensor(kick)), engine=engine)[1].numpy()
+    error = true + rng.normal(size=true.shape) * noise_nu - started
+    mask = windows.mask[..., 6:12].numpy().copy()
+    mask[:, 0] = 0.0
+    good = np.isfinite(error).all((1, 2))
+    if not good.any():
+        return float("nan")
+    squared = (error[good] ** 2 * mask[good]).sum((0, 1)) / np.maximum(mask[good].sum((0, 1)), 1.0)
+    value = np.sqrt(squared) / np.where(scale.std > 0, scale.std, np.nan)
+    return float(np.nanmean(value[scale.excited])) if scale.excited.any() else float("nan")

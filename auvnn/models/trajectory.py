@@ -1,0 +1,55 @@
+"""A free run: where it went, and whether and why it diverged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from torch import Tensor
+
+if TYPE_CHECKING:
+    pass
+
+
+@dataclass(frozen=True)
+class Divergence:
+    """Where a rollout left what is physical.
+
+    Attributes:
+        index: which trajectory, flattened.
+        time: s, the last time at which the state was sound.
+        term: the term of the equation of motion that pushed most, or "initial state".
+        words: the same as a sentence.
+    """
+
+    index: int
+    time: float
+    term: str
+    words: str
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A free run.
+
+    Attributes:
+        times: (..., T), s.
+        eta: (..., T, 7), NED m and quaternion.
+        nu: (..., T, 6), m/s and rad/s.
+        thrust: (..., T, n), N, just after each row's command.
+        divergences: empty where the run stayed sound; a diverged trajectory holds its last sound state.
+        notes: in words, steps that were cut because the model is stiff, and velocities beyond those that the damping
+            was trained on, where what it says is extrapolated.
+    """
+
+    times: Tensor
+    eta: Tensor
+    nu: Tensor
+    thrust: Tensor
+    divergences: tuple[Divergence, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def diverged(self) -> bool:
+        """Whether any trajectory left what is physical."""
+        return bool(self.divergences)
