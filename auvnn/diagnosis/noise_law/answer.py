@@ -15,8 +15,9 @@ from auvnn.diagnosis.answers.table import values
 from auvnn.diagnosis.hypotheses.layout import Layout
 from auvnn.diagnosis.noise_law.command_holding import Holding, between, holding
 from auvnn.diagnosis.noise_law.foretold import foretold
+from auvnn.diagnosis.noise_law.hypothesis import BesideForce
 from auvnn.diagnosis.noise_law.law import ALPHA_BOUNDARY, left
-from auvnn.diagnosis.noise_law.search import BesideForce, ForceSearch
+from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.state import Searched

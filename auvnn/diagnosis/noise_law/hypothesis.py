@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from auvnn.diagnosis.noise_law.sums import ForceSums
 from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS
 from auvnn.effects import effect_class
 from auvnn.metrics.force_law import ForceLaw
+from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
 
@@ -39,6 +41,38 @@ class Hypothesis:
     def name(self) -> str:
         """The effect that came last."""
         return self.explanation.effects[-1] if self.explanation.effects else ""
+
+
+@dataclass(frozen=True)
+class BesideForce:
+    """What was found beside a stochastic force.
+
+    Attributes:
+        steps: of the search.
+        groups: explanations between which the log cannot decide.
+        last: the fit with what was found, under the law of the force.
+        windows: with that law.
+        estimate: the law.
+        tried: all that were fitted at first, the best first.
+        p_value: of there being nothing with a name.
+        first: the fit without any name, under the law of the force.
+        first_law: that law.
+    """
+
+    steps: list[dict[str, Any]]
+    groups: list[list[str]]
+    last: FittedHypothesis
+    windows: Windows
+    estimate: Estimate
+    tried: list[FittedHypothesis]
+    p_value: float
+    first: FittedHypothesis
+    first_law: ForceLaw | None
+
+    @property
+    def names(self) -> list[str]:
+        """Effects that were named or tied, in order."""
+        return [e for s in self.steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"]]
 
 
 def judged(layout: Layout, explanation: FittedHypothesis, sums: ForceSums, law: ForceLaw) -> Hypothesis:

@@ -12,7 +12,7 @@ Reference: Kristensen, Madsen and Joergensen (2004), Automatica 40(2) 225-237.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.layout import Layout, initial_guess, shapes
-from auvnn.diagnosis.noise_law.hypothesis import Hypothesis, judged, p_value_of, tied
-from auvnn.diagnosis.noise_law.law import Estimate, estimate
+from auvnn.diagnosis.noise_law.hypothesis import BesideForce, Hypothesis, judged, p_value_of, tied
+from auvnn.diagnosis.noise_law.law import estimate
 from auvnn.diagnosis.noise_law.sums import CELL, force_sums
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.score_tests.score import Score
@@ -43,38 +43,6 @@ LEADERS, WITHOUT, JUDGED = 4, 2, 3
 # Members of a group that the log cannot tell apart, at most.
 GROUP = 3
 STEPS = 4
-
-
-@dataclass(frozen=True)
-class BesideForce:
-    """What was found beside a stochastic force.
-
-    Attributes:
-        steps: of the search.
-        groups: explanations between which the log cannot decide.
-        last: the fit with what was found, under the law of the force.
-        windows: with that law.
-        estimate: the law.
-        tried: all that were fitted at first, the best first.
-        p_value: of there being nothing with a name.
-        first: the fit without any name, under the law of the force.
-        first_law: that law.
-    """
-
-    steps: list[dict[str, Any]]
-    groups: list[list[str]]
-    last: FittedHypothesis
-    windows: Windows
-    estimate: Estimate
-    tried: list[FittedHypothesis]
-    p_value: float
-    first: FittedHypothesis
-    first_law: ForceLaw | None
-
-    @property
-    def names(self) -> list[str]:
-        """Effects that were named or tied, in order."""
-        return [e for s in self.steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"]]
 
 
 class ForceSearch:
