@@ -15,6 +15,7 @@ from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.diagnosis.hypotheses.layout import lay_out
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
+from auvnn.diagnosis.noise_law.answer import beside_what_is_left
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.state import Searched, Setting
@@ -43,6 +44,7 @@ def diagnose(
     window: float | None = None,
     advice: bool = True,
     whiteness: bool = True,
+    stochastic: bool = False,
     force: bool = False,
     tolerance: Any = None,
     costs: bool = True,
@@ -62,6 +64,8 @@ def diagnose(
         window: length of the windows of free running that are fitted, s; by default 5.
         advice: for an ambiguous answer, also work out which manoeuvre would tell the candidates apart.
         whiteness: also test what is left for correlations, before and after; no verdict depends on these tests.
+        stochastic: where a force is left, also ask how commands go between samples, and for effects beside a stochastic
+            force whose law is estimated; takes as long again or longer.
         force: go on with a log that contradicts itself: signs, units, axes.
         tolerance: what does not matter: a number for the cost in free running, with a fifth of it for the force as a
             share of the actuators', or a mapping with `cost` and `force`; by default 0.1 and 0.02. At 0 everything
@@ -81,6 +85,7 @@ def diagnose(
         window=window,
         advice=advice,
         whiteness=whiteness,
+        stochastic=stochastic,
         force=force,
         tolerance=tolerance,
         costs=costs,
@@ -97,6 +102,7 @@ def searched(
     window: float | None = None,
     advice: bool = True,
     whiteness: bool = True,
+    stochastic: bool = False,
     force: bool = False,
     tolerance: Any = None,
     costs: bool = True,
@@ -135,6 +141,8 @@ def searched(
     )
     try:
         found, under_way = search(asked, windows)
+        if stochastic:
+            found, under_way = beside_what_is_left(found, under_way)
     except (np.linalg.LinAlgError, SINGULAR) as problem:
         raise InputError(
             f"{log.name} cannot be diagnosed with {model.vehicle.name}: free running grows without bound, so that the "

@@ -15,6 +15,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from auvnn.estimation.force_columns import pushed
+from auvnn.estimation.force_sums import LOOSE, beside_force, cost_beside_force
 from auvnn.estimation.sensitivity import Response, respond_by
 from auvnn.estimation.simulated_windows import simulate_windows
 from auvnn.metrics.windows import Windows
@@ -22,9 +24,6 @@ from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
 
-# A weak pull on each initial state towards the measured one keeps channels that were not measured in place:
-# metres, radians, m/s, rad/s.
-LOOSE = np.array([10.0] * 3 + [1.0] * 3 + [2.0] * 3 + [2.0] * 3)
 # A channel is never trusted beyond this share of its own motion: the integrator's error and the logging's last
 # digits must not pass for information.
 TRUST = 1e-4
@@ -52,6 +51,8 @@ class Statistics:
         pairs: (B, 18) differences.
         run: (B,) run numbers.
         first: (B,) index of the first sample.
+        spent: (B, 18) degrees of freedom that initial state and stochastic force have taken; None without a force.
+        volume: (B,) logarithm of the determinant of what the data say of both; None without a force.
     """
 
     hessian: Array
@@ -63,6 +64,8 @@ class Statistics:
     pairs: Array
     run: NDArray[np.int64]
     first: NDArray[np.int64]
+    spent: Array | None = None
+    volume: Array | None = None
 
     @cached_property
     def total(self) -> Array:
@@ -113,6 +116,11 @@ def linearise(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence
     """Yield the windows' answers chunk by chunk."""
     model = model.without_absent(names)
     columns = sum(len(model.effect(n).parameters_of) for n in names)
+    # What moves is the model itself; only its slopes are asked for with a force in it.
+    asked, by = model, names
+    if windows.law is not None:
+        asked, by = pushed(model, names)
+        columns += windows.law.cells * len(windows.law.axes)
     size = max(CHUNK * COLUMNS // max(columns, COLUMNS), 1)
     for start in range(0, len(windows), BLOCK):
         block = slice(start, start + BLOCK)
@@ -121,11 +129,11 @@ def linearise(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence
         few = max(NEAR // (some.nu.shape[1] * 18 * (12 + columns)), 1)
         for begin in range(0, len(some), size):
             part = slice(begin, begin + size)
-            yield from respond_by(few, model, some.pick(part), states[part], names, ran=ran.pick(part))
+            yield from respond_by(few, asked, some.pick(part), states[part], by, ran=ran.pick(part))
 
 
 def normal_equations(
-    windows: Windows, responses: Iterable[Response], sigma: Array
+    windows: Windows, responses: Iterable[Response], sigma: Array, *, leverage: bool = False
 ) -> tuple[Statistics, Array, Array]:
     """Return the statistics of windows, and how their best initial states follow the parameters.
 
@@ -133,6 +141,7 @@ def normal_equations(
         windows: B windows.
         responses: their answers, in chunks.
         sigma: (18,), infinite where a channel does not count.
+        leverage: also work out the degrees of freedom that a stochastic force takes of each channel.
 
     Returns:
         statistics; a (B, 12); A (B, 12, P): the best change of the initial state is a - A dtheta.
@@ -143,6 +152,8 @@ def normal_equations(
     weighed = torch.nonzero(weight).flatten().tolist()
     parts: list[list[Array]] = []
     begin, hessian = 0, np.zeros((len(windows), 0, 0))
+    spent: list[Array] = []
+    volume: list[Array] = []
     for answer in responses:
         count, length, told, size = answer.parameters.shape
         # Nor does a channel count that nobody measured, whatever noise it would have had.
@@ -153,19 +164,27 @@ def normal_equations(
         # The largest of all arrays: made once, and not joined from pieces.
         if hessian.shape[-1] != size:
             hessian = np.empty((len(windows), size, size))
-        both = answer.error.new_empty(count, length, len(live), 1 + size)
-        both[..., 0] = answer.error[..., live]
-        both[..., 1:] = answer.parameters[:, :, live]
-        both = both.mul_(weight[live, None]).reshape(count, length * len(live), 1 + size)
-        state = answer.state[:, :, live].mul_(weight[live, None]).reshape(count, length * len(live), 12)
-        q, r = torch.linalg.qr(torch.cat([state, loose.expand(count, 12, 12)], dim=1))
-        q = q[:, :-12]
-        along = q.mT @ both
-        # With the loose rows left out, this difference is the sum of squares after the best initial state.
-        sums = (both.mT @ both).sub_(along.mT @ along)
-        hessian[here] = sums[:, 1:, 1:].numpy()
-        solved = torch.linalg.solve_triangular(r, along, upper=True)
-        remaining = answer.left(solved[..., 0])
+        if answer.force is not None:
+            sums, solved, grown = beside_force(answer, weight, live, leverage=leverage)
+            volume.append(grown[0])
+            spent.append(grown[1])
+            hessian[here] = sums[:, 1:, 1:].numpy()
+            remaining = answer.left(solved[:, :12, 0])
+            remaining[..., live] -= (answer.force[:, :, live] @ solved[:, None, 12:, :1]).squeeze(-1)
+        else:
+            both = answer.error.new_empty(count, length, len(live), 1 + size)
+            both[..., 0] = answer.error[..., live]
+            both[..., 1:] = answer.parameters[:, :, live]
+            both = both.mul_(weight[live, None]).reshape(count, length * len(live), 1 + size)
+            state = answer.state[:, :, live].mul_(weight[live, None]).reshape(count, length * len(live), 12)
+            q, r = torch.linalg.qr(torch.cat([state, loose.expand(count, 12, 12)], dim=1))
+            q = q[:, :-12]
+            along = q.mT @ both
+            # With the loose rows left out, this difference is the sum of squares after the best initial state.
+            sums = (both.mT @ both).sub_(along.mT @ along)
+            hessian[here] = sums[:, 1:, 1:].numpy()
+            solved = torch.linalg.solve_triangular(r, along, upper=True)
+            remaining = answer.left(solved[..., 0])
         remaining = torch.where(mask > 0, remaining, torch.zeros_like(remaining))
         pair = mask[:, 1:] * mask[:, :-1]
         step = (remaining[:, 1:] - remaining[:, :-1]) * pair
@@ -179,15 +198,18 @@ def normal_equations(
                     mask.sum(1),
                     (step**2).sum(1),
                     pair.sum(1),
-                    solved[..., 0],
-                    solved[..., 1:],
+                    solved[:, :12, 0],
+                    solved[:, :12, 1:],
                 )
             ]
         )
     joined = [np.concatenate(p) for p in zip(*parts, strict=True)]
     slope, cost, channel, count, rough, pairs, change, follow = joined
     run, first = windows.run.astype(np.int64), windows.first.astype(np.int64)
-    return Statistics(hessian, slope, cost, channel, count, rough, pairs, run, first), change, follow
+    of_force = (np.concatenate(spent), np.concatenate(volume)) if volume else (None, None)
+    of_force = of_force if leverage else (None, of_force[1])
+    found = Statistics(hessian, slope, cost, channel, count, rough, pairs, run, first, *of_force)
+    return found, change, follow
 
 
 def weights_of(sigma: Array) -> Tensor:
@@ -198,14 +220,25 @@ def weights_of(sigma: Array) -> Tensor:
 def cost_of(responses: Iterable[Response], sigma: Array) -> float:
     """Return the weighted squared error of answers, infinite where a model diverged."""
     weight = weights_of(sigma)
-    total = sum(float(((r.error * weight) ** 2).sum()) for r in responses)
+    total = sum(_cost(r, weight) for r in responses)
     return total if np.isfinite(total) else np.inf
+
+
+def _cost(response: Response, weight: Tensor) -> float:
+    """Return the weighted squared error, of which a stochastic force takes what it is likely to."""
+    return (
+        float(((response.error * weight) ** 2).sum())
+        if response.force is None
+        else cost_beside_force(response, weight)
+    )
 
 
 def residual_std(statistics: Statistics, floor: Array, parameters: int) -> Array:
     """Return each channel's root-mean-square error, (18,), for the degrees of freedom spent; infinite unmeasured."""
     count = statistics.count.sum(0)
     spent = (12 * len(statistics.cost) + parameters) * count / max(count.sum(), 1.0)
+    if statistics.spent is not None:
+        spent = statistics.spent.sum(0) + parameters * count / max(count.sum(), 1.0)
     with np.errstate(invalid="ignore", divide="ignore"):
         value = np.sqrt(statistics.channel.sum(0) / np.maximum(count - spent, 0.25 * count))
     return np.where(count > 0, np.maximum(value, floor), np.inf)

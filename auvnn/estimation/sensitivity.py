@@ -14,11 +14,12 @@ integrator's, so that a perfect model still leaves no residual at all.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
+from auvnn.estimation.force_columns import PUSH, Cells
 from auvnn.estimation.point_slopes import OperatingPoint, differentiate
 from auvnn.estimation.simulated_windows import SimulatedWindows, simulate_windows
 from auvnn.metrics.windows import Windows
@@ -37,11 +38,14 @@ class Response:
         error: measured minus predicted, (B, L, 18).
         state: change of the prediction with the initial state, (B, L, C, 12).
         parameters: change of the prediction with the parameters, (B, L, C, P).
+        force: change of the prediction with the independent standard normal variables of the windows' stochastic force,
+            (B, L, C, F); None where there is none.
     """
 
     error: Tensor
     state: Tensor
     parameters: Tensor
+    force: Tensor | None = None
 
     def left(self, change: Tensor) -> Tensor:
         """Return the errors once the initial states have moved, (B, L, 18), to first order; change is (B, 12)."""
@@ -100,6 +104,7 @@ def respond_by(
     eta, nu = ran.eta, ran.nu
     count, length = nu.shape[:2]
     total = sum(theta.numel() for theta in thetas.values())
+    cells = Cells(windows, windows.law) if windows.law is not None and PUSH in names else None
     times = windows.times[:, windows.warmup :]
     inputs = windows.inputs.rows(windows.warmup)
     steps = times[:, 1:] - times[:, :-1]
@@ -120,6 +125,10 @@ def respond_by(
         jac_theta[..., ran.columns] += rate[3] @ ran.mean_slope[:, :-1].flatten(0, 1)
     along = [x.unflatten(0, (count, length - 1)) for x in (jac_state, jac_theta)]
     seen = _reports(model, windows, ran, times, inputs, thetas, chunk)
+    if cells is not None:
+        # The last columns are those of a unit wrench: each cell of the force has its share of them.
+        along[1] = cells.spread(along[1])
+        seen = replace(seen, parts=[cells.part(at, slope, 12 + total) for at, slope in seen.parts])
     for begin in range(0, count, size):
         part = slice(begin, begin + size)
         sensitivity = _propagate(
@@ -127,7 +136,10 @@ def respond_by(
         )
         state, parameters = _outputs(seen, part, sensitivity)
         mask = windows.mask[part, :, : state.shape[-2]].unsqueeze(-1)
-        yield Response(ran.error[part], state.mul_(mask), parameters.mul_(mask))
+        state, parameters, force = state.mul_(mask), parameters.mul_(mask), None
+        if cells is not None:
+            parameters, force = cells.parted(parameters)
+        yield Response(ran.error[part], state, parameters, force)
 
 
 def _propagate(jac_state: Tensor, jac_theta: Tensor, quaternion: Tensor, nu: Tensor, steps: Tensor) -> Tensor:

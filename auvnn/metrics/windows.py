@@ -11,6 +11,7 @@ from torch import Tensor
 
 from auvnn.errors import InputError
 from auvnn.logs import Log, Run
+from auvnn.metrics.force_law import ForceLaw
 from auvnn.models.inputs import Inputs
 
 CHANNELS = (
@@ -56,6 +57,7 @@ class Windows:
         length: (B,) samples before the padding.
         warmup: rows of history.
         max_step: longest step with which an integrator may run them, s.
+        law: of a stochastic force that acts in them; None for none.
     """
 
     run: np.ndarray
@@ -69,6 +71,7 @@ class Windows:
     length: np.ndarray
     warmup: int
     max_step: float = MAX_STEP
+    law: ForceLaw | None = None
 
     def __len__(self) -> int:
         """Return the number of windows."""

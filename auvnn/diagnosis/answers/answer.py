@@ -65,6 +65,7 @@ class Diagnosis(Answer):
     judged_by: str = ""
     whole_log: dict[str, Any] | None = None
     baseline: dict[str, Any] = field(default_factory=dict)
+    stochastic: dict[str, Any] = field(default_factory=dict)
 
     @property
     def surfaces(self) -> list[dict[str, Any]]:
@@ -118,6 +119,7 @@ class Diagnosis(Answer):
             "story",
             "whole_log",
             "baseline",
+            "stochastic",
         )
         absorbed = None if self.absorbed is None else self.absorbed.to_dict()
         return plain(

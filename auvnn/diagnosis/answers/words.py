@@ -8,6 +8,7 @@ import numpy as np
 
 from auvnn.diagnosis.answers import judged_words
 from auvnn.diagnosis.answers.moved import moved_words
+from auvnn.diagnosis.noise_law.words import stochastic_words
 from auvnn.effects import EFFECTS
 
 if TYPE_CHECKING:
@@ -90,6 +91,7 @@ def tell(diagnosis: Diagnosis) -> list[str]:
         *lines,
         *_where(diagnosis),
         *judged_words.left(diagnosis),
+        *stochastic_words(diagnosis.stochastic),
         *_dependence(diagnosis),
         *moved_words(diagnosis.moved),
     ]

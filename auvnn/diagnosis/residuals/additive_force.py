@@ -113,7 +113,9 @@ def _by_part(
     for answer in linearise(asked, windows, fitted.initial, [*explanation.names, str(probe.name)]):
         part = windows.pick(slice(begin, begin + len(answer.error)))
         begin += len(answer.error)
-        each = [Response(answer.error, answer.state, answer.parameters[..., c]) for c in columns]
+        each = [
+            Response(answer.error, answer.state, answer.parameters[..., c], answer.force) for c in columns
+        ]
         yield [normal_equations(part, [one], sigma)[0].finite() for one in each]
 
 

@@ -1,0 +1,1 @@
+"""The law of what is not modelled: a stochastic force, and commands between samples."""

@@ -1,0 +1,123 @@
+"""An explanation with the law of the force that is most likely with it, and its marginal likelihood."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.layout import Layout, scales, shapes
+from auvnn.diagnosis.noise_law.law import Estimate, estimate
+from auvnn.diagnosis.noise_law.sums import ForceSums
+from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS
+from auvnn.effects import effect_class
+from auvnn.metrics.force_law import ForceLaw
+from auvnn.metrics.windows import Windows
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An explanation with the law of the force that is most likely with it.
+
+    Attributes:
+        explanation: fitted under the law of the explanation before it.
+        estimate: its own law, and its likelihood there.
+        misfit: minus twice the log marginal likelihood, departure of the parameters in it, their volume aside.
+        evidence: logarithm of the marginal likelihood, up to what all hypotheses of a log share.
+    """
+
+    explanation: FittedHypothesis
+    estimate: Estimate
+    misfit: float
+    evidence: float
+
+    @property
+    def name(self) -> str:
+        """The effect that came last."""
+        return self.explanation.effects[-1] if self.explanation.effects else ""
+
+
+@dataclass(frozen=True)
+class BesideForce:
+    """What was found beside a stochastic force.
+
+    Attributes:
+        steps: of the search.
+        groups: explanations between which the log cannot decide.
+        last: the fit with what was found, under the law of the force.
+        windows: with that law.
+        estimate: the law.
+        tried: all that were fitted at first, the best first.
+        p_value: of there being nothing with a name.
+        first: the fit without any name, under the law of the force.
+        first_law: that law.
+    """
+
+    steps: list[dict[str, Any]]
+    groups: list[list[str]]
+    last: FittedHypothesis
+    windows: Windows
+    estimate: Estimate
+    tried: list[FittedHypothesis]
+    p_value: float
+    first: FittedHypothesis
+    first_law: ForceLaw | None
+
+    @property
+    def names(self) -> list[str]:
+        """Effects that were named or tied, in order."""
+        return [e for s in self.steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"]]
+
+
+def judged(layout: Layout, explanation: FittedHypothesis, sums: ForceSums, law: ForceLaw) -> Hypothesis:
+    """Return an explanation with the law that is most likely with it, and what they are worth.
+
+    Args:
+        layout: stated values.
+        explanation: fitted under some law.
+        sums: of its windows.
+        law: to begin from; a degree of freedom without a force in it has none here.
+    """
+    found = estimate(sums, law, law.axes)
+    size, mean, shape = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=bool)]
+    for name in explanation.names:
+        stated = name in layout.spreads and name not in explanation.effects
+        own = layout.spreads[name] if stated else scales(layout, name)
+        size.append(np.broadcast_to(own, layout.means[name].shape))
+        mean.append(layout.means[name])
+        shape.append(shapes(layout, name))
+    sizes, means, fixed = np.concatenate(size), np.concatenate(mean), np.concatenate(shape)
+    theta, priors = explanation.fitted.theta + found.step, explanation.fitted.priors
+    data = found.value - float(priors.precision @ (theta - priors.mean) ** 2)
+    away = np.where(fixed, 0.0, (theta - means) / sizes)
+    information = found.information * sizes[:, None] * sizes
+    volume = float(np.linalg.slogdet(information + np.eye(len(sizes)))[1])
+    misfit = data + float(away @ away)
+    return Hypothesis(explanation, found, misfit, -0.5 * (misfit + volume))
+
+
+def p_value_of(layout: Layout, after: Hypothesis, before: Hypothesis) -> float:
+    """Return the p-value of the effect that came last, by the likelihood ratio at laws of their own."""
+    degrees = len(layout.columns[after.name])
+    return float(chi2.sf(max(before.misfit - after.misfit, 0.0), degrees))
+
+
+def tied(layout: Layout, good: list[Hypothesis]) -> list[Hypothesis]:
+    """Return the best and those that the log cannot tell from it, the plainer one first."""
+    best = good[0]
+    for other in good[1:]:
+        # Evidence weighs how large parameters might have been, which is a guess: it must not outvote the fit.
+        extra = len(layout.columns[other.name])
+        if best.misfit - other.misfit > chi2.isf(ALPHA_REFUTED, extra):
+            best = other
+    rest = [h for h in good if h is not best and best.evidence - h.evidence < ODDS]
+    mine = len(layout.columns[best.name])
+    rest = [h for h in rest if h.misfit - best.misfit < chi2.isf(ALPHA_REFUTED, mine)]
+    plainer = effect_class(best.name).plainer
+    return sorted([best, *rest], key=lambda h: h.name not in plainer)

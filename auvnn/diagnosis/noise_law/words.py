@@ -1,0 +1,27 @@
+"""What was found of a stochastic force, and of commands between samples, in plain words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+MOTIONS = {"X": "surge", "Y": "sway", "Z": "heave", "K": "roll", "M": "pitch", "N": "yaw"}
+
+
+def stochastic_words(stochastic: Mapping[str, Any]) -> list[str]:
+    """Return the sentences; none where nothing was asked or found."""
+    lines: list[str] = []
+    if stochastic.get("force"):
+        parts = [
+            f"{MOTIONS[axis]} {told['rms']:.2g} {'N' if axis in 'XYZ' else 'N m'} over {told['correlation_time']:.2g} s"
+            for axis, told in stochastic["force"].items()
+        ]
+        lines.append(f"A stochastic force is left (rms, correlation time): {', '.join(parts)}.")
+    commands = stochastic.get("commands")
+    if commands and commands["between_samples"] != "held":
+        next_one = commands["share_of_next"]
+        lines.append(
+            f"Commands change between the log's samples: the mean of an interval was taken as {1 - next_one:.0%} of its "
+            f"own sample's and {next_one:.0%} of the next one's."
+        )
+    return lines

@@ -1,0 +1,92 @@
+"""A stochastic force: per degree of freedom a variance and a correlation time.
+
+What the equations lack and nobody measured is taken as an Ornstein-Uhlenbeck force on the body,
+
+    E[f(t) f(s)] = rms^2 exp(-|t - s| / time),
+
+one process per degree of freedom, independent of the others. In a window it is taken as constant over short cells
+that count from the window's start; the value in a cell is the mean of the process over the cell, whose covariance is
+known exactly, so that the impulse over each cell is that of the process.
+
+References: Uhlenbeck and Ornstein (1930), Physical Review 36; Kristensen, Madsen and Joergensen (2004), Automatica 40(2)
+225-237, for stochastic terms in grey-box models.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+# Cells are half as long as the shortest correlation time, within these, s: shorter ones cost time, longer ones let
+# the force change too much within a cell.
+SHORTEST, LONGEST = 0.2, 0.5
+
+
+@dataclass(frozen=True)
+class ForceLaw:
+    """The law of a stochastic force, in the body's axes at its origin.
+
+    Attributes:
+        rms: (6,) standard deviations, N and N m; zero where there is none.
+        time: (6,) correlation times, s.
+        cell: length of the cells, s.
+        span: longest window, s.
+        plain: cells of unit variance that do not hang together; for the estimate of the law itself.
+    """
+
+    rms: Array
+    time: Array
+    cell: float
+    span: float
+    plain: bool = False
+
+    @cached_property
+    def axes(self) -> list[int]:
+        """Degrees of freedom in which there is a force."""
+        return [int(i) for i in np.flatnonzero(self.rms > 0.0)]
+
+    @property
+    def cells(self) -> int:
+        """How many cells a window has."""
+        return max(int(np.ceil(self.span / self.cell - 1e-9)), 1)
+
+    @cached_property
+    def factors(self) -> Array:
+        """Cholesky factors of the cells' covariances, (A, K, K), in N and N m."""
+        if self.plain:
+            return np.broadcast_to(np.eye(self.cells), (len(self.axes), self.cells, self.cells))
+        return np.stack(
+            [
+                self.rms[i] * np.linalg.cholesky(correlation(self.cells, self.cell, self.time[i]))
+                for i in self.axes
+            ]
+        )
+
+    def cell_of(self, since: Array) -> NDArray[np.int64]:
+        """Return the cell of moments so long after a window's start, s."""
+        return np.clip((since / self.cell + 1e-9).astype(np.int64), 0, self.cells - 1)
+
+
+def cell_for(time: Array) -> float:
+    """Return how long the cells are for forces of some correlation times, s."""
+    return float(np.clip(0.5 * np.min(time, initial=2 * LONGEST), SHORTEST, LONGEST))
+
+
+def correlation(count: int, cell: float, time: float) -> Array:
+    """Return the covariance of a unit process's means over successive cells, (count, count).
+
+    With a = cell / time it is 2 (a - 1 + exp(-a)) / a^2 within a cell, and between cells that are k apart
+    exp(-k a) (exp(a) - 2 + exp(-a)) / a^2, the integral of exp(-|t - s| / time) over both, divided by cell^2.
+    """
+    a = cell / time
+    apart = np.abs(np.arange(count)[:, None] - np.arange(count))
+    if a < 1e-4:
+        return np.exp(-a * apart) + 1e-9 * np.eye(count)
+    own = 2.0 * (a + np.expm1(-a)) / a**2
+    # exp(-k a) (exp(a) - 2 + exp(-a)) = exp(-(k - 1) a) (1 - exp(-a))^2.
+    across = np.exp(-np.maximum(apart - 1, 0) * a) * np.expm1(-a) ** 2 / a**2
+    return np.where(apart == 0, own * (1.0 + 1e-9), across)

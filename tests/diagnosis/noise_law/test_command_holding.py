@@ -1,0 +1,59 @@
+"""Commands between samples: a log that was thinned out is told from one whose commands were held."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
+from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.noise_law.command_holding import between, holding
+from auvnn.logs import Log
+from auvnn.models import GreyBox
+from tests.small_logs import make_log, small_vehicle
+
+STEP = 5
+
+
+@pytest.fixture(scope="module")
+def model():
+    return GreyBox(small_vehicle())
+
+
+def thinned(log: Log, step: int) -> Log:
+    """Return every so many-th sample of a log."""
+    runs = []
+    for run in log.runs:
+        arrays = {n: getattr(run, n) for n in ("t", "quaternion", "nu", "position", "thrusters")}
+        runs.append(replace(run, **{n: x[::step].copy() for n, x in arrays.items()}))
+    return Log.from_runs(runs, name=log.name)
+
+
+def asked(model, log):
+    windows, layout = windows_for(model, log), lay_out(model, [])
+    first = fit_hypothesis(layout, windows, list(layout.names), (), iterations=4)
+    return holding(first, windows)
+
+
+def test_commands_that_change_every_tick_are_not_held(model):
+    """Five ticks of a fast controller a sample: the mean command of an interval is two fifths on the way to the next."""
+    log = thinned(make_log(model, duration=20.0, rate=25.0, noise=0.3, max_step=0.04), STEP)
+    found = asked(model, log)
+    assert found.name in ("ahead", "linear") and found.share == pytest.approx(0.4, abs=0.11)
+    assert found.odds > np.log(100.0) and found.to_dict()["between_samples"] == found.name
+
+
+def test_commands_that_were_held_are_held(model):
+    found = asked(model, make_log(model, duration=20.0, rate=5.0, noise=0.3))
+    assert found.name == "held" and found.share == 0.0
+
+
+def test_a_share_mixes_each_sample_with_the_next(model):
+    windows = windows_for(model, make_log(model, duration=12.0, rate=5.0))
+    mixed, plain = between(windows, 0.25).inputs.command, windows.inputs.command
+    assert torch.allclose(mixed[:, :-1], 0.75 * plain[:, :-1] + 0.25 * plain[:, 1:])
+    assert torch.equal(mixed[:, -1], plain[:, -1]) and between(windows, 0.0) is windows
