@@ -96,7 +96,7 @@ def left(diagnosis: Diagnosis) -> list[str]:
     return []
 
 
-def _known(value: Any) -> bool:
+def _known(value: Any) -> TypeGuard[float]:
     return value is not None and bool(np.isfinite(value))
 
 

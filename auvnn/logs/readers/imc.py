@@ -60,7 +60,7 @@ def crc16(packets: NDArray[np.uint8]) -> NDArray[np.uint16]:
     """Return the CRC-16-IBM (polynomial 8005 reflected, from 0) of packets of one length, (N, L) to (N,)."""
     crc = np.zeros(len(packets), dtype=np.uint16)
     for byte in packets.T:
-        crc = (crc >> 8) ^ _TABLE[(crc ^ byte) & 0xFF]
+        crc = np.asarray((crc >> 8) ^ _TABLE[(crc ^ byte) & 0xFF], dtype=np.uint16)
     return crc
 
 
