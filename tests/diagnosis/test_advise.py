@@ -93,7 +93,7 @@ def test_the_promise_is_what_a_full_refit_leaves(twins):
 
 def test_without_advice_nothing_is_simulated(twins, monkeypatch):
     model, log = twins
-    module = sys.modules["auvnn.diagnosis.search"]
+    module = sys.modules["auvnn.diagnosis.answers.answering"]
     monkeypatch.setattr(module, "advise", None)
     assert diagnose(model, log, NAMES, advice=False, whiteness=False).next_experiment is None
 

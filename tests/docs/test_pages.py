@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -75,13 +76,13 @@ def test_python_blocks_run(name, place, monkeypatch):
 def test_commands_are_composed_as_printed(name, place, monkeypatch, capfd):
     monkeypatch.chdir(place)
     for line in "".join(blocks(name, "sh")).splitlines():
-        words = line.split("#")[0].split()
+        words = shlex.split(line, comments=True)
         if not words or words[0] != "auvnn" or any(w.startswith(FOREIGN) for w in words):
             continue
         if words[1:2] and words[1] in PAGES:
             assert main(words[1:]) == 0, line
             continue
-        kept = [w.strip("'") for w in words[1:] if not w.startswith(("out=", "-j")) and w != "2"]
+        kept = [w for w in words[1:] if not w.startswith(("out=", "-j")) and w != "2"]
         status = main([*kept, "dry_run=true"])
         assert status == 0, (line, capfd.readouterr().err)
 

@@ -106,6 +106,7 @@ CASES = {
     thrusters.allocation_matrix: (vector(4, 3), unit(4, 3)),
     thrusters.quadratic_thrust: (vector(4), positive(4), positive(4)),
     thrusters.table_thrust: (vector(4), rising(4, 5), rising(4, 5)),
+    thrusters.summed_table_thrust: (vector(4), rising(5), rising(5)),
     fins.fin_frame: (vector(2, 3), unit(2, 3)),
     fins.fin_wrench: (V6, small(2), vector(2, 2, 6), *FINS),
     fins.fin_force: (V6, small(2), vector(2, 3), unit(2, 3), *FINS),

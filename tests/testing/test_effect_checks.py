@@ -197,7 +197,7 @@ def test_the_example_vehicle_is_a_sound_one_that_has_everything():
     assert vehicle.warnings == ()
     assert vehicle.linear_damping is not None and vehicle.quadratic_damping is not None
     assert vehicle.damping_elements and vehicle.fins and vehicle.reference_voltage
-    assert {type(u.curve).__name__ for u in vehicle.thrusters} == {"str", "Table"}
+    assert {type(u.curve).__name__ for u in vehicle.thrusters} == {"str", "ThrustTable"}
 
 
 @pytest.mark.parametrize(

@@ -124,7 +124,7 @@ def _check(data: bytes | FileBytes, size: int, where: str) -> Contents:
     notes = {
         e[1].decode("utf-8", "replace"): e.get(2, b"").decode("utf-8", "replace") for e in meta.get(5, [])
     }
-    if any(len(places.get(name, [])) != len(groups) for name in flat):
+    if any(len(places.get(name, [])) < len(groups) for name in flat):
         raise ThriftError("a column is missing in a part of the file")
     return Contents(rows, flat, nested, total, tuple(int(group[3]) for group in groups), places, start, notes,
                     summed)  # fmt: skip

@@ -62,7 +62,7 @@ def test_a_withdrawn_effect_is_told_and_not_counted_as_missing(model, two, monke
 
     monkeypatch.setattr(Chooser, "withdrawn", all_gone)
     # What is left without the one that was taken away is no stand-in here, but the purpose.
-    monkeypatch.setattr("auvnn.diagnosis.search.PARTIAL", 2.0)
+    monkeypatch.setattr("auvnn.diagnosis.stages.what_is_left.PARTIAL", 2.0)
     found = diagnose(model, two, NAMES)
     assert found.missing == [plain.missing[1]]
     assert [s["verdict"] for s in found.steps][:3] == ["named", "named", "withdrawn"]

@@ -69,7 +69,7 @@ def test_nothing_is_overwritten_by_accident(tmp_path: Path) -> None:
     assert path.read_bytes() != before
     assert sorted(p.name for p in tmp_path.iterdir()) == ["log.csv", "log.csv.sha256"]
     assert Log.read(path).samples > 0, "the seal is that of the new file"
-    with pytest.raises(ConfigError, match=r"\.parquet or \.csv"):
+    with pytest.raises(ConfigError, match=r"\.parquet, \.csv or \.mcap"):
         log.write(tmp_path / "log.mat")
 
 
