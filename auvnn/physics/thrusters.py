@@ -72,14 +72,15 @@ def summed_table_thrust(command: PerPart, command_grid: Knots, thrust_grid: Knot
 
     Args:
         command: (...).
-        command_grid: rising commands of the table, (k,), k >= 2.
-        thrust_grid: thrust at these commands, N, (k,).
+        command_grid: rising commands of the table, (..., k), k >= 2.
+        thrust_grid: thrust at these commands, N, (..., k).
 
     Returns:
         (...), N.
     """
-    slope = (thrust_grid[1:] - thrust_grid[:-1]) / (command_grid[1:] - command_grid[:-1])
-    level = torch.zeros_like(slope[:1])
-    kink = 0.5 * (torch.cat((slope, level)) - torch.cat((level, slope)))
+    rise = thrust_grid[..., 1:] - thrust_grid[..., :-1]
+    slope = rise / (command_grid[..., 1:] - command_grid[..., :-1])
+    level = torch.zeros_like(slope[..., :1])
+    kink = 0.5 * (torch.cat((slope, level), dim=-1) - torch.cat((level, slope), dim=-1))
     away = (command.unsqueeze(-1) - command_grid).abs()
-    return 0.5 * (thrust_grid[0] + thrust_grid[-1]) + (kink * away).sum(-1)
+    return 0.5 * (thrust_grid[..., 0] + thrust_grid[..., -1]) + (kink * away).sum(-1)

@@ -299,7 +299,9 @@ def test_a_group_that_had_stood_in_is_withdrawn_with_all_its_members(level, monk
     monkeypatch.setattr(Chooser, "withdrawn", gone)
     # What is left without the group is no stand-in here, but the purpose.
     monkeypatch.setattr("auvnn.diagnosis.stages.what_is_left.PARTIAL", 2.0)
-    monkeypatch.setattr("auvnn.diagnosis.stages.what_is_left.additive_force_test", lambda *_: AdditiveForce("X", "u", 1.0, ()))
+    monkeypatch.setattr(
+        "auvnn.diagnosis.stages.what_is_left.additive_force_test", lambda *_: AdditiveForce("X", "u", 1.0, ())
+    )
     names = ["net_buoyancy", "heave_push", "heading_force"]
     found = diagnose(model, log, names, advice=False, whiteness=False)
     assert [s["verdict"] for s in found.steps][:3] == ["ambiguous", "named", "withdrawn"]

@@ -106,7 +106,7 @@ CASES = {
     thrusters.allocation_matrix: (vector(4, 3), unit(4, 3)),
     thrusters.quadratic_thrust: (vector(4), positive(4), positive(4)),
     thrusters.table_thrust: (vector(4), rising(4, 5), rising(4, 5)),
-    thrusters.summed_table_thrust: (vector(4), rising(5), rising(5)),
+    thrusters.summed_table_thrust: (vector(4), rising(4, 5), rising(4, 5)),
     fins.fin_frame: (vector(2, 3), unit(2, 3)),
     fins.fin_wrench: (V6, small(2), vector(2, 2, 6), *FINS),
     fins.fin_force: (V6, small(2), vector(2, 3), unit(2, 3), *FINS),
@@ -124,7 +124,11 @@ CASES = {
     cross: (V3, V3),
 }
 # A table may serve all thrusters, so their number is not tied to its shape; lift is element by element.
-UNTIED = {(thrusters.table_thrust, 0), *((fins.lift_coefficient, i) for i in range(3))}
+UNTIED = {
+    (thrusters.table_thrust, 0),
+    (thrusters.summed_table_thrust, 0),
+    *((fins.lift_coefficient, i) for i in range(3)),
+}
 NOT_SMOOTH = {inertia.is_positive_definite}
 
 every = pytest.mark.parametrize("function", CASES, ids=lambda f: f.__name__)
