@@ -130,7 +130,7 @@ def _launched(name: str, arguments: list[str], task: Callable[[DictConfig], Any]
 
 
 def _job(name: str, verb: Verb, composer: Composer, config: DictConfig) -> int:
-    """Run one job of perhaps many; whatever befalls it is its own affair."""
+    """Run one job of perhaps many; its failure does not stop the others."""
     own = HydraConfig.get()
     number = own.job.num if own.mode == RunMode.MULTIRUN else None
     root = own.run.dir if number is None else own.sweep.dir

@@ -60,7 +60,7 @@ class Question:
 
 
 def dive(question: Question, path: Path) -> dict[str, Any] | str:
-    """Return one dive's values, or why there are none: whatever befalls a dive is its own affair."""
+    """Return one dive's values, or why there are none: a dive that fails does not stop the others."""
     try:
         return _fitted(question, path)
     except AuvnnError as problem:

@@ -1,4 +1,4 @@
-"""A fit in which a few windows went astray is begun again from what the others say.
+"""A fit in which a few windows diverged is begun again from the estimate of the others.
 
 Where a vehicle is unstable and its coefficients are off, a window of free running may leave the measured motion so far
 that no small step of its initial state brings it back. Its error then drowns that of all the others: weights follow
@@ -20,7 +20,7 @@ from auvnn.metrics.free_run import initial_states
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 
-# A window is astray whose error is so many times the median's, and fit to lead the others back below so many.
+# A window is an outlier whose error is so many times the median's, and fit to lead the others back below so many.
 ASTRAY, NEAR = 3.0, 2.0
 # A fit that goes out from another one is left alone unless a window is as far out as this.
 WILD = 1e3
@@ -40,10 +40,10 @@ def fit_with_outlier_restart(
     initial: Tensor | None = None,
     sigma: NDArray[np.float64] | None = None,
 ) -> Fitted:
-    """Fit; where windows end astray, again from a fit without them.
+    """Fit; where windows end as outliers, again from a fit without them.
 
     A fit that goes out from another one, by initial states or weights, is begun again only where a window is so far out
-    that it leaves no other a say: the other fit had none astray.
+    that it outweighs all others: the other fit had no outlier.
 
     Args:
         model: holds the named effects; it is not changed.

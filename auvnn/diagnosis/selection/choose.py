@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 ALPHA = 0.05
 # Explanations are refitted in full, nonlinearly, as long as their one-step evidence is within reach of the best.
 LEADERS, REACH, REACH_SHARE = 5, 30.0, 0.5
-# Parts of what a test estimates from which a fit is begun, the next where it went astray from the one before: near the
+# Parts of what a test estimates from which a fit is begun, the next where the one before diverged: near the
 # bottom the force grows faster than any slope says.
 SHARES = (1.0, 0.1)
 
@@ -320,7 +320,7 @@ class Chooser:
             except FitError as fault:
                 problem = fault
                 continue
-            # It holds the fit without the effect: one that is worse than that has gone astray.
+            # It holds the fit without the effect: one that is worse than that has diverged.
             if found.fitted.cost <= current.fitted.cost:
                 break
         if found is None:
