@@ -147,11 +147,6 @@ def settled(page: Any, seconds: float = 60) -> None:
     raise AssertionError("the page did not come to rest")
 
 
-def busy() -> float:
-    """Return by how much everything takes longer here than on a machine that does nothing else."""
-    return max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
-
-
 def barriers(page, where: str) -> list[str]:
     """Return what axe finds serious on the screen in view; nothing where axe is not at hand."""
     script = axe()

@@ -183,5 +183,4 @@ def test_a_step_is_no_slower_than_the_compiled_engine(cc, tmp_path, name):
             )
             theirs.append(time.perf_counter() - begin)
     print(f"{name}: {1e6 * min(mine) / rows:.2f} us a step, the engine {1e6 * min(theirs) / rows:.2f}")
-    # Equal for networks, whose time is that of the same products: a tenth for what else the machine does.
-    assert min(mine) <= 1.1 * min(theirs)
+    assert min(mine) <= min(theirs)
