@@ -17,7 +17,8 @@ from auvnn.effects import HOOKS, Body, Effect, Moment, Sensed, effect_class
 from auvnn.errors import ConfigError
 from auvnn.models.actuators import Actuators
 from auvnn.models.inputs import Inputs
-from auvnn.models.saving import REGION, SUBNETWORKS, save
+from auvnn.models.saving import PASSIVE, REGION, SUBNETWORKS, save
+from auvnn.models.stated_drag import StatedDrag
 from auvnn.physics.attitude import quat_to_matrix
 from auvnn.physics.coriolis import coriolis_force
 from auvnn.physics.current import water_velocity
@@ -93,6 +94,8 @@ class GreyBox(nn.Module):
         self.actuation = actuation or ("thrusters" if vehicle.thrusters else "wrench")
         self.actuators = Actuators(vehicle, self.actuation)
         self.damping = damping
+        if damping is not None and self.passive:
+            damping.stated = StatedDrag(vehicle).to(damping.output_scale)
         members = list(effects)
         names = [e.name for e in members]
         for effect in members:
@@ -141,6 +144,11 @@ class GreyBox(nn.Module):
 
     def _known(self, name: str) -> Any:
         return getattr(self, f"known_{name}")
+
+    @property
+    def passive(self) -> bool:
+        """Whether the subnetworks are kept from making the drag as a whole give energy."""
+        return bool(getattr(self.damping, "passive", False))
 
     def using(self, hook: str) -> list[Effect]:
         """Return the effects that override a hook, in order of action."""
@@ -386,7 +394,12 @@ class GreyBox(nn.Module):
             law = body.element_linear.flatten(-2) + body.element_quadratic.flatten(-2) * own.abs()
             terms["damping elements"] = -matvec(to_parts.mT, law * own)
         if self.damping is not None:
-            terms["damping subnetworks"] = -self.damping(nu_r)
+            if self.passive:
+                stated = [terms[name] for name in DRAG_TERMS if name in terms]
+                learned = self.damping(nu_r, -sum(stated, torch.zeros_like(nu_r)))
+            else:
+                learned = self.damping(nu_r)
+            terms["damping subnetworks"] = -learned
         terms["restoring"] = -restoring_force(rotation, body.weight, body.buoyancy, body.hangs, body.cb)
         if self._known("fin_area") is not None:
             # Fins whose angles are not known are still there: they are taken as held at zero.
@@ -465,6 +478,8 @@ class GreyBox(nn.Module):
         described: dict[str, Any] = {SUBNETWORKS: self.damping.describe()}
         if self.damping.region is not None:
             described[REGION] = self.damping.region.to_dict()
+        if self.passive:
+            described[PASSIVE] = True
         return described, self.damping.state_dict()
 
     def save(self, folder: str | Path, *, overwrite: bool = False) -> Path:

@@ -12,7 +12,16 @@ from auvnn.damping.region import Region
 from auvnn.effects import Effect, effect_class
 from auvnn.errors import ConfigError, ModelError
 from auvnn.models.grey_box import GreyBox
-from auvnn.models.saving import MODEL, REGION, STRUCTURE, SUBNETWORKS, UNCERTAINTY, WEIGHTS, reads_again
+from auvnn.models.saving import (
+    MODEL,
+    PASSIVE,
+    REGION,
+    STRUCTURE,
+    SUBNETWORKS,
+    UNCERTAINTY,
+    WEIGHTS,
+    reads_again,
+)
 from auvnn.models.structures import build_structure
 from auvnn.models.structures.base import Structure
 from auvnn.storage import folder_exists, read_folder, tensors_from_bytes
@@ -63,6 +72,7 @@ def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None 
     data: dict[str, Any] = parse_yaml(files[MODEL].decode("utf-8"), str(path / MODEL))
     networks = data.pop(SUBNETWORKS, None)
     region = data.pop(REGION, None)
+    passive = data.pop(PASSIVE, False)
     structure = data.pop(STRUCTURE, None)
     saved_actuation = data.pop("actuation", None)
     vehicle = Vehicle.from_dict(data, where=str(path / MODEL))
@@ -81,6 +91,9 @@ def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None 
             raise ModelError(
                 f"{path / WEIGHTS}: {name} must be positive in each direction: train the model again"
             )
+    if not isinstance(passive, bool):
+        raise ModelError(f"{path / MODEL}: {PASSIVE} is {passive!r}: save the model again")
+    bank.passive = passive
     bank.region = None if region is None else Region.read(region, str(path / MODEL))
     return GreyBox(model.vehicle, model.copied_effects(), bank, model.actuation)
 

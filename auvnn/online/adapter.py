@@ -22,12 +22,14 @@ from auvnn.online.change_words import Change
 from auvnn.online.consistency import Consistency
 from auvnn.online.counts import Counts
 from auvnn.online.guards import REASONS, Guards, build_guards
-from auvnn.online.intake import refusal, sample_of
+from auvnn.online.intake import refusal, sample_of, turned
 from auvnn.online.noise import Gate, NoiseLevel
+from auvnn.online.positions import Positions
 from auvnn.online.residual import Predictor, Residual, Sample
 from auvnn.online.schemes.base import Lesson, OnlineScheme, anchors, build_online_scheme
 from auvnn.online.shadow import Shadow
 from auvnn.online.trial import Trial
+from auvnn.online.trusted import Trusted
 from auvnn.online.weights import Weights
 
 # Scales of subnetworks that an adapter adds itself: of velocity, and of acceleration for the force.
@@ -117,6 +119,11 @@ class Adapter:
         assert bank is not None
         self.weights = Weights(bank, self.scheme.layers)
         self._original = Weights(copy.deepcopy(bank), self.scheme.layers)
+        if self.guards.enabled and self.guards.dissipative:
+            bank.passive = True
+            self._model = GreyBox(
+                self._model.vehicle, self._model.copied_effects(), bank, self._model.actuation
+            )
         self.scheme.start(self.weights, known_drag(self._model, anchors(self.weights)) / bank.output_scale)
         self._predictor = Predictor(self._model)
         self._noise = NoiseLevel(self.guards.noise_floor)
@@ -126,6 +133,8 @@ class Adapter:
         self._trial = Trial(self.weights, self.guards.proof if self.guards.enabled else 0.0)
         self._bounds = Bounds(self.weights, self.guards)
         self._consistency = Consistency()
+        self._positions = Positions()
+        self._trusted = Trusted(self.weights.read(), self.scheme.state())
         self._monitor = Monitor(self._unadapted(), bank.output_scale) if watch else None
         self._held: list[tuple[Sample, Tensor, Tensor]] = []
         self._off_until = -float("inf")
@@ -185,6 +194,8 @@ class Adapter:
         """Begin another run, whose time may start again: nothing is compared across the gap; weights stay."""
         self._predictor.forget_all()
         self._consistency.forget()
+        self._positions.forget()
+        self._trusted.restart()
         self._gate.clear()
         self._held, self._resting, self._off_until = [], 0, -float("inf")
         if self._shadow.since is not None:
@@ -243,6 +254,9 @@ class Adapter:
         if sample is None:
             # The next sample is compared across the hole, unless it is longer than `max_gap`.
             return self._no(float("nan"), "not_finite")
+        sample = turned(sample)
+        if sample is None:
+            return self._no(float("nan"), "no_rotation")
         last = self._predictor.last
         why = refusal(sample, last, self.guards, now)
         if why is not None:
@@ -254,7 +268,9 @@ class Adapter:
         if not fault and self._passed_over(sample):
             self._predictor.skip(sample)
             return self._no(sample.t, "at_rest")
-        if fault:
+        if self.guards.enabled and self._lost(last, sample):
+            self._off_until, self._off_cause = sample.t + self.guards.hold, "positions_disagree"
+        elif fault:
             self._off_until, self._off_cause = sample.t + self.guards.hold, "fault_flagged"
         elif self.guards.enabled and self._consistency.faulty(last, sample):
             self._off_until, self._off_cause = sample.t + self.guards.hold, "inconsistent"
@@ -265,6 +281,22 @@ class Adapter:
         if found is None:
             return self._no(sample.t, "first")
         return self._learn(found, sample, dt)
+
+    def _lost(self, last: Sample | None, sample: Sample) -> bool:
+        """Whether positions contradict the velocity; what was learned while that began to show is taken back."""
+        before = self._positions.wrong
+        now = self._positions.disagree(last, sample)
+        if now and not before:
+            weights, scheme = self._trusted.back()
+            if not torch.equal(weights, self.weights.read()):
+                self.counts.reverted += 1
+            self.weights.write(weights)
+            self.scheme.load(scheme)
+            self._shadow.close(weights, scheme)
+            self._trial.begin(self.weights)
+        elif not now and sample.t >= self._off_until and self._trusted.due(sample.t):
+            self._trusted.keep(sample.t, self.weights.read(), self.scheme.state())
+        return now
 
     def _passed_over(self, sample: Sample) -> bool:
         """Whether this is one of the many samples at rest that are not looked at, ever rarer as rest goes on."""
@@ -284,9 +316,10 @@ class Adapter:
         bank, guards = self.weights.bank, self.guards
         value, slope = self.weights.jacobian(found.nu)
         error = found.error / bank.output_scale
-        target = value + error
+        target = self.weights.limited(found.nu) + error
+        error = target - value
         inertia = self._predictor.inertia(found.sample)
-        original = target - self._original.value(found.nu)
+        original = target - self._original.limited(found.nu)
         told: dict[str, Any] = {
             "residual": found.error,
             "prediction_error": found.acceleration,
