@@ -115,9 +115,8 @@ def _scale(t: Array, x: Array, way: Array) -> tuple[float, float]:
     """Return g of x = x0 + c t + g way over all axes, and its standard error for noise with a memory."""
     if len(t) < 4 * FEWEST or not x.shape[1]:
         return 1.0, np.inf
-    basis = np.stack([np.ones_like(t), t - t.mean()], axis=1)
-    rest = np.eye(len(t)) - basis @ np.linalg.pinv(basis)
-    x, way = rest @ x, rest @ way
+    time = (t - t.mean())[:, None]
+    x, way = (v - v.mean(0) - time * ((time * v).sum(0) / (time * time).sum()) for v in (x, way))
     square = float((way * way).sum())
     if square <= 0.0:
         return 1.0, np.inf
