@@ -98,7 +98,7 @@ def fleet(
         workers: processes.
         executor: who computes: `serial`, `processes`, `ray` or `dask`.
         address: of a Ray or Dask cluster that is running.
-        force: fit dives that contradict themselves, too.
+        force: fit dives that contradict themselves, or in which nothing moves or is driven, too.
         progress: told in words what is being done.
 
     Raises:

@@ -28,6 +28,8 @@ SPANS = (1.0, 3.0, 10.0)  # s
 SURE = 6.0  # standard deviations of D
 # Mean velocity (m/s) and share of the way by which both may differ without a fault: levers, scales, alignment.
 ALLOWED, SHARE = 0.05, 0.25
+# A step beyond this many times the usual one, and m, is a position set anew: the ways begin again behind it.
+ANEW, LEAST = 10.0, 0.2
 # Scale of the velocity against the positions that is never held against it, and what confirms it.
 SCALE, CLOSE = 0.3, 0.15
 # The way is confirmed when it is this many times longer than what D leaves open.
@@ -70,15 +72,18 @@ class Positions:
         old = sample.t - self._nodes[:, 0]
         recent = np.arange(len(old), 0, -1) <= RARE
         self._nodes = self._nodes[(old <= SPANS[-1] + 0.5) | (recent & (old <= LONGEST))]
-        self._judge()
+        gaps = np.diff(self._nodes[:, 1:4] - self._nodes[:, 4:7], axis=0)
+        if len(gaps) > FEWEST and (np.abs(gaps[-1]) > ANEW * np.median(np.abs(gaps), axis=0) + LEAST).any():
+            self._nodes = self._nodes[-1:]
+        else:
+            self._judge(gaps)
         return self.wrong
 
-    def _judge(self) -> None:
+    def _judge(self, gaps: Array) -> None:
         nodes = self._nodes
         if len(nodes) < FEWEST + 2:
             return
         there = (nodes[:, 1:4] != 0.0).all(0)
-        gaps = np.diff(nodes[:, 1:4] - nodes[:, 4:7], axis=0)
         noise = np.sqrt(2.0) * TO_STD * np.median(np.abs(np.diff(gaps, axis=0)), axis=0)
         steps = np.diff(self._steps[:, 1:], n=2, axis=0)
         jitter = TO_STD * float(np.median(np.abs(steps))) if len(steps) > FEWEST else 0.0

@@ -61,9 +61,9 @@ def long():
 
 
 @pytest.mark.parametrize("every", [1, 10])
-@pytest.mark.parametrize("noise", [0.0, 0.02, 0.1])
+@pytest.mark.parametrize("noise", [0.02, 0.1])
 def test_true_velocities_pass_and_false_ones_do_not(long, every, noise):
-    """Positions with every sample and once a second (held between), from exact to 10 cm of noise."""
+    """Positions with every sample and once a second (held between), of 2 and 10 cm of noise."""
     fixes = long.position + noise * np.random.default_rng(2).standard_normal(long.position.shape)
     fixes = fixes[np.arange(long.samples) // every * every]
     for factor in (0.9, 1.1):
@@ -75,11 +75,11 @@ def test_true_velocities_pass_and_false_ones_do_not(long, every, noise):
             assert wrong[300:].mean() > 0.95
 
 
-def test_a_position_set_anew_rests_adaptation_until_the_way_confirms_it(long):
+def test_a_position_set_anew_is_no_fault_of_the_velocity(long):
     fixes = np.array(long.position)
     fixes[300:] += [8.0, -3.0, 0.0]
-    wrong = judged(long, fixes)
-    assert not wrong[:300].any() and wrong[300] and not wrong[450:].any()
+    assert not judged(long, fixes).any()
+    assert judged(long, fixes, 3.0)[:300].any() and judged(long, fixes, 3.0)[450:].all()
 
 
 def test_depth_alone_is_judged_by_the_depth_alone(long):
