@@ -21,12 +21,13 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from auvnn.answers import write_text
-from auvnn.cli.compose import Composer, mended, quoted
+from auvnn.cli.compose import Composer
 from auvnn.cli.faults import OK, outcome
 from auvnn.cli.folder import created, locked, refuse_taken, written
 from auvnn.cli.foreign import read_configs, write_configs
 from auvnn.cli.job import Job, Verb, files
 from auvnn.cli.speech import Speaker, complain
+from auvnn.cli.suggestions import mended, quoted
 from auvnn.cli.sweep import jobs_of, note, run_jobs, statuses
 from auvnn.cli.words import Words
 from auvnn.cli.working import WORK, refuse_links, take_away

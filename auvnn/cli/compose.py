@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -17,36 +17,14 @@ from omegaconf.errors import OmegaConfBaseException
 
 from auvnn.catalogue import unknown_name
 from auvnn.cli.foreign import judge_hydra
+from auvnn.cli.suggestions import _first, _heads, _leaves, _paths, _wrong_kind, quoted, resolver_in
 from auvnn.config import config_dir
 from auvnn.errors import ConfigError, one_line
 
-_KEYED = re.compile(r"([A-Za-z_][\w./@]*)=(.*)", re.DOTALL)
 # Hydra's own parts are objects named in its configuration; nobody else's may be.
 _CODE_KEYS = {"_target_", "_args_", "_partial_", "()", "class"}
 _RESERVED = ("hydra.mode", "hydra.searchpath", "hydra.output_subdir", "hydra.run.dir", "hydra.sweep.dir")
 _HYDRAS_OWN = ("hydra._internal.core_plugins.", "hydra_plugins.")
-
-
-def mended(word: str) -> str:
-    """Quote a value that Hydra's grammar cannot take as it stands, such as a path with brackets in it."""
-    match = _KEYED.fullmatch(word)
-    if match is None or match[2][:1] in ("'", '"', "{"):
-        return word
-    try:
-        OverridesParser.create().parse_override(word)
-    except (HydraException, RecursionError):
-        plain_list = re.fullmatch(r"\[([^\[\]{}'\"]*)\]", match[2])
-        if plain_list:
-            return f"{match[1]}=[{','.join(quoted(item.strip()) for item in plain_list[1].split(','))}]"
-        return word if match[2].startswith("[") else f"{match[1]}={quoted(match[2])}"
-    return word
-
-
-def quoted(value: object) -> str:
-    """Return a text as Hydra's grammar takes it, whatever stands in it."""
-    # Backslashes stand for themselves unless a quote follows, as in Hydra's grammar.
-    escaped = re.sub(r"(\\*)('|$)", lambda m: m[1] * 2 + ("\\'" if m[2] else ""), str(value))
-    return f"'{escaped}'"
 
 
 @lru_cache(maxsize=64)
@@ -241,64 +219,3 @@ class Composer:
             if problem:
                 raise ConfigError(f"{key}={value}: {problem}")
         return options
-
-
-def _wrong_kind(value: Any, default: Any) -> str | None:
-    if isinstance(default, bool):
-        return None if isinstance(value, bool) else "true or false is needed"
-    if isinstance(default, int):
-        good = isinstance(value, int) and not isinstance(value, bool)
-        return None if good else "a whole number is needed"
-    if isinstance(default, float):
-        good = isinstance(value, (int, float)) and not isinstance(value, bool)
-        return None if good else "a number is needed"
-    if isinstance(default, str):
-        return None if isinstance(value, str) else f"a word is needed, such as {default}"
-    return None
-
-
-def resolver_in(text: str) -> str | None:
-    """Return the name of a resolver in a text, `oc.env` of `${oc.env:HOME}`; None where there is none.
-
-    A name may itself be put together, as in `${oc.${x}:HOME}`: what stands inside is taken out first.
-    """
-    while True:
-        match = re.search(r"\$\{\s*([\w.\s]*):", text)
-        if match:
-            return match[1].strip()
-        inner = re.sub(r"\$\{[^{}:]*\}", "x", text)
-        if inner == text:
-            return None
-        text = inner
-
-
-def _first(override: Override) -> str:
-    if override.is_sweep_override():
-        return f"{override.get_key_element()}={next(iter(override.sweep_string_iterator()))}"
-    return str(override.input_line)
-
-
-def _heads(key: str) -> Iterator[str]:
-    parts = key.split(".")
-    return (".".join(parts[: n + 1]) for n in range(len(parts)))
-
-
-def _paths(config: DictConfig, head: str = "") -> Iterator[str]:
-    for key in config:
-        path = f"{head}{key}"
-        yield path
-        if path == "hydra" or OmegaConf.is_missing(config, str(key)):
-            continue
-        if isinstance(config[key], DictConfig):
-            yield from _paths(config[key], f"{path}.")
-
-
-def _leaves(data: Any, path: tuple[str, ...] = ()) -> Iterable[tuple[tuple[str, ...], Any]]:
-    if isinstance(data, dict):
-        for key, value in data.items():
-            yield from _leaves(value, (*path, str(key)))
-    elif isinstance(data, list):
-        for value in data:
-            yield from _leaves(value, path)
-    elif path:
-        yield path, data

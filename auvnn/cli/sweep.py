@@ -17,9 +17,9 @@ from hydra._internal.core_plugins.basic_sweeper import BasicSweeper
 from hydra.core.override_parser.overrides_parser import OverridesParser
 
 from auvnn.answers import write_text
-from auvnn.cli.compose import quoted
 from auvnn.cli.faults import BAD_INPUT, FAULT
 from auvnn.cli.speech import complain
+from auvnn.cli.suggestions import quoted
 from auvnn.cli.working import WORK, refuse_links, take_away
 from auvnn.errors import ConfigError
 from auvnn.executors.safe_path import environment, python

@@ -12,44 +12,25 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from auvnn.diagnosis.diagnose import diagnose
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
-from auvnn.diagnosis.left_out import gain
-from auvnn.errors import AuvnnError, ConfigError
+from auvnn.errors import ConfigError
 from auvnn.improvement import learned
-from auvnn.improvement.answer import CAUSE, LEARNED, PREDICTS, REFITTED, Improved, Step
+from auvnn.improvement.answer import LEARNED, PREDICTS, REFITTED, Improved
 from auvnn.improvement.budget import budget
-from auvnn.improvement.excerpt import liveliest
-from auvnn.improvement.judge import Judge
+from auvnn.improvement.causes import Causes
 from auvnn.improvement.screen import PROMISE, Promise, promises, wanted
 from auvnn.improvement.state import (
-    Recipe,
     State,
-    as_given,
     fitted,
-    fitted_one_step,
-    laid_out,
-    parameters,
-    starting,
 )
+from auvnn.improvement.trials import FAILURES
 from auvnn.logs import Log
 from auvnn.logs.leakage import leakage
-from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
 from auvnn.threads import on_one_thread
 
-# Numerical failures of one step: the step is told and left out, the loop goes on.
-FAILURES = (FloatingPointError, np.linalg.LinAlgError, RuntimeError, ValueError, ArithmeticError, AuvnnError)
 # Names that are fitted in one round of the search by prediction; how many of them may fail before it ends.
 FITTED = 3
-# A diagnosis sees at most so many seconds of a log.
-DIAGNOSED = 300.0
-# Share of the time after which a diagnosis is broken off: prediction shall have its turn.
-PATIENCE = 0.3
-# Rounds of diagnosis at most.
-ROUNDS = 3
 
 
 @on_one_thread
@@ -114,11 +95,7 @@ def improve(
     return walk.end(test, held_out)
 
 
-class _TooLong(Exception):
-    """The time for a diagnosis is up."""
-
-
-class Walk:
+class Walk(Causes):
     """One walk around the loop.
 
     Attributes:
@@ -128,204 +105,6 @@ class Walk:
         story: what was done and found.
         adequate: the diagnosis found nothing (more) that is missing.
     """
-
-    def __init__(
-        self,
-        model: GreyBox,
-        log: Log,
-        derivative: dict[str, Any] | None,
-        effects: Sequence[str] | None,
-        max_effects: int,
-        seconds: float,
-        progress: Callable[[str], None] | None,
-        tell: Callable[[str], None] | None,
-    ) -> None:
-        """Cut the log and look at the model as given."""
-        self.began, self.limit = time.monotonic(), seconds
-        self.say, self.tell = progress or (lambda words: None), tell or (lambda words: None)
-        self.model, self.log = model, log
-        self.how = choose_derivative(log, derivative)
-        self.judge = Judge.of(log, model.actuation)
-        self.state = as_given(model, self.judge)
-        self.effects, self.max_effects = effects, max_effects
-        self.steps: list[Step] = []
-        self.tried: list[Step] = []
-        self.story: list[str] = []
-        self.warnings: list[str] = [*model.vehicle.warnings, *log.quality().reservations]
-        self.diagnoses: list[dict[str, Any]] = []
-        self.adequate = False
-        self.stopped = "nothing more pays on what was left out"
-        # The fit that others begin from: the refitted coefficients, whether they paid by themselves or not.
-        self.ground: State | None = None
-
-    def told(self, words: str) -> None:
-        """Add a sentence to the story."""
-        self.story.append(words)
-        self.tell(words)
-
-    def late(self) -> bool:
-        """Whether the time is up."""
-        if time.monotonic() - self.began <= self.limit:
-            return False
-        self.stopped = f"the time was up (seconds={self.limit:g})"
-        return True
-
-    def check(self) -> None:
-        """Say what the quality of the log is."""
-        findings = self.log.quality().to_dict()["findings"]
-        bad = [f for f in findings if f["level"] in ("error", "warning")]
-        words = "; ".join(f"{f['where']}: {f['what']}" for f in bad[:3])
-        more = f", and {len(bad) - 3} more (auvnn check shows them)" if len(bad) > 3 else ""
-        self.told(f"Check: {words}{more}." if bad else "Check: nothing to complain of.")
-
-    def compare(self) -> None:
-        """Say where the model as given stands beside the plain regression and persistence."""
-        self.say("running the model as given, and a plain regression beside it")
-        self.regression = self.judge.regression(self.how)
-        given = self.state.left
-        self.told(
-            f"Compare: over {self.judge.horizon} s of free running the model as given errs by {given.total:.3f} of the "
-            f"motion's spread, a plain regression by {self.regression.total:.3f} ({self.judge.folds.words}), holding the "
-            f"initial velocity by {given.persistence:.3f}."
-        )
-
-    def refit(self) -> None:
-        """Refit the coefficients, by every objective, and keep the one that foresees best what was left out."""
-        found: list[State] = []
-        one_step = self._try(
-            lambda: fitted_one_step(self.model, self.judge, Recipe(objective="one_step"), self.how),
-            "refitting the coefficients one step ahead",
-        )
-        found += [one_step] if one_step else []
-        longest = float(self.judge.horizon)
-        for seconds in dict.fromkeys((longest, min(2.0, longest))):
-            state = self._try(
-                lambda seconds=seconds: fitted(
-                    self.model, self.judge, Recipe(seconds=seconds), one_step, start=self._start(one_step)
-                ),
-                f"refitting the coefficients by free running over {seconds:g} s",
-            )
-            found += [state] if state else []
-        if not found:
-            self.told("Refit: no fit of the coefficients settled; they stay as stated.")
-            return
-        best = min(found, key=lambda s: s.left.total)
-        by_rollout = [s for s in found if s.recipe.objective == "rollout"]
-        self.ground = min(by_rollout, key=lambda s: s.left.total) if by_rollout else None
-        for state in found:
-            if state is not best:
-                self._note(state, REFITTED, REFITTED, False, f"{best.recipe.words()} foresees more")
-        self._take(best, REFITTED, REFITTED, "its stated uncertainties")
-
-    def _start(self, state: State | None) -> np.ndarray | None:
-        """Return the fit one step ahead as a place to begin from, or None where running free it is no better."""
-        if state is None or state.left.total >= self.state.left.total:
-            return None
-        layout, names, held = laid_out(self.model, Recipe())
-        return starting(layout, names, held, state, probes=False)
-
-    def diagnose(self) -> None:
-        """Ask which causes are missing, and add those that pay, until none is named or none pays."""
-        part = liveliest(self.log, DIAGNOSED)
-        if part is not self.log:
-            self.told(
-                f"Diagnose: on the liveliest {part.duration:.0f} s of the log's {self.log.duration:.0f} s."
-            )
-        for number in range(ROUNDS):
-            if self.late() or self._full():
-                return
-            self.say(f"diagnosing what is missing ({number + 1})")
-            patience = max(self.limit * PATIENCE - (time.monotonic() - self.began), 0.0)
-            asked = (
-                None
-                if self.effects is None
-                else [n for n in self.effects if n not in self.state.model.effect_names]
-            )
-            if asked is not None and not asked:
-                return
-            try:
-                found = diagnose(
-                    self.state.model,
-                    part,
-                    asked,
-                    force=True,
-                    advice=False,
-                    whiteness=False,
-                    costs=False,
-                    progress=self._until(time.monotonic() + patience),
-                )
-            except _TooLong:
-                self.told(
-                    f"Diagnose: broken off, it took too long (seconds={self.limit:g} for everything): no cause is named "
-                    "in this round."
-                )
-                return
-            except FAILURES as problem:
-                self._failed("the diagnosis", problem)
-                return
-            last = found.steps[-1]["verdict"] if found.steps else found.verdict
-            self.diagnoses.append(
-                {
-                    "verdict": found.verdict,
-                    "missing": found.missing,
-                    "nearest": found.nearest,
-                    "story": found.story,
-                }
-            )
-            self.told(f"Diagnose: {' '.join(found.story)}")
-            if found.verdict == "adequate":
-                self.adequate = True
-                return
-            pays = False
-            groups = [[n] for n in found.missing] if found.verdict == "named" else [list(found.missing)]
-            for group in [g for g in groups if g]:
-                pays |= self._add_best(
-                    group, CAUSE, "named by the diagnosis", rivals=found.verdict != "named"
-                )
-            if not pays:
-                return
-            if found.verdict == "named" and last == "adequate":
-                self.adequate = True
-                return
-
-    def _until(self, end: float) -> Callable[[str], None]:
-        """Return who tells what is being done, and breaks it off after a time."""
-
-        def say(words: str) -> None:
-            if time.monotonic() > end:
-                raise _TooLong
-            self.say(words)
-
-        return say
-
-    def _add_best(self, group: Sequence[str], kind: str, reason: str, *, rivals: bool = False) -> bool:
-        """Fit each of a group, take the one that foresees best if it pays, and say so."""
-        found = []
-        for name in group:
-            if (
-                name in self.state.recipe.effects
-                or name in self.model.effect_names
-                or self._full()
-                or self.late()
-            ):
-                continue
-            recipe = self._recipe(name)
-            state = self._try(
-                lambda recipe=recipe: fitted(self.model, self.judge, recipe, self._before()),
-                f"fitting {name}",
-            )
-            if state is not None:
-                found.append((name, state))
-        if not found:
-            return False
-        name, best = min(found, key=lambda item: item[1].left.total)
-        others = ", ".join(n for n in group if n != name)
-        for other, state in found:
-            if other != name:
-                self._note(state, other, kind, False, f"{name} foresees more")
-        return self._take(
-            best, name, kind, f"{reason}, one of a tie with {others}" if rivals and others else reason
-        )
 
     def predict(self) -> None:
         """Look for names that foresee better, whatever they stand for, until none pays."""
@@ -477,57 +256,6 @@ class Walk:
     @property
     def _given_error(self) -> float:
         return self.steps[0].before if self.steps else self.state.left.total
-
-    def _full(self) -> bool:
-        named = [s for s in self.steps if s.kind in (CAUSE, PREDICTS)]
-        return len(named) >= self.max_effects
-
-    def _recipe(self, name: str) -> Recipe:
-        begin = self._before()
-        recipe = Recipe() if begin is None else begin.recipe
-        return replace(recipe, effects=(*self.state.recipe.effects, name), objective="rollout")
-
-    def _before(self) -> State | None:
-        """Return the fit from which the next begins: the last accepted one, if it was fitted by free running."""
-        return self.state if self.state.fit is not None else self.ground
-
-    def _try(self, make: Callable[[], State], words: str) -> State | None:
-        """Make a state; a fit that fails is told and left out."""
-        self.say(words)
-        try:
-            state = make()
-        except FAILURES as problem:
-            self._failed(words, problem)
-            return None
-        return state if np.isfinite(state.left.total) else None
-
-    def _failed(self, words: str, problem: Exception) -> None:
-        self.warnings.append(
-            f"{words} failed and was left out: {type(problem).__name__}: {str(problem)[:200]}"
-        )
-
-    def _note(self, state: State, step: str, kind: str, accepted: bool, reason: str) -> Step:
-        won = gain(self.state.left, state.left)
-        found = Step(
-            step, kind, accepted, {**won.to_dict()}, won.before, won.after, state.recipe.words(),
-            parameters(state), reason, state.model if accepted else None, learned.used(state) if accepted else {},
-        )  # fmt: skip
-        (self.steps if accepted else self.tried).append(found)
-        return found
-
-    def _take(self, state: State, step: str, kind: str, reason: str) -> bool:
-        """Accept a step if it pays on what was left out, and say so."""
-        won = gain(self.state.left, state.left)
-        pays = won.beyond(1.0)
-        words = f"{won.before:.3f} -> {won.after:.3f} on what was left out (fall {won.value:.3f} +- {won.std:.3f})"
-        if pays:
-            self._note(state, step, kind, True, reason)
-            self.state = state
-            self.told(f"Taken: {step} ({kind}; {reason}): {words}.")
-        else:
-            self._note(state, step, kind, False, "does not pay on what was left out")
-            self.told(f"Not taken: {step} ({kind}): {words}.")
-        return pays
 
 
 __all__ = ["Improved", "improve"]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.fitters import newton
 from auvnn.diagnosis.hypotheses.bake import holding
 from auvnn.diagnosis.hypotheses.layout import Layout, lay_out, priors, scales
-from auvnn.diagnosis.left_out import LeftOut
+from auvnn.diagnosis.left_out_errors import LeftOut
 from auvnn.diagnosis.one_step.fit import fit_hypothesis_one_step
 from auvnn.effects import Effect
 from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters

@@ -1,6 +1,7 @@
 """Physics, damping and effects as one `nn.Module`, its free running, and its files."""
 
-from auvnn.models.grey_box import GreyBox, Prepared
+from auvnn.models.equations_of_motion import Prepared
+from auvnn.models.grey_box import GreyBox
 from auvnn.models.inputs import Inputs
 from auvnn.models.loading import from_vehicle, load, remove
 from auvnn.models.rollout import rollout

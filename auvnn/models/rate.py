@@ -12,7 +12,8 @@ from auvnn.physics.attitude import quat_derivative, quat_normalize, quat_to_matr
 from auvnn.physics.products import matvec
 
 if TYPE_CHECKING:
-    from auvnn.models.grey_box import GreyBox, Prepared
+    from auvnn.models.equations_of_motion import Prepared
+    from auvnn.models.grey_box import GreyBox
 
 SIZE = 13
 """Size of the state: position, quaternion, velocity."""

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from auvnn.models import GreyBox, Inputs
-from auvnn.models.grey_box import DRAG_TERMS
+from auvnn.models.equations_of_motion import DRAG_TERMS
 from auvnn.online.guards import Guards
 from auvnn.online.weights import Weights
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.models import GreyBox
+from auvnn.online.blocks import ITEMS, _blocks, _joined, _Open
 from auvnn.online.change_words import Change, _words
 from auvnn.online.evidence import Block, Fit, fit, gains
 from auvnn.online.noise import NoiseLevel
@@ -43,17 +43,7 @@ EXPLAINED = 0.7
 AROUND = 3  # blocks by which the moment may still be moved
 SETTLE = 10.0  # s over which the kind may still be revised
 MOST_CHANGES = 100
-ITEMS = ("start", "count", "hessian", "slope", "square", "total", "reach")
 UNDETERMINED = 0.5  # of the plausible size: what is not known better than this is not given
-
-
-@dataclass
-class _Open:
-    """A change that is still being judged."""
-
-    before: list[Block]
-    found: Change
-    blocks: list[Block]
 
 
 class Monitor:
@@ -288,15 +278,3 @@ class Monitor:
     def pending(self) -> list[Sample]:
         """The samples of the block that is being filled."""
         return [sample for sample, _, _ in self._pending]
-
-
-def _blocks(tensors: Mapping[str, Tensor], name: str) -> list[Block]:
-    items = [tensors[f"{name}.{i}"].numpy() for i in ITEMS]
-    return [
-        Block(float(start), float(count), *(m.copy() for m in more))
-        for start, count, *more in zip(*items, strict=True)
-    ]
-
-
-def _joined(columns: list[Columns]) -> NDArray[np.int64]:
-    return np.concatenate([np.arange(c.columns.start, c.columns.stop) for c in columns])

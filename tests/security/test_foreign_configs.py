@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from auvnn.cli.compose import resolver_in
 from auvnn.cli.foreign import is_plain_parameter, read_configs
+from auvnn.cli.suggestions import resolver_in
 
 GLOBAL = "# @package _global_\n"
 SIMULATE = [
