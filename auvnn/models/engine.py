@@ -19,13 +19,13 @@ from torch import Tensor, nn
 from auvnn.compiled.program import Numbers
 from auvnn.compiled.recorder import CannotCompile
 from auvnn.errors import ConfigError
+from auvnn.models.free_running.rate import SIZE
+from auvnn.models.free_running.tableaus import TABLEAUS
 from auvnn.models.inputs import Inputs
 from auvnn.models.model_kernels import _KERNELS, _made, _ready, _require_plain, _RightHandSide
-from auvnn.models.rate import SIZE
-from auvnn.models.tableaus import TABLEAUS
 
 if TYPE_CHECKING:
-    from auvnn.models.actuators import Drive
+    from auvnn.models.actuation.actuators import Drive
     from auvnn.models.grey_box import GreyBox
 
 ENGINES = ("auto", "torch", "compiled", "firm")

@@ -10,7 +10,7 @@ from torch import Tensor, nn
 
 from auvnn.effects import Body, Effect, Moment, Sensed
 from auvnn.errors import ConfigError
-from auvnn.models.actuators import Actuators
+from auvnn.models.actuation.actuators import Actuators
 from auvnn.models.inputs import Inputs
 from auvnn.physics.attitude import quat_to_matrix
 from auvnn.physics.coriolis import coriolis_force

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from auvnn.effects import HOOKS, Effect, effect_class
 from auvnn.errors import ConfigError
-from auvnn.models.actuators import Actuators
+from auvnn.models.actuation.actuators import Actuators
 from auvnn.models.equations_of_motion import EquationsOfMotion
 from auvnn.models.inputs import Inputs
 from auvnn.models.saving import REGION, SUBNETWORKS, save
@@ -24,8 +24,8 @@ from auvnn.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from auvnn.damping.bank import DampingBank
-    from auvnn.models.linearise import Linearisation
-    from auvnn.models.trajectory import Trajectory
+    from auvnn.models.free_running.trajectory import Trajectory
+    from auvnn.models.linear.linearise import Linearisation
 
 
 def _tensor(value: Any) -> Tensor:
@@ -206,22 +206,22 @@ class GreyBox(EquationsOfMotion):
     def rollout(
         self, eta0: Tensor, nu0: Tensor, commands: Tensor | Inputs, times: Tensor, **options: Any
     ) -> Trajectory:
-        """Run free from a state: see `auvnn.models.rollout.rollout`."""
-        from auvnn.models.rollout import rollout
+        """Run free from a state: see `auvnn.models.free_running.rollout.rollout`."""
+        from auvnn.models.free_running.rollout import rollout
 
         return rollout(self, eta0, nu0, commands, times, **options)
 
     def linearise(
         self, state: Tensor, command: Tensor, dt: float | None = None, **given: Any
     ) -> Linearisation:
-        """Return A and B at a state, with the actuators' states: see `auvnn.models.linearise.linearise`."""
-        from auvnn.models.linearise import linearise
+        """Return A and B at a state, with the actuators' states: see `auvnn.models.linear.linearise.linearise`."""
+        from auvnn.models.linear.linearise import linearise
 
         return linearise(self, state, command, dt, **given)
 
     def discrete_step(self, state: Tensor, command: Tensor, dt: float, **given: Any) -> Tensor:
-        """Return the state after one step: see `auvnn.models.linearise.discrete_step`."""
-        from auvnn.models.linearise import discrete_step
+        """Return the state after one step: see `auvnn.models.linear.linearise.discrete_step`."""
+        from auvnn.models.linear.linearise import discrete_step
 
         return discrete_step(self, state, command, dt, **given)
 

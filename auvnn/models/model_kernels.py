@@ -16,9 +16,9 @@ from auvnn.compiled.kernel import Kernel
 from auvnn.compiled.program import Layout, Numbers, Program, trace, trace_plain
 from auvnn.compiled.recorder import CannotCompile
 from auvnn.compiled.source import write
+from auvnn.models.free_running.rate import SIZE, state_rate, unit_attitude
 from auvnn.models.identity import Identity, has_hooks
 from auvnn.models.inputs import Inputs
-from auvnn.models.rate import SIZE, state_rate, unit_attitude
 
 if TYPE_CHECKING:
     from auvnn.models.grey_box import GreyBox

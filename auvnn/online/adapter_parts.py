@@ -13,18 +13,18 @@ from torch import Tensor
 from auvnn.damping.bank import DampingBank, Description
 from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
-from auvnn.online.bounds import Bounds, known_drag
-from auvnn.online.change import Monitor
-from auvnn.online.change_words import Change
+from auvnn.online.change_detection.change import Monitor
+from auvnn.online.change_detection.change_words import Change
 from auvnn.online.consistency import Consistency
 from auvnn.online.counts import Counts
 from auvnn.online.guards import Guards, build_guards
 from auvnn.online.noise import Gate, NoiseLevel
 from auvnn.online.residual import Predictor, Sample
 from auvnn.online.schemes.base import OnlineScheme, anchors, build_online_scheme
-from auvnn.online.shadow import Shadow
-from auvnn.online.trial import Trial
-from auvnn.online.weights import Weights
+from auvnn.online.updates.bounds import Bounds, known_drag
+from auvnn.online.updates.shadow import Shadow
+from auvnn.online.updates.trial import Trial
+from auvnn.online.updates.weights import Weights
 
 # Scales of subnetworks that an adapter adds itself: of velocity, and of acceleration for the force.
 SPEED = 0.3

@@ -18,7 +18,7 @@ from auvnn.docs import FOLDER, page, page_names
 from auvnn.effects import EFFECTS
 from auvnn.effects.describe import describe_all
 from auvnn.errors import ConfigError
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.online.adapter_parts import with_subnetworks
 from auvnn.vehicle import Vehicle
 

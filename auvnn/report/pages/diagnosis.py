@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
-from auvnn.report.pages.diagnosis_words import (
+from auvnn.report.pages.sections.diagnosis_words import (
     _best_of_the_rest,
     _candidate_words,
     _candidates,
