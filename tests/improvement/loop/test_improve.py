@@ -102,7 +102,7 @@ def test_a_diagnosis_that_fails_is_told_and_the_loop_goes_on(model, logs, monkey
     def fails(*_, **__):
         raise np.linalg.LinAlgError("SVD did not converge")
 
-    monkeypatch.setattr("auvnn.improvement.loop.improve.diagnose", fails)
+    monkeypatch.setattr("auvnn.improvement.loop.causes.diagnose", fails)
     found = auvnn.improve(model, logs[0], test=logs[1], effects=["net_buoyancy"], learn=())
     assert any("SVD did not converge" in w for w in found.warnings)
     assert "net_buoyancy" in [s.step for s in found.steps]
