@@ -69,7 +69,13 @@ def load(source: str | Path, actuation: str | None = None) -> GreyBox:
 def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None = None) -> GreyBox:
     """Return the model that the files of a folder describe; see `contents`."""
     # Parsed from the bytes whose hash was checked, not from the file, which may have changed since.
-    data: dict[str, Any] = parse_yaml(files[MODEL].decode("utf-8"), str(path / MODEL))
+    try:
+        text = files[MODEL].decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise ModelError(
+            f"{path / MODEL}: is not UTF-8 text (byte {error.start}): save the model again"
+        ) from None
+    data: dict[str, Any] = parse_yaml(text, str(path / MODEL))
     networks = data.pop(SUBNETWORKS, None)
     region = data.pop(REGION, None)
     passive = data.pop(PASSIVE, False)
