@@ -7,7 +7,8 @@ from torch import Tensor
 
 # By this much more than what is missing is taken, so that rounding never leaves a push.
 BEYOND = 1e-9
-SMALLEST = 1e-200
+# Small beside any motion, and still a number in single precision, in which some exports hold constants.
+SMALLEST = 1e-30
 
 
 def passive(learned: Tensor, known: Tensor, nu: Tensor, weight: Tensor) -> Tensor:
@@ -32,4 +33,4 @@ def passive(learned: Tensor, known: Tensor, nu: Tensor, weight: Tensor) -> Tenso
     missing = torch.clamp(torch.clamp(stated, max=0.0) - power, min=0.0)
     way = weight * nu
     size = torch.clamp((nu * way).sum(-1, keepdim=True), min=SMALLEST)
-    return learned + way * (missing * (1.0 + BEYOND) / size)
+    return learned + way * ((missing + BEYOND * missing) / size)

@@ -170,7 +170,7 @@ def soak(seconds: int = 7200, learner: str = "rls", seed: int = 0, watch: bool =
             for k, _, own, speed in sensors.minute(eta.numpy(), nu.numpy()):
                 while len(models) <= k // RATE:
                     models.append(adapter.model)
-                if minute in saves and k == 200 and twin is None:
+                if minute in saves and k >= 200 and twin is None:
                     adapter.save(Path(place) / "state")
                     twin, left = Adapter.restore(Path(place) / "state"), TWINS
                 t = minute * 60.0 + k / RATE

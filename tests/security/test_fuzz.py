@@ -1,4 +1,4 @@
-"""Whatever a stranger writes into a file that auvnn reads: a result or one line; no crash, no hang, no flood of memory."""
+"""Whatever a stranger writes into a file that auvnn reads: a result or one line; no crash, no hang, no flood."""
 
 from __future__ import annotations
 
