@@ -20,7 +20,7 @@ VERBS = {
     "train in parts": ["train", "stream=true"],
     "diagnose": ["diagnose"],
     "diagnose in parts": ["diagnose", "stream=true"],
-    "add": ["add", "effects=quadratic_damping"],
+    "add": ["add", "effect=quadratic_damping"],
     "improve": ["improve"],
     "fleet": ["fleet", "effects=quadratic_damping"],
     "adapt": ["adapt"],
