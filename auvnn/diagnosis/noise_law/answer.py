@@ -13,7 +13,7 @@ import numpy as np
 from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.answers.table import values
 from auvnn.diagnosis.hypotheses.layout import Layout
-from auvnn.diagnosis.noise_law.command_holding import Holding, between, holding
+from auvnn.diagnosis.noise_law.command_holding import Holding, between, holding, squared_error
 from auvnn.diagnosis.noise_law.foretold import foretold
 from auvnn.diagnosis.noise_law.hypothesis import BesideForce
 from auvnn.diagnosis.noise_law.law import ALPHA_BOUNDARY, left
@@ -37,23 +37,19 @@ def beside_what_is_left(found: Diagnosis, under_way: Searched) -> tuple[Diagnosi
         return found, under_way
     asked = under_way.setting
     held = _held(under_way)
-    if held.share > 0.0:
+    if held.odds > 0.0:
         asked.say(f"commands change between samples ({held.name}): searching again")
-        found, under_way = search(asked, between(under_way.state.windows, held.share))
+        found, under_way = search(asked, held.applied(under_way.state.windows))
     found = replace(found, stochastic={"commands": held.to_dict()})
     return _beside_force(found, under_way), under_way
 
 
 def _held(under_way: Searched) -> Holding:
-    """Return how commands go between samples; held where an effect explains more than anything else would."""
-    windows, asked = under_way.state.windows, under_way.setting
-    held = holding(under_way.first, windows)
-    if held.share == 0.0:
-        return held
-    asked.say("asking whether an effect explains more than commands between samples")
-    tested = asked.tests(windows)(under_way.first, asked.usable, list(asked.base), [])
-    most = max(((s.gain - s.degrees) / s.inflation for s in tested.scores.values() if s.degrees), default=0.0)
-    return held if held.gain > most else replace(held, name="held", share=0.0, odds=0.0, gain=0.0)
+    """Return how commands go between samples, by the explanation that leaves least, whatever the search made of it."""
+    state = under_way.state
+    ends = [state.first, *state.tried, state.current]
+    sigma = state.first.fitted.sigma
+    return holding(min(ends, key=lambda e: squared_error(e, sigma)), state.windows)
 
 
 def _beside_force(found: Diagnosis, under_way: Searched) -> Diagnosis:
@@ -62,11 +58,12 @@ def _beside_force(found: Diagnosis, under_way: Searched) -> Diagnosis:
     last = under_way.state.current
     if variance_component_test(last, windows, white(last, floor)).p_value >= ALPHA_BOUNDARY:
         return found
-    beside = ForceSearch(asked.layout, windows, asked.usable, asked.base, floor, asked.say)
+    beside = ForceSearch(asked.layout, windows, asked.usable, asked.base, asked.say)
     null = beside.begin(under_way.first, white(under_way.first, floor))
     if null is None:
         return found
-    result = beside.run(null, [c["effect"] for c in found.candidates], asked.most)
+    alone = [e for e in under_way.state.tried if len(e.effects) == 1]
+    result = beside.run(null, alone, asked.most)
     asked.say("asking how much of the force measured inputs foretell")
     told = foretold(result.last, result.windows)
     if told is not None and told.least > FORETOLD:
