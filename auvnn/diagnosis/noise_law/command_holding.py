@@ -84,7 +84,7 @@ def between(windows: Windows, share: float, *, smooth: bool = False) -> Windows:
 
 
 def cubic_weights(share: float) -> tuple[float, ...]:
-    """Return the weights of the samples -1, 0, 1, 2 in the mean of the cubic through them from share - 1/2 to share + 1/2.
+    """Return the weights of samples -1, 0, 1, 2 in the mean of the cubic through them, share - 1/2 to share + 1/2.
 
     A share of one half is the interval itself: -1/24, 13/24, 13/24, -1/24.
     """
@@ -115,13 +115,15 @@ def holding(first: FittedHypothesis, windows: Windows) -> Holding:
     sums = first.fitted.statistics
     factor = variance_inflation(sums.slope, sums.total, sums.run)
     plain = _cost(first, windows) / factor
-    half = [_cost(first, between(windows, share)) / factor for share in (LINEAR, 1.0)]
-    found = Holding("linear", LINEAR, 0.5 * (plain - half[0]), plain - half[0])
-    ahead = _vertex("ahead", (plain, *half), plain)
+    half, full = (_cost(first, between(windows, share)) / factor for share in (LINEAR, 1.0))
+    found = Holding("linear", LINEAR, 0.5 * (plain - half), plain - half)
+    ahead = _vertex("ahead", (plain, half, full), plain)
     if ahead is not None and ahead.odds > found.odds + PLAINER:
         found = ahead
-    bent = [_cost(first, between(windows, share, smooth=True)) / factor for share in (0.0, LINEAR, 1.0)]
-    smooth = _vertex("smooth", (bent[0], bent[1], bent[2]), plain)
+    low, half, full = (
+        _cost(first, between(windows, share, smooth=True)) / factor for share in (0.0, LINEAR, 1.0)
+    )
+    smooth = _vertex("smooth", (low, half, full), plain)
     if smooth is not None and smooth.odds > found.odds + PLAINER:
         found = smooth
     return found if found.odds > ODDS else held

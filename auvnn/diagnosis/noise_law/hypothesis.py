@@ -65,7 +65,7 @@ class BesideForce:
     """
 
     steps: list[dict[str, Any]]
-    groups: list[list[str]]
+    groups: list[list[FittedHypothesis]]
     last: FittedHypothesis
     windows: Windows
     estimate: Estimate
@@ -73,11 +73,6 @@ class BesideForce:
     p_value: float
     first: FittedHypothesis
     first_law: ForceLaw | None
-
-    @property
-    def names(self) -> list[str]:
-        """Effects that were named or tied, in order."""
-        return [e for s in self.steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"]]
 
 
 def judged(layout: Layout, explanation: FittedHypothesis, sums: ForceSums, law: ForceLaw) -> Hypothesis:

@@ -1,4 +1,4 @@
-"""Names beside a stochastic force: explanations are compared again, each with the law of the force that is likely with it.
+"""Names beside a stochastic force: explanations are compared again, each with the law that is most likely with it.
 
 Where no force is left, nothing here is asked and the answer is that of the search without one. Else the law of the
 force is estimated at the fit without any name. An effect that is absent from the model inflates the variance that then
@@ -11,7 +11,7 @@ Reference: Kristensen, Madsen and Joergensen (2004), Automatica 40(2) 225-237.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -28,9 +28,12 @@ from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.diagnosis.selection.predictive_density import cross_validated_log_density
+from auvnn.diagnosis.stages.state import Setting
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
+from auvnn.estimation.sufficient_statistics import fit_initial_states
 from auvnn.metrics.force_law import ForceLaw, cell_for
+from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
@@ -43,32 +46,30 @@ GAIN, GAIN_FURTHER = 1.0, 2.0
 LEADERS = 3
 # Members of a group that the log cannot tell apart, at most.
 GROUP = 3
+HORIZON = "5"
 STEPS = 6
+# Share of the odds that a further name needs, which its test must promise before it is fitted.
+WORTH_A_FIT = 0.3
+# What the first name and a further one must cost in free running, as shares of the tolerance: both fits are to all of the
+# log, and a force that is always there makes errors that no name takes away. And the share of the gain of all names
+# that a further one must bring.
+FIRST_COST, FURTHER_COST, FURTHER_SHARE = 0.5, 1.0, 0.1
 
 
 class ForceSearch:
     """The search beside a stochastic force, of one log.
 
     Args:
-        layout: stated values.
+        asked: what is asked.
         windows: of the log, without a law.
-        usable: effects that can be asked for.
-        base: effects that are free anyway.
-        say: told in words what is being done.
     """
 
-    def __init__(
-        self,
-        layout: Layout,
-        windows: Windows,
-        usable: Sequence[str],
-        base: Sequence[str],
-        say: Callable[[str], None],
-    ) -> None:
+    def __init__(self, asked: Setting, windows: Windows) -> None:
         """Begin without a law."""
-        self.layout, self.windows, self.usable, self.base = layout, windows, list(usable), list(base)
-        self.say = say
-        self.sigma = np.full(18, np.inf)
+        self.layout, self.windows, self.tolerance = asked.layout, windows, asked.tolerance
+        self.usable, self.base, self.say = list(asked.usable), list(asked.base), asked.say
+        self.log, self.scale = asked.log, scale_of(asked.log)
+        self.sigma = self.weights = np.full(18, np.inf)
         self.cell = CELL
 
     def begin(self, first: FittedHypothesis, sigma: Array) -> Hypothesis | None:
@@ -79,14 +80,17 @@ class ForceSearch:
             sigma: (18,) the sensors' white noise.
         """
         self.say("estimating the law of the force that is left")
-        self.sigma = sigma
+        # Fits without the force weigh errors as the first one did, the force's among them.
+        self.sigma, self.weights = sigma, first.fitted.sigma
         found = estimate(force_sums(first, self.windows, sigma, self.cell))
         if found.law is None:
             return None
         cell = cell_for(found.law.time[found.law.axes])
         if cell < self.cell:
             self.cell = cell
-            found = estimate(force_sums(first, self.windows, sigma, cell), replace(found.law, cell=cell), found.law.axes)
+            found = estimate(
+                force_sums(first, self.windows, sigma, cell), replace(found.law, cell=cell), found.law.axes
+            )
         assert found.law is not None
         return self.judged(first, found.law)
 
@@ -106,13 +110,13 @@ class ForceSearch:
         """
         current, chosen = null, []
         steps: list[dict[str, Any]] = []
-        groups: list[list[str]] = []
+        groups: list[list[FittedHypothesis]] = []
         tried: list[Hypothesis] = []
         whole = 1.0
         while len(chosen) < most:
             law = current.estimate.law
             assert law is not None
-            grouped = {m for g in groups for m in g}
+            grouped = {e.effects[-1] for g in groups for e in g}
             remaining = [n for n in self.usable if n not in chosen and n not in grouped]
             if not remaining:
                 break
@@ -124,7 +128,8 @@ class ForceSearch:
             # Beside what was found the variance is no longer inflated by it: the tests say whether to go on.
             if chosen and tested.p_value >= ALPHA:
                 break
-            leading = self._leading(tested, current, base, chosen, fitted)
+            odds = max(ODDS, FURTHER_SHARE * (current.evidence - null.evidence))
+            leading = self._leading(tested, current, base, chosen, fitted, WORTH_A_FIT * odds)
             found = [self.judged(e, law) for e in leading]
             found.sort(key=lambda h: -h.evidence)
             sure = {h.name: min(1.0, len(remaining) * p_value_of(self.layout, h, current)) for h in found}
@@ -132,12 +137,14 @@ class ForceSearch:
                 tried = found
                 whole = min([tested.p_value, *sure.values()], default=1.0)
             level, least = (ALPHA_FURTHER, GAIN_FURTHER) if chosen else (ALPHA_NAME, GAIN)
+            cost = FURTHER_COST if chosen else FIRST_COST
             good = [
                 h
                 for h in found
-                if h.evidence > current.evidence + ODDS
+                if h.evidence > current.evidence + odds
                 and sure[h.name] < level
                 and foresees(h, current, least)
+                and (self.tolerance.strict or self._cost(h, current) > cost * self.tolerance.cost)
             ]
             if not good:
                 break
@@ -147,21 +154,21 @@ class ForceSearch:
             names = [h.name for h in group]
             verdict = "ambiguous" if len(group) > 1 else "named"
             steps.append({"verdict": verdict, "effects": names, "p_value": sure[group[0].name]})
-            if len(group) > 1:
-                groups.append(names)
             current = self._taken(group[0])
+            if len(group) > 1:
+                groups.append([current.weighed, *(h.weighed for h in group[1:])])
             chosen.append(group[0].name)
         law = current.estimate.law
         assert law is not None
         return BesideForce(
             steps,
             groups,
-            current.explanation,
+            current.weighed,
             replace(self.windows, law=law),
             current.estimate,
-            [h.explanation for h in tried],
+            [h.weighed for h in tried],
             whole,
-            null.explanation,
+            null.weighed,
             null.estimate.law,
         )
 
@@ -172,6 +179,7 @@ class ForceSearch:
         base: list[str],
         chosen: list[str],
         fitted: Sequence[FittedHypothesis],
+        odds: float,
     ) -> list[FittedHypothesis]:
         """Return the leading effects fitted in full beside what was chosen, one explanation for each."""
         scores = {n: s for n, s in tested.scores.items() if s.degrees}
@@ -184,7 +192,8 @@ class ForceSearch:
         order = sorted(scores, key=lambda n: -scores[n].evidence)[:LEADERS]
         by_gain = sorted(scores, key=lambda n: scores[n].degrees - scores[n].gain)[:1]
         for name in dict.fromkeys([*order, *by_gain]):
-            if name not in known:
+            # A further name must bring much: what promises a small part of that is not worth a fit.
+            if name not in known and (not chosen or 0.5 * scores[name].gain > odds):
                 found = self._one(name, scores[name], tested.at, current, base, chosen)
                 if found is not None:
                     known[name] = found
@@ -195,9 +204,6 @@ class ForceSearch:
     ) -> FittedHypothesis | None:
         """Return an effect fitted from what its test estimates, or from nearer its null; None where every fit fails."""
         self.say(f"fitting {name} beside the force")
-        law = current.estimate.law
-        assert law is not None
-        under = replace(self.windows, law=law)
         known, start = parameters_of(at.model, [name]), initial_guess(self.layout, name, score.estimate)
         shape = shapes(self.layout, name)
         for share in (1.0, 0.1):
@@ -205,23 +211,54 @@ class ForceSearch:
             set_parameters(guess, [name], np.where(shape, start, known + share * (start - known)))
             try:
                 return fit_hypothesis(
-                    self.layout, under, base, [*chosen, name], start=current.explanation.fitted,
-                    guess=replace(at, model=guess), sigma=self.sigma, iterations=STEPS,
+                    self.layout, self.windows, base, [*chosen, name], start=current.explanation.fitted,
+                    guess=replace(at, model=guess), sigma=self.weights, iterations=STEPS,
                 )  # fmt: skip
             except FitError:
                 continue
         return None
 
+    def _cost(self, after: Hypothesis, before: Hypothesis) -> float:
+        """Return by what share the error of free running over 5 s is larger before than after."""
+        rolled = [
+            roll(
+                h.explanation.fitted.model.without_absent(h.explanation.effects),
+                self.log,
+                HORIZON,
+                self.scale,
+            )
+            for h in (before, after)
+        ]
+        if rolled[0] is None or rolled[1] is None:
+            return float("inf")
+        errors = [r.total(self.scale) for r in rolled if r is not None]
+        return errors[0] / errors[1] - 1.0 if np.isfinite(errors[1]) and errors[1] > 0.0 else -1.0
+
     def _taken(self, best: Hypothesis) -> Hypothesis:
-        """Return a hypothesis fitted under its own law."""
+        """Return a hypothesis at the parameters that its law has moved it to.
+
+        The windows stay linear about the free running without the force, with the initial states that suit it best: a
+        force takes an unstable vehicle too far from the free running for a linearisation about its own initial states.
+        """
         law = best.estimate.law
         assert law is not None
         found = best.explanation
-        again = fit_hypothesis(
-            self.layout, replace(self.windows, law=law), self.base, found.effects,
-            start=found.fitted, guess=replace(self.layout, model=found.fitted.model), sigma=self.sigma, iterations=STEPS,
-        )  # fmt: skip
-        return self.judged(again, law)
+        for share in (1.0, 0.3):
+            theta = found.fitted.theta + share * best.estimate.step
+            model = found.fitted.model.rebuilt(found.fitted.model.copied_effects())
+            set_parameters(model, found.names, theta)
+            try:
+                initial = fit_initial_states(
+                    model.without_absent(found.names), self.windows, self.weights, found.fitted.initial
+                )
+                moved = replace(found.fitted, model=model, theta=theta, initial=initial)
+                again = self.judged(replace(found, fitted=moved), law)
+            except (FitError, np.linalg.LinAlgError, RuntimeError):
+                continue
+            # Where the windows are far from linear, a whole step leads away.
+            if again.evidence > best.evidence - ODDS:
+                return again
+        return best
 
 
 def foresees(after: Hypothesis, before: Hypothesis, least: float) -> bool:
