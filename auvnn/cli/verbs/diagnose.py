@@ -56,7 +56,7 @@ def _effects(job: Job) -> list[str] | None:
 
 
 def _options(job: Job) -> dict[str, Any]:
-    return {key: job[key] for key in ("max_effects", "window", "force", "tolerance", "costs", "stochastic")}
+    return {key: job[key] for key in ("max_effects", "window", "force", "tolerance", "costs")}
 
 
 def _shares(job: Job) -> dict[str, Any]:
