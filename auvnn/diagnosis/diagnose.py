@@ -44,7 +44,7 @@ def diagnose(
     window: float | None = None,
     advice: bool = True,
     whiteness: bool = True,
-    stochastic: bool = False,
+    stochastic: bool = True,
     force: bool = False,
     tolerance: Any = None,
     costs: bool = True,
@@ -64,8 +64,8 @@ def diagnose(
         window: length of the windows of free running that are fitted, s; by default 5.
         advice: for an ambiguous answer, also work out which manoeuvre would tell the candidates apart.
         whiteness: also test what is left for correlations, before and after; no verdict depends on these tests.
-        stochastic: where a force is left, also ask how commands go between samples, and for effects beside a stochastic
-            force whose law is estimated; takes as long again or longer.
+        stochastic: where a force is left without a name, also ask how commands go between samples, and compare the
+            effects again beside a stochastic force whose law is estimated; takes as long again.
         force: go on with a log that contradicts itself: signs, units, axes.
         tolerance: what does not matter: a number for the cost in free running, with a fifth of it for the force as a
             share of the actuators', or a mapping with `cost` and `force`; by default 0.1 and 0.02. At 0 everything
@@ -102,7 +102,7 @@ def searched(
     window: float | None = None,
     advice: bool = True,
     whiteness: bool = True,
-    stochastic: bool = False,
+    stochastic: bool = True,
     force: bool = False,
     tolerance: Any = None,
     costs: bool = True,

@@ -121,6 +121,8 @@ def diagnose_files(
             force=force,
             tolerance=tolerance,
             costs=costs,
+            # The tests on more windows that follow hold the force for noise as the windows show it.
+            stochastic=False,
             progress=say,
         )
         parts = plan.spread(windows)
