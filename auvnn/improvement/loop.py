@@ -38,6 +38,7 @@ from auvnn.logs import Log
 from auvnn.logs.leakage import leakage
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
+from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
 from auvnn.threads import on_one_thread
 
 # Numerical failures of one step: the step is told and left out, the loop goes on.
@@ -54,10 +55,10 @@ ROUNDS = 3
 
 @on_one_thread
 def improve(
-    model: GreyBox,
-    log: Log,
+    model: GivenModel,
+    log: GivenLog,
     *,
-    test: Log | None = None,
+    test: GivenLog | None = None,
     effects: str | Sequence[str] | None = None,
     learn: Sequence[str] = learned.KINDS,
     max_effects: int = 8,
@@ -89,6 +90,9 @@ def improve(
         ConfigError: an unknown effect, or unknown kind of what may be learned.
         InputError: the same data on both sides, a log that contradicts itself, or one that is too short.
     """
+    log = as_log(log)
+    model = as_model(model, log)
+    test = None if test is None else as_log(test, "test")
     strange = [k for k in learn if k not in learned.KINDS]
     if strange:
         raise ConfigError(f"learn={strange[0]}: choose from {', '.join(learned.KINDS)}")

@@ -5,6 +5,7 @@ from auvnn.models.inputs import Inputs
 from auvnn.models.loading import from_vehicle, load, remove
 from auvnn.models.rollout import rollout
 from auvnn.models.saving import save
+from auvnn.models.taking import as_log, as_model
 from auvnn.models.trajectory import Divergence, Trajectory
 
 __all__ = [
@@ -13,6 +14,8 @@ __all__ = [
     "Inputs",
     "Prepared",
     "Trajectory",
+    "as_log",
+    "as_model",
     "from_vehicle",
     "load",
     "remove",

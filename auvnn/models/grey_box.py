@@ -14,10 +14,13 @@ import torch
 from torch import Tensor, nn
 
 from auvnn.effects import HOOKS, Body, Effect, Moment, Sensed, effect_class
+from auvnn.effects.registering import values_of
 from auvnn.errors import ConfigError
+from auvnn.models.accepting import as_tensor, own
 from auvnn.models.actuators import Actuators
 from auvnn.models.inputs import Inputs
 from auvnn.models.saving import REGION, SUBNETWORKS, save
+from auvnn.models.shown import ShownModel
 from auvnn.physics.attitude import quat_to_matrix
 from auvnn.physics.coriolis import coriolis_force
 from auvnn.physics.current import water_velocity
@@ -61,7 +64,7 @@ class Prepared:
 _WITHOUT: weakref.WeakKeyDictionary[nn.Module, GreyBox] = weakref.WeakKeyDictionary()
 
 
-class GreyBox(nn.Module):
+class GreyBox(ShownModel, nn.Module):
     """Fossen's equations of one vehicle, with damping subnetworks and effects.
 
     M_RB nu_dot + C_RB(nu) nu + M_A nu_r_dot + C_A(nu_r) nu_r + D(nu_r) nu_r + d(nu_r) + g(eta) = tau
@@ -175,11 +178,11 @@ class GreyBox(nn.Module):
         )
 
     def with_effects(self, wanted: Sequence[str] | Mapping[str, Mapping[str, float] | None]) -> GreyBox:
-        """Return the model with further effects, at the given values or at their nulls.
+        """Return the model with further effects (names, classes, instances), at the given values or at their nulls.
 
         The new model has parameters of its own; damping subnetworks and present effects are copied.
         """
-        values = wanted if isinstance(wanted, Mapping) else dict.fromkeys(wanted)
+        values = values_of(wanted)
         new = [effect_class(n).build(self.vehicle, self.actuation, v) for n, v in values.items()]
         return self.rebuilt([*self.copied_effects(), *new])
 
@@ -271,6 +274,8 @@ class GreyBox(nn.Module):
     ) -> Tensor:
         """Return the acceleration, with the actuators settled at their commands.
 
+        Numpy arrays and lists are taken too, and tensors that are less precise than the model.
+
         Args:
             eta: position and attitude (..., 7) with a quaternion (w, x, y, z), or (..., 6) with Euler angles.
             nu: velocity (..., 6), m/s and rad/s, over ground, of the body origin.
@@ -286,6 +291,14 @@ class GreyBox(nn.Module):
         Raises:
             ConfigError: the last size of a tensor is not what the model takes.
         """
+        like = own(self)
+        eta, nu, command = (
+            as_tensor(eta, like, "eta"),
+            as_tensor(nu, like, "nu"),
+            as_tensor(command, like, "command"),
+        )
+        fins, voltage = as_tensor(fins, like, "fins"), as_tensor(voltage, like, "voltage")
+        altitude = as_tensor(altitude, like, "altitude")
         sizes = (eta.shape[-1:], nu.shape[-1:], command.shape[-1:])
         if sizes[0] not in ((6,), (7,)) or sizes[1:] != ((6,), (self.actuators.size,)):
             raise ConfigError(

@@ -113,6 +113,20 @@ def vehicle_from_dict(
     return vehicle
 
 
+def check_words(fields: Fields) -> None:
+    """Refuse a name, uncertainties, effects or a source that a model file could not hold.
+
+    Raises:
+        ModelError: with the first of them.
+    """
+    _name(fields)
+    _uncertainty(fields, set(), [])
+    _effects(fields)
+    fields.text("source", "")
+    if fields.has("reference_voltage"):
+        fields.positive("reference_voltage")
+
+
 def _frame(fields: Fields) -> Array:
     frame = fields.text("frame", "FRD")
     if frame not in ("FRD", "FLU"):

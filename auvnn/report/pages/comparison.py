@@ -192,7 +192,9 @@ def _whole(entry: dict[str, Any]) -> Plot:
 
 def _horizons(rollout: Mapping[str, Any]) -> Figure:
     return error_against_horizon(
-        {"as given": common.over_horizons(rollout)}, common.over_horizons(rollout, "persistence")
+        {"as given": common.over_horizons(rollout)},
+        common.over_horizons(rollout, "persistence"),
+        common.over_horizons(rollout, "noise_floor"),
     )
 
 
