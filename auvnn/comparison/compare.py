@@ -22,7 +22,7 @@ from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.one_step import OneStep, one_step, scores
 from auvnn.metrics.rollouts import HORIZONS, NAMES, Rolled, Scale, rollout_table, scale_of
 from auvnn.models import GreyBox
-from auvnn.models.excursions import region_of, words_of
+from auvnn.models.free_running.excursions import region_of, words_of
 from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
 from auvnn.threads import on_one_thread
 

@@ -17,9 +17,10 @@ from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Run
 from auvnn.models import GreyBox
 from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
-from auvnn.online.adapter import Adapter, Update
+from auvnn.online.adapter import Adapter
 from auvnn.online.frozen import frozen_errors
 from auvnn.online.guards import REASONS, Guards
+from auvnn.online.update import Update
 
 Array = NDArray[np.float64]
 
