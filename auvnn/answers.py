@@ -20,8 +20,8 @@ from auvnn.errors import InputError, one_line
 DRAWERS = Catalogue(
     "report page",
     {
-        "log": "auvnn.report.pages.log:PAGE",
-        "model": "auvnn.report.pages.model:PAGE",
+        "log": "auvnn.report.pages.inputs.log:PAGE",
+        "model": "auvnn.report.pages.inputs.model:PAGE",
         "comparisons": "auvnn.report.pages.comparisons:PAGE",
         "quality": "auvnn.report.pages.quality:PAGE",
         "comparison": "auvnn.report.pages.comparison:PAGE",

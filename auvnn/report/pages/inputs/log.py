@@ -53,6 +53,7 @@ class LogPage(Page):
         return out
 
 
+@style.styled
 def _velocities(run: Any) -> Figure:
     title = f"run {run.number}"
     return time_series(run.t, {"measured": run.nu}, symbols=style.VELOCITY, title=title)
