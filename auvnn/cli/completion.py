@@ -134,7 +134,10 @@ _auvnn() {{
       last="${{value##*[\\[,]}}" kept="${{value%"$last"}}"
       for word in $(compgen -W "$list" -- "$last"); do COMPREPLY+=( "$kept$word" ); done
       case "$list" in
-        ""|*bluerov2*) while IFS= read -r word; do COMPREPLY+=( "$word" ); done < <(compgen -f -- "$value") ;;
+        ""|*bluerov2*)
+          # Only of files: in keys it would escape the equals sign.
+          compopt -o filenames 2>/dev/null
+          while IFS= read -r word; do COMPREPLY+=( "$word" ); done < <(compgen -f -- "$value") ;;
       esac
       # bash takes = for the end of a word unless it has been told otherwise.
       case "$COMP_WORDBREAKS" in *=*) ;; *) COMPREPLY=( "${{COMPREPLY[@]/#/$key=}}" ) ;; esac ;;
@@ -143,7 +146,7 @@ _auvnn() {{
       compopt -o nospace 2>/dev/null ;;
   esac
 }}
-complete -o filenames -o bashdefault -F _auvnn auvnn"""
+complete -o bashdefault -F _auvnn auvnn"""
 
 
 def _zsh(keys: dict[str, list[str]], values: dict[str, list[str]]) -> str:
@@ -208,11 +211,11 @@ function __auvnn_complete
     set -l kept (string match -r -- '^.*[\\[,]' $value)
     set -l list (__auvnn_values $key)
     for word in $list
-      echo $key=$kept$word
+      echo "$key=$kept$word"
     end
     if test (count $list) -eq 0; or contains -- bluerov2 $list
       for path in (__fish_complete_path $value)
-        echo $key=$path
+        echo "$key=$path"
       end
     end
   else
