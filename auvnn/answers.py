@@ -40,6 +40,7 @@ DRAWERS = Catalogue(
 )
 
 
+_BARE = {float, type(None)}
 # What a card says last.
 PLOTTED = ".plot() draws it, .report('report.html') writes the page, .to_dict() is the JSON answer"
 
@@ -49,6 +50,9 @@ def plain(value: Any) -> Any:
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
+        if len(value) > 32 and not set(map(type, value)) - _BARE:
+            # Traces of thousands of numbers: one look at each is enough.
+            return [v if v is None or math.isfinite(v) else None for v in value]
         return [plain(v) for v in value]
     if isinstance(value, (bool, str)) or value is None:
         return value

@@ -223,7 +223,8 @@ class Pages:
         horizon = str(asked.get("horizon", "full"))
         if horizon not in HORIZONS:
             raise ConfigError(f"horizon {horizon}: choose {', '.join(HORIZONS)}")
-        return self.trial().run(effects, horizon, number, low, high, points, asked.get("whole") is not False)
+        flags = (asked.get("whole") is not False, asked.get("judge") is not False)
+        return self.trial().run(effects, horizon, number, low, high, points, *flags)
 
     def script(self, asked: Asked) -> Any:
         """The commands and the script, and where they would be saved."""

@@ -13,9 +13,10 @@ from auvnn.cards import Card, figure
 from auvnn.comparison.beside import HORIZONS as MAIN
 from auvnn.comparison.compare import Comparison, write_predictions
 from auvnn.comparison.compare import compare as compare_one
-from auvnn.errors import ConfigError
+from auvnn.errors import ConfigError, InputError
 from auvnn.metrics.rollouts import HORIZONS
-from auvnn.models.taking import GivenLog, GivenModel, as_log
+from auvnn.models import GreyBox
+from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
 
 Models = Sequence[GivenModel] | Mapping[str, GivenModel]
 
@@ -155,18 +156,23 @@ def compare(
     if not model:
         raise ConfigError("no model to compare: give a model, or a list of them")
     given = list(model.values()) if isinstance(model, Mapping) else list(model)
-    found = [compare_one(m, log, horizons=horizons, derivative=derivative) for m in given]
-    labels = list(map(str, model)) if isinstance(model, Mapping) else labelled(given, found)
-    return Comparisons(log.name, dict(zip(labels, found, strict=True)))
+    loaded = [as_model(m, log) for m in given]
+    labels = list(map(str, model)) if isinstance(model, Mapping) else labelled(given, loaded)
+    found = {}
+    for label, each in zip(labels, loaded, strict=True):
+        try:
+            found[label] = compare_one(each, log, horizons=horizons, derivative=derivative)
+        except InputError as problem:
+            raise InputError(f"model {label}: {problem}") from None
+    return Comparisons(log.name, found)
 
 
-def labelled(given: Sequence[Any], found: Sequence[Comparison]) -> list[str]:
+def labelled(given: Sequence[Any], loaded: Sequence[GreyBox]) -> list[str]:
     """Return a label for each model, all different: its file or name, else its vehicle's name and its effects."""
     out: list[str] = []
-    for source, comparison in zip(given, found, strict=True):
-        effects = getattr(source, "effect_names", None)
+    for source, model in zip(given, loaded, strict=True):
         named = isinstance(source, (str, Path))
-        label = str(source) if named else " + ".join([comparison.model, *(effects or ())])
+        label = str(source) if named else " + ".join([model.vehicle.name, *model.effect_names])
         if label in out:
             number = 2
             while f"{label} ({number})" in out:

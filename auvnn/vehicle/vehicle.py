@@ -7,9 +7,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from auvnn.cards import Card, Shown, Text
+from auvnn.vehicle.checks import rigid_body
 from auvnn.vehicle.parts import DEFAULT_UNCERTAINTY, Array, DampingElement, Fin, Thruster, freeze
 from auvnn.vehicle.reading import vehicle_from_dict
 from auvnn.vehicle.summary import summary
@@ -175,12 +174,7 @@ class Vehicle(Shown):
 
         Reference: Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, ch. 3.
         """
-        r = self.center_of_gravity
-        x, y, z = r
-        s = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        upper = np.hstack([self.mass * np.eye(3), -self.mass * s])
-        lower = np.hstack([self.mass * s, self.inertia + self.mass * (r @ r * np.eye(3) - np.outer(r, r))])
-        return np.vstack([upper, lower])
+        return rigid_body(self.mass, self.inertia, self.center_of_gravity)
 
     @property
     def inertia_matrix(self) -> Array:

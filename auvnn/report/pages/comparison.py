@@ -49,7 +49,9 @@ class ComparisonPage(Page):
             out.append(say.verdict(common.horizon_words(horizon or ""), error, held))
             floor = common.total(rollout, horizon, "noise_floor")
             if floor is not None and floor > 0:
-                out.append(f"Noise alone would leave {percent(floor)}, {number(error / floor, 2)} times less.")
+                out.append(
+                    f"Noise alone would leave {percent(floor)}, {number(error / floor, 2)} times less."
+                )
         out += common.baseline_words(view)
         lost = sum(int(finite(e.get("diverged")) or 0) for e in rollout.values())
         if lost:
