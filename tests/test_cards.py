@@ -95,7 +95,7 @@ def test_several_models_on_one_log(model, made, comparison, tmp_path):
     assert named.models == ["a", "b"] and isinstance(named.plot(), Figure)
     twice = auvnn.compare([model, model], made.log, horizons=("1",))
     assert twice.models == ["rov95", "rov95 (2)"]
-    with pytest.raises(InputError, match="model rov90: .* 6 thrusters"):
+    with pytest.raises(InputError, match=r"model rov90: .* 6 thrusters"):
         auvnn.compare([model, "rov90"], made.log, horizons=("1",))
     with pytest.raises(ConfigError, match="no model"):
         auvnn.compare([], made.log)

@@ -16,6 +16,8 @@ from auvnn.config import config_dir
 from auvnn.errors import ConfigError
 
 SHELLS = ("bash", "zsh", "fish")
+# Words in the place of a verb that only say something.
+PAGES = ("effects", "docs", "completion", "version", "help")
 FLAGS = ("--help", "--cfg", "--multirun", "--config-dir", "--jobs")
 # Keys whose values are names of effects, alone or in a list.
 EFFECTS = ("effect", "effects", "hidden", "candidates")
@@ -39,7 +41,6 @@ def completion(words: Sequence[str]) -> str:
 
 def tables() -> tuple[dict[str, list[str]], dict[str, list[str]]]:
     """Return each verb's keys, and the values that are known of each key."""
-    from auvnn.cli.pages import PAGES
     from auvnn.docs import page_names
     from auvnn.effects import EFFECTS as CATALOGUE
 
@@ -53,7 +54,7 @@ def tables() -> tuple[dict[str, list[str]], dict[str, list[str]]]:
     values |= {key: effects for key in EFFECTS}
     values["model"] = sorted(path.stem for path in (folder / "vehicle").glob("*.yaml"))
     values["vehicle"] = values["model"]
-    keys |= {page: [] for page in (*PAGES, "version", "help")}
+    keys |= {page: [] for page in PAGES}
     values["@effects"], values["@docs"], values["@completion"] = [*effects, "all"], page_names(), list(SHELLS)
     return keys, values
 

@@ -22,20 +22,16 @@ SCREEN, PIXELS = 45, 1350
 @pytest.fixture(scope="module")
 def cells(tmp_path_factory) -> list[Any]:
     """Return the code cells after they have run in a kernel of their own."""
-    import os
-
     notebook = nbformat.read(PATH, as_version=4)
     folder = tmp_path_factory.mktemp("notebook")
-    before = os.environ.get("PYTHONPATH")
-    # The kernel starts elsewhere: it is to find the package that is being tested.
-    os.environ["PYTHONPATH"] = str(PATH.parents[2])
-    try:
+    with pytest.MonkeyPatch.context() as patch:
+        # The kernel starts elsewhere: it is to find the package that is being tested, and to run it as users do.
+        patch.setenv("PYTHONPATH", str(PATH.parents[2]))
+        patch.setenv("AUVNN_ENGINE", "auto")
         client = nbclient.NotebookClient(
-            notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(folder)}}
+            notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(folder)}}
         )
         client.execute()
-    finally:
-        os.environ.pop("PYTHONPATH") if before is None else os.environ.update(PYTHONPATH=before)
     assert (folder / "better" / "model.yaml").is_file() and (folder / "report.html").is_file()
     return [cell for cell in notebook.cells if cell.cell_type == "code"]
 
