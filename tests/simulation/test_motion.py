@@ -61,7 +61,9 @@ def plain_wrench(command):
 
 def test_log_equals_an_independent_plant():
     current = {"v_north": 0.2, "v_east": -0.1, "v_down": 0.05}
-    made = simulate(model_of("rov90"), "multisine", hidden={"ocean_current": current}, runs=1, duration=6.0, noise="none")
+    made = simulate(
+        model_of("rov90"), "multisine", hidden={"ocean_current": current}, runs=1, duration=6.0, noise="none"
+    )
     run = made.log.runs[0]
     w, x, y, z = run.quaternion[0]
     rotation = np.array([
@@ -156,7 +158,9 @@ def test_noise_and_hidden_effects_do_not_change_the_manoeuvre():
 
 
 def test_actuation_by_wrench():
-    made = simulate(model_of("rov95"), "multisine", actuation="wrench", runs=1, duration=3.0, **COARSE, noise="none")
+    made = simulate(
+        model_of("rov95"), "multisine", actuation="wrench", runs=1, duration=3.0, **COARSE, noise="none"
+    )
     run = made.log.runs[0]
     assert made.plant.actuation == "wrench" and made.log.kind == "wrench"
     assert run.thrusters is None and run.wrench.shape == (31, 6)
@@ -164,13 +168,17 @@ def test_actuation_by_wrench():
 
 
 def test_fins_are_logged_for_a_vehicle_that_has_them():
-    run = simulate(model_of("remus100"), "multisine", runs=1, duration=3.0, **COARSE, noise="none").log.runs[0]
+    run = simulate(model_of("remus100"), "multisine", runs=1, duration=3.0, **COARSE, noise="none").log.runs[
+        0
+    ]
     assert run.fins.shape == (31, 4) and run.thrusters.shape == (31, 1)
     assert run.fins.std() > 0.01
 
 
 def test_voltage_only_where_it_is_known_and_slowly_falling():
-    assert simulate(model_of("rov95"), runs=1, duration=3.0, **COARSE, noise="none").log.runs[0].voltage is None
+    assert (
+        simulate(model_of("rov95"), runs=1, duration=3.0, **COARSE, noise="none").log.runs[0].voltage is None
+    )
     options = {"runs": 3, "duration": 60.0, **COARSE}
     for run in simulate(model_of("bluerov2"), **options, noise="none").log.runs:
         assert (np.diff(run.voltage) < 0).all()

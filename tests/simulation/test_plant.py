@@ -37,10 +37,14 @@ def test_typical_values_are_plausible_and_never_the_null(name):
 
 def test_hidden_by_name_gets_typical_values_that_do_not_hang_on_the_order():
     model = GreyBox(load_vehicle("rov95"))
-    one = simulate(model, "paper", hidden=["ocean_current", "net_buoyancy"], **SHORT, noise="none").truth["hidden"]
+    one = simulate(model, "paper", hidden=["ocean_current", "net_buoyancy"], **SHORT, noise="none").truth[
+        "hidden"
+    ]
     other = {"net_buoyancy": None, "ocean_current": {}}
     assert simulate(model, "paper", hidden=other, **SHORT, noise="none").truth["hidden"] == one
-    partly = simulate(model, "paper", hidden={"ocean_current": {"v_east": 0.1}}, **SHORT, noise="none").truth["hidden"]
+    partly = simulate(model, "paper", hidden={"ocean_current": {"v_east": 0.1}}, **SHORT, noise="none").truth[
+        "hidden"
+    ]
     assert partly == {"ocean_current": {"v_north": 0.0, "v_east": 0.1, "v_down": 0.0}}
 
 
@@ -89,7 +93,9 @@ def test_drawn_plant_has_exactly_these_coefficients():
 
 def test_a_hidden_group_stays_exact_beside_what_is_hidden():
     hidden = {"added_mass": {"X": 1.7}}
-    made = simulate(GreyBox(load_vehicle("rov95")), "paper", hidden=hidden, coefficients="drawn", **SHORT, noise="none")
+    made = simulate(
+        GreyBox(load_vehicle("rov95")), "paper", hidden=hidden, coefficients="drawn", **SHORT, noise="none"
+    )
     assert set(made.truth["coefficients"]) == {"linear_damping", "quadratic_damping", "inertia"}
     assert made.plant.effect("added_mass").values()["X"] == 1.7
     assert made.plant.effect("added_mass").values()["Y"] == 1.0
