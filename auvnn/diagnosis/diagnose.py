@@ -25,6 +25,7 @@ from auvnn.estimation.prediction_error import SINGULAR
 from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
+from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
 from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
 
@@ -36,8 +37,8 @@ LEARNED = (
 
 @on_one_thread
 def diagnose(
-    model: GreyBox,
-    log: Log,
+    model: GivenModel,
+    log: GivenLog,
     effects: str | Sequence[str] | None = None,
     *,
     max_effects: int = 4,
@@ -77,6 +78,8 @@ def diagnose(
         ConfigError: an unknown effect.
         InputError: the log has too little that can be used, or contradicts itself.
     """
+    log = as_log(log)
+    model = as_model(model, log)
     return searched(
         model,
         log,

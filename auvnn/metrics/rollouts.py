@@ -148,6 +148,7 @@ def rollout_table(
                 **{n: {"rmse": None, "nrmse": None} for n in NAMES},
                 "total": None,
                 "persistence": None,
+                "noise_floor": None,
                 "diverged": 0,
                 "windows": 0,
             }

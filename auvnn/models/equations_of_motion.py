@@ -10,6 +10,7 @@ from torch import Tensor, nn
 
 from auvnn.effects import Body, Effect, Moment, Sensed
 from auvnn.errors import ConfigError
+from auvnn.models.accepting import as_tensor, own
 from auvnn.models.actuation.actuators import Actuators
 from auvnn.models.inputs import Inputs
 from auvnn.physics.attitude import quat_to_matrix
@@ -112,6 +113,8 @@ class EquationsOfMotion(nn.Module):
     ) -> Tensor:
         """Return the acceleration, with the actuators settled at their commands.
 
+        Numpy arrays and lists are taken too, and tensors that are less precise than the model.
+
         Args:
             eta: position and attitude (..., 7) with a quaternion (w, x, y, z), or (..., 6) with Euler angles.
             nu: velocity (..., 6), m/s and rad/s, over ground, of the body origin.
@@ -127,6 +130,10 @@ class EquationsOfMotion(nn.Module):
         Raises:
             ConfigError: the last size of a tensor is not what the model takes.
         """
+        like = own(self)
+        eta, nu = as_tensor(eta, like, "eta"), as_tensor(nu, like, "nu")
+        command, fins = as_tensor(command, like, "command"), as_tensor(fins, like, "fins")
+        voltage, altitude = as_tensor(voltage, like, "voltage"), as_tensor(altitude, like, "altitude")
         sizes = (eta.shape[-1:], nu.shape[-1:], command.shape[-1:])
         if sizes[0] not in ((6,), (7,)) or sizes[1:] != ((6,), (self.actuators.size,)):
             raise ConfigError(

@@ -10,6 +10,7 @@ from auvnn.config import parse_yaml
 from auvnn.damping.bank import DampingBank
 from auvnn.damping.region import Region
 from auvnn.effects import Effect, effect_class
+from auvnn.effects.registering import names_of
 from auvnn.errors import ConfigError, ModelError
 from auvnn.models.grey_box import GreyBox
 from auvnn.models.saving import (
@@ -134,6 +135,7 @@ def remove(model: GreyBox, effects: str | list[str]) -> GreyBox:
     Raises:
         ConfigError: the model has no such effect.
     """
+    effects = names_of(effects)
     names = [effects] if isinstance(effects, str) else list(effects)
     for name in names:
         model.effect(name)
