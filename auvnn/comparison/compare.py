@@ -165,7 +165,13 @@ def _series(number: int, nu: Array, part: OneStep, rolled: Rolled | None) -> dic
 
 
 def stitch(rolled: Rolled, number: int, nu: Array) -> Array:
-    """Return the predictions of every other window (they overlap by half) as one trace of a run, (N, 6)."""
+    """Return the predictions of every other window (they overlap by half) as one trace of a run, (N, 6).
+
+    Args:
+        rolled: free runs over the windows of one horizon.
+        number: of the run whose trace is asked for.
+        nu: measured velocity of that run, (N, 6), m/s and rad/s; gives the trace its shape alone.
+    """
     trace = np.full_like(nu, np.nan)
     upto = -1
     for b in np.flatnonzero(rolled.windows.run == number):

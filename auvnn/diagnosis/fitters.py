@@ -49,7 +49,14 @@ class Fitter(Protocol):
         ...
 
     def without(self, layout: Layout, found: FittedHypothesis, fold: Fold, refit: bool) -> FittedHypothesis:
-        """Fit the same again without a fold; where not `refit`, by one Newton step from the fit to everything."""
+        """Fit the same again without a fold; where not `refit`, by one Newton step from the fit to everything.
+
+        Args:
+            layout: stated values.
+            found: the fit to everything.
+            fold: part of the log that is left out.
+            refit: whether to fit in full.
+        """
         ...
 
 
@@ -62,6 +69,13 @@ def fitter_for(
     derivative: dict[str, Any] | None = None,
 ) -> Fitter:
     """Return who fits by an objective.
+
+    Args:
+        model: that is to be fitted, for its actuation.
+        log: measurements.
+        objective: "rollout" (windows run free) or "one_step" (accelerations).
+        window: length of the windows, s; chosen by the log where None.
+        derivative: how accelerations are obtained, for "one_step".
 
     Raises:
         ConfigError: an unknown objective, or a window for one that has none.
@@ -91,7 +105,14 @@ class ByWindows:
     def fit(
         self, layout: Layout, base: Sequence[str], effects: Sequence[str], start: FittedHypothesis | None
     ) -> FittedHypothesis:
-        """Fit from measured states, or from another fit's; see `Fitter`."""
+        """Fit from measured states, or from another fit's; see `Fitter`.
+
+        Args:
+            layout: stated values.
+            base: effects that are free anyway.
+            effects: that are asked for, the newest last.
+            start: a fit to go on from; measured states where None.
+        """
         looked = start is not None and bool(effects) and effects[-1] not in start.names
         looked = looked and null_is_no_start(layout, effects[-1])
         guess = None
@@ -103,7 +124,14 @@ class ByWindows:
         return fit_hypothesis(layout, self.windows, base, effects, start=fitted, guess=guess)
 
     def without(self, layout: Layout, found: FittedHypothesis, fold: Fold, refit: bool) -> FittedHypothesis:
-        """Fit again without the windows that share a sample with a fold; see `Fitter`."""
+        """Fit again without the windows that share a sample with a fold; see `Fitter`.
+
+        Args:
+            layout: stated values.
+            found: the fit to everything.
+            fold: part of the log that is left out.
+            refit: whether to fit in full after the Newton step.
+        """
         keep = ~within(self.windows, fold.held)
         if not keep.any():
             raise FloatingPointError("nothing is left to fit to")
@@ -142,6 +170,12 @@ class OneStep:
     ) -> FittedHypothesis:
         """Fit all samples; see `Fitter`.
 
+        Args:
+            layout: stated values.
+            base: effects that are free anyway.
+            effects: that are asked for; none may have a shape.
+            start: a fit to go on from, or None.
+
         Raises:
             ConfigError: an effect has a time or a shape to be found.
         """
@@ -151,7 +185,14 @@ class OneStep:
         )
 
     def without(self, layout: Layout, found: FittedHypothesis, fold: Fold, refit: bool) -> FittedHypothesis:
-        """Fit the other samples, always in full: it is cheap; see `Fitter`."""
+        """Fit the other samples, always in full: it is cheap; see `Fitter`.
+
+        Args:
+            layout: stated values.
+            found: the fit to everything.
+            fold: part of the log that is left out.
+            refit: not used: the fit is always in full.
+        """
         log = replace(fold.fit, runs=tuple(run.cleaned for run in fold.fit.runs))
         base = [n for n in found.names if n not in found.effects]
         return fit_hypothesis_one_step(layout, log, base, found.effects, self.how, start=found.fitted)
@@ -166,14 +207,26 @@ def _shapeless(layout: Layout, effects: Sequence[str]) -> None:
 
 
 def at(layout: Layout, names: Sequence[str], theta: NDArray[np.float64]) -> GreyBox:
-    """Return the layout's model with some effects at given values."""
+    """Return the layout's model with some effects at given values.
+
+    Args:
+        layout: stated values.
+        names: effects, in the order of `theta`.
+        theta: their parameters side by side, (P,).
+    """
     model = layout.model.rebuilt(layout.model.copied_effects())
     set_parameters(model, names, theta)
     return model
 
 
 def started(layout: Layout, found: FittedHypothesis, names: Sequence[str]) -> Layout:
-    """Return the layout with those of some effects that a fit holds where it has them."""
+    """Return the layout with those of some effects that a fit holds where it has them.
+
+    Args:
+        layout: stated values.
+        found: a fit.
+        names: effects that take the fit's values where it has them.
+    """
     model = layout.model.rebuilt(layout.model.copied_effects())
     for name in names:
         if name in found.names:
@@ -182,7 +235,13 @@ def started(layout: Layout, found: FittedHypothesis, names: Sequence[str]) -> La
 
 
 def newton(fitted: Fitted, held: Any, keep: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the parameters one Newton step from a fit, some of its windows left out, (P,), within their bounds."""
+    """Return the parameters one Newton step from a fit, some of its windows left out, (P,), within their bounds.
+
+    Args:
+        fitted: the fit to all windows.
+        held: its priors, with the parameters' bounds.
+        keep: which windows stay, (B,).
+    """
     theta, sums = fitted.theta, fitted.statistics
     low, high = limits(fitted.model, fitted.names, held)
     free = held.inside(theta) & (theta > low) & (theta < high)

@@ -133,7 +133,13 @@ def costs(model: GreyBox, task: Task) -> Array:
 
 
 def normal_equations(model: GreyBox, task: Task, names: Sequence[str]) -> tuple[Array, Array, Array]:
-    """Return J^T J, J^T e and e^T e of every window, robust weights in them: (B, P, P), (B, P), (B,)."""
+    """Return J^T J, J^T e and e^T e of every window, robust weights in them: (B, P, P), (B, P), (B,).
+
+    Args:
+        model: at the values about which it is linearised.
+        task: windows, scales and weights.
+        names: effects whose parameters are fitted, P parameters in all.
+    """
     weight, samples, at = task.weight(), task.samples(), 0
     if not names:
         count = len(task.windows)

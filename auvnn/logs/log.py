@@ -127,7 +127,13 @@ class Log:
 
     @classmethod
     def from_runs(cls, runs: Iterable[Run], name: str = "log", repairs: Iterable[Repair] = ()) -> Log:
-        """Make a log of runs in memory."""
+        """Make a log of runs in memory.
+
+        Args:
+            runs: in their order, each with a number of its own.
+            name: of the log.
+            repairs: what was mended on the way here.
+        """
         return cls(tuple(runs), name=name, repairs=tuple(repairs))
 
     @property

@@ -173,7 +173,13 @@ class OneStepReplay:
 
 
 def one_step(model: GreyBox, log: Log, derivative: Derivative) -> list[OneStep]:
-    """Compare accelerations run by run; see `OneStep`."""
+    """Compare accelerations run by run; see `OneStep`.
+
+    Args:
+        model: that is compared.
+        log: measurements.
+        derivative: how accelerations are obtained.
+    """
     found = []
     for run in log.runs:
         measured, predicted = accelerations(model, run, derivative)
@@ -193,6 +199,11 @@ def accelerations(model: GreyBox, run: Run, derivative: Derivative) -> tuple[Arr
     """Return measured and predicted acceleration of a run, after the same filter, (N, 6) each.
 
     Spikes of single samples count as missing.
+
+    Args:
+        model: that is compared.
+        run: N samples.
+        derivative: how accelerations are obtained.
     """
     run = run.cleaned
     if derivative.method == "measured":
@@ -210,7 +221,13 @@ def _rms(x: Array) -> Array:
 
 
 def inertia_of(model: GreyBox, run: Run, time: float | None = None) -> Array:
-    """Return the model's inertia matrix (6, 6); of a body that varies in time, that at a time or the run's start."""
+    """Return the model's inertia matrix (6, 6); of a body that varies in time, that at a time or the run's start.
+
+    Args:
+        model: whose matrix is asked for.
+        run: for its start.
+        time: s; the run's start where None.
+    """
     moment = None
     if model.time_varying:
         zero3, zero6 = torch.zeros(3, dtype=torch.float64), torch.zeros(6, dtype=torch.float64)

@@ -58,7 +58,13 @@ def load(source: str | Path, actuation: str | None = None) -> GreyBox:
 
 
 def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None = None) -> GreyBox:
-    """Return the model that the files of a folder describe; see `contents`."""
+    """Return the model that the files of a folder describe; see `contents`.
+
+    Args:
+        files: their contents by name.
+        path: of the folder, for messages.
+        actuation: "thrusters" or "wrench"; as it was saved where None.
+    """
     # Parsed from the bytes whose hash was checked, not from the file, which may have changed since.
     data: dict[str, Any] = parse_yaml(files[MODEL].decode("utf-8"), str(path / MODEL))
     networks = data.pop(SUBNETWORKS, None)

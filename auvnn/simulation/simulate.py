@@ -216,6 +216,14 @@ def bottom_below(
     """Return the depth, m, of a bottom that the nominal model comes close to: 1.3 of its radii below.
 
     The radius is that of the sphere of the vehicle's volume.
+
+    Args:
+        model: nominal.
+        excitation: a manoeuvre's name or its options.
+        seed: of its draws.
+        runs: how many.
+        duration: of each, s.
+        rate: rows per second.
     """
     nominal = simulate(
         model, excitation, "none", None, seed, runs=runs, duration=duration, rate=rate, max_step=0.025

@@ -232,7 +232,15 @@ def _free_running(models: Mapping[str, GreyBox], test: Log) -> dict[str, Any]:
 
 
 def metrics_of(fit: Fit, before: dict, after: dict, samples: int, held: int) -> dict[str, Any]:
-    """Return `metrics` of the answer."""
+    """Return `metrics` of the answer.
+
+    Args:
+        fit: what came of it.
+        before: comparison before training.
+        after: comparison after training.
+        samples: that were fitted.
+        held: samples that decided when to stop.
+    """
     units = ("N", "N", "N", "N_m", "N_m", "N_m")
     found: dict[str, Any] = {
         "samples_fitted": samples,

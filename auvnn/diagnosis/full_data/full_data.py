@@ -15,7 +15,8 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.layout import DETERMINED, Layout
 from auvnn.diagnosis.residuals.autocorrelation import slower_than_white
 from auvnn.diagnosis.score_tests.probes import Probed
-from auvnn.diagnosis.score_tests.score import Score, following, projection, ratio, score_from_sums
+from auvnn.diagnosis.score_tests.score import Score, following, projection, score_from_sums
+from auvnn.diagnosis.score_tests.variance_inflation import ratio
 from auvnn.effects import Extent
 from auvnn.estimation.priors import Priors, bounded_step, limits, parameters_of, set_parameters
 from auvnn.estimation.scaling import unit_of

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.layout import DETERMINED, Layout, priors, scales, shapes
 from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
-from auvnn.diagnosis.score_tests.score import variance_inflation
+from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.estimation.normal_equations import Statistics
 from auvnn.estimation.prediction_error import Fitted
 from auvnn.estimation.priors import Priors
@@ -66,6 +66,13 @@ def plausible(
 
     What is left out may be all that says anything of a parameter. It is then not foreseen anywhere, but where the
     evidence looks for it too; a shape near where it was found.
+
+    Args:
+        layout: stated values and plausible sizes.
+        names: effects that are free, in the order of `theta`.
+        effects: those of them that were asked for.
+        held: priors of the fit on everything.
+        theta: where it ended, (P,).
     """
     mean, precision = held.mean.copy(), held.precision.copy()
     for name, own in layout.places(names).items():
@@ -79,6 +86,12 @@ def left_out(statistics: Statistics, theta: Array, held: Priors, fold: NDArray[n
     """Return each window's weighted squared error under parameters fitted without its fold, (B,).
 
     The fit is linear about the fit on everything, from the windows' own sums: no run is simulated again.
+
+    Args:
+        statistics: sums of every window at the fit on everything.
+        theta: that fit, (P,).
+        held: its priors.
+        fold: of each window, (B,).
     """
     cost = np.empty(len(fold))
     free = held.inside(theta)

@@ -52,7 +52,14 @@ def _solved(square: Array, right: Array, precision: Array, mean: Array) -> Array
 
 
 def weights(gap: Array, x: Array, precision: Array, mean: Array) -> Array:
-    """Return weights (N, 6) by which each degree of freedom counts alike and outliers count little."""
+    """Return weights (N, 6) by which each degree of freedom counts alike and outliers count little.
+
+    Args:
+        gap: measured minus predicted acceleration, (N, 6).
+        x: its slopes in the parameters, (N, 6, P).
+        precision: of the priors, (P,).
+        mean: of the priors, (P,).
+    """
     weight = np.ones_like(gap) / np.maximum((gap**2).mean(0), 1e-300)
     for _ in range(ROUNDS):
         left = gap - x @ solve(gap, x, precision, weight, mean) if x.shape[-1] else gap
@@ -64,7 +71,16 @@ def weights(gap: Array, x: Array, precision: Array, mean: Array) -> Array:
 def left_out(
     gap: Array, x: Array, precision: Array, mean: Array, weight: Array, fifth: NDArray[np.int64]
 ) -> Array:
-    """Return each sample's weighted squared error by the fit on the other fifths, (N,)."""
+    """Return each sample's weighted squared error by the fit on the other fifths, (N,).
+
+    Args:
+        gap: measured minus predicted acceleration, (N, 6).
+        x: its slopes in the parameters, (N, 6, P).
+        precision: of the priors, (P,).
+        mean: of the priors, (P,).
+        weight: of each sample and degree of freedom, (N, 6).
+        fifth: number of the fifth to which a sample belongs, (N,).
+    """
     out = np.zeros(len(gap))
     held = [fifth == k for k in range(FIFTHS)]
     sums = [_sums(gap[h], x[h], weight[h]) for h in held]

@@ -17,7 +17,7 @@ from scipy.stats import chi2
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.layout import Layout, shapes
 from auvnn.diagnosis.residuals.input_forces import AXES, InputForces
-from auvnn.diagnosis.score_tests.score import variance_inflation
+from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
 from auvnn.estimation.scaling import unit_of
 from auvnn.estimation.sensitivity import Response

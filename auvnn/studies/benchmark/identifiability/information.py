@@ -145,7 +145,15 @@ class TruthPoint:
 def truth_point(
     model: GreyBox, log: Log, truth: Truth, rivals: Sequence[str], noise: str | Mapping[str, Any]
 ) -> TruthPoint:
-    """Return where the information is asked for: the truth, with the rivals at their nulls."""
+    """Return where the information is asked for: the truth, with the rivals at their nulls.
+
+    Args:
+        model: nominal.
+        log: whose windows are taken.
+        truth: what is hidden, and the drawn coefficients.
+        rivals: effects that might be taken for it.
+        noise: condition: a name or its options.
+    """
     names = list(dict.fromkeys([*truth.hidden, *rivals]))
     layout = lay_out(model, names)
     at = layout.model.rebuilt(layout.model.copied_effects())
