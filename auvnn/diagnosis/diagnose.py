@@ -76,6 +76,14 @@ def diagnose(
     Raises:
         ConfigError: an unknown effect.
         InputError: the log has too little that can be used, or contradicts itself.
+
+    Example:
+        ```python
+        model = auvnn.load("rov95")
+        log = auvnn.simulate(model, noise="realistic", hidden={"ocean_current": {"v_north": 0.2}}).log
+        diagnosis = auvnn.diagnose(model, log, ["ocean_current", "net_buoyancy"])
+        diagnosis.verdict, diagnosis.missing  # "named", ["ocean_current"]
+        ```
     """
     return searched(
         model,

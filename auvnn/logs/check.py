@@ -16,5 +16,12 @@ def check(log: Log | str | Path | Sequence[str | Path], mapping: Any = None) -> 
     Args:
         log: a log, a file that a reader knows, or a list of such files.
         mapping: for files, how their columns are named; see `Log.read`.
+
+    Example:
+        ```python
+        made = auvnn.simulate(auvnn.load("rov95"), noise="realistic", runs=1, duration=8.0)
+        quality = auvnn.check(made.log)
+        [finding.what for finding in quality.findings]
+        ```
     """
     return (log if isinstance(log, Log) else Log.read(log, mapping)).quality()

@@ -36,6 +36,12 @@ class Log:
 
     Raises:
         InputError: there is no run, a number occurs twice, or the runs' columns differ.
+
+    Example:
+        ```python
+        made = auvnn.simulate(auvnn.load("rov95"), runs=2, duration=5.0)
+        first, second = made.log.runs  # first.t (N,), first.nu (N, 6), first.command (N, n)
+        ```
     """
 
     runs: tuple[Run, ...]
@@ -87,6 +93,13 @@ class Log:
         Raises:
             InputError: a file cannot be read or its content must not be trusted.
             ConfigError: the mapping is wrong.
+
+        Example:
+            ```python
+            made = auvnn.simulate(auvnn.load("rov95"), runs=1, duration=8.0)
+            made.log.write("dive.csv", overwrite=True)
+            log = auvnn.Log.read("dive.csv", max_duration=4.0)
+            ```
         """
         from auvnn.logs.reading.reading import read
 

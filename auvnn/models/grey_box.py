@@ -56,6 +56,13 @@ class GreyBox(EquationsOfMotion):
         ConfigError: effects repeat or exclude one another.
 
     Reference: Fossen (2011), equations 6.41 to 6.60 and 8.134; Van de Ven, Flanagan and Toal (2004), eq. 15.
+
+    Example:
+        ```python
+        import torch
+        model = auvnn.load("rov95")
+        nu_dot = model(torch.zeros(6).double(), torch.zeros(6).double(), torch.zeros(model.actuators.size).double())
+        ```
     """
 
     def __init__(
@@ -220,6 +227,16 @@ class GreyBox(EquationsOfMotion):
             commands: (..., T, n), each held until the next row, or `Inputs` with fins, voltage and altitude too.
             times: s, increasing, (T,) or (..., T).
             **options: method, `max_step`, `engine` and others of `rollout`.
+
+        Example:
+            ```python
+            import torch
+            model = auvnn.load("rov95")
+            times = torch.arange(0.0, 5.0, 0.05).double()
+            still = torch.zeros(6).double()
+            ahead = 0.3 * torch.ones(len(times), model.actuators.size).double()
+            trajectory = model.rollout(still, still, ahead, times)  # trajectory.nu: (100, 6)
+            ```
         """
         from auvnn.models.free_running.rollout import rollout
 

@@ -45,6 +45,12 @@ def load(source: str | Path, actuation: str | None = None) -> GreyBox:
     Raises:
         ModelError: the file is damaged, incomplete, not physical, or from a newer auvnn.
         ConfigError: an unknown name.
+
+    Example:
+        ```python
+        model = auvnn.load("bluerov2_heavy")  # or "my_vehicle.yaml", or a folder that was saved
+        by_wrench = auvnn.load("rov95", actuation="wrench")
+        ```
     """
     path = Path(source)
     if not folder_exists(path):
@@ -120,6 +126,12 @@ def remove(model: GreyBox, effects: str | list[str]) -> GreyBox:
 
     Raises:
         ConfigError: the model has no such effect.
+
+    Example:
+        ```python
+        model = auvnn.load("rov95").with_effects({"ocean_current": {"v_north": 0.2}})
+        plain = auvnn.remove(model, "ocean_current")
+        ```
     """
     names = [effects] if isinstance(effects, str) else list(effects)
     for name in names:

@@ -108,6 +108,14 @@ def simulate(
         ConfigError: an option is unknown or out of range, or the plant does not know a hidden effect.
         MissingExtra: the plant's package is not installed.
         AuvnnError: the plant diverges; the message says when and by which term.
+
+    Example:
+        ```python
+        model = auvnn.load("rov95")
+        hidden = {"ocean_current": {"v_north": 0.2}}
+        made = auvnn.simulate(model, "multisine", "realistic", hidden, seed=1, runs=1, duration=8.0)
+        made.log, made.truth["hidden"]
+        ```
     """
     _check(seed, runs, duration, rate, coefficients, max_step)
     if accelerations is not None and not isinstance(accelerations, bool):

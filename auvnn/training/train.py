@@ -120,6 +120,14 @@ def train(
     Raises:
         ConfigError: an unknown scheme, form or option.
         InputError: nothing to fit, the same data on both sides, or a log that contradicts itself.
+
+    Example:
+        ```python
+        model = auvnn.load("rov95")
+        log = auvnn.simulate(model, coefficients="drawn", noise="realistic").log
+        trained = auvnn.train(model, log, "levenberg_marquardt", "polynomial")
+        trained.metrics, trained.model
+        ```
     """
     goal = build_objective(objective)
     if test is None:

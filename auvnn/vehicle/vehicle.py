@@ -41,6 +41,12 @@ class Vehicle:
         effects: effects that are part of the model, name to parameters.
         source: where the numbers come from.
         warnings: what is doubtful about the file, in words.
+
+    Example:
+        ```python
+        vehicle = auvnn.load("remus100").vehicle
+        vehicle.mass, vehicle.added_mass.shape  # kg, (6, 6)
+        ```
     """
 
     name: str
