@@ -19,9 +19,9 @@ from auvnn.diagnosis.one_step.fit import fit_hypothesis_one_step
 from auvnn.diagnosis.score_tests.probes import null_is_no_start
 from auvnn.diagnosis.score_tests.shape_search import search_shapes
 from auvnn.errors import ConfigError
+from auvnn.estimation.nuisance import NormalEquations
 from auvnn.estimation.prediction_error import Fitted, fit
 from auvnn.estimation.priors import limits, parameters_of, set_parameters
-from auvnn.estimation.scaling import unit_of
 from auvnn.logs import Log
 from auvnn.metrics.derivative import Derivative, choose_derivative
 from auvnn.metrics.windows import Windows
@@ -247,11 +247,9 @@ def newton(fitted: Fitted, held: Any, keep: NDArray[np.bool_]) -> NDArray[np.flo
     free = held.inside(theta) & (theta > low) & (theta < high)
     step = np.zeros(len(theta))
     if free.any():
-        hessian = sums.hessian[keep].sum(0) + np.diag(held.precision)
-        slope = sums.slope[keep].sum(0) - held.precision * (theta - held.mean)
-        unit = unit_of(hessian[np.ix_(free, free)])
-        even = hessian[np.ix_(free, free)] * unit[:, None] * unit
-        step[free] = np.linalg.lstsq(even, slope[free] * unit, rcond=1e-12)[0] * unit
+        hessian, slope = sums.hessian[keep].sum(0), sums.slope[keep].sum(0)
+        whole = NormalEquations.with_priors(hessian, slope, held.precision, theta - held.mean)
+        step[free] = whole.part(free).solve()
     return np.clip(theta + step, low, high)
 
 

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from auvnn.effects import Sensed
 from auvnn.estimation.normal_equations import linearise
-from auvnn.estimation.priors import Priors, bounded_step, limits, parameters_of, set_parameters
+from auvnn.estimation.nuisance import NormalEquations
+from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
 from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.rollouts import CUT, Scale
 from auvnn.metrics.windows import VELOCITY, Windows
@@ -108,11 +109,9 @@ class FreeRunFit:
 
 
 def _step(hessian: Array, slope: Array, theta: Array, low: Array, high: Array, damping: float) -> Array:
-    unit = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
-    normal = hessian / unit[:, None] / unit + damping * np.eye(len(theta))
-    if not (np.isfinite(normal).all() and np.isfinite(slope).all()):
+    if not (np.isfinite(hessian).all() and np.isfinite(slope).all()):
         return np.zeros(len(theta))
-    return bounded_step(normal, slope / unit, (low - theta) * unit, (high - theta) * unit) / unit
+    return NormalEquations(hessian, slope).bounded(low - theta, high - theta, damping=damping)
 
 
 def predicted(model: GreyBox, windows: Windows) -> Array:

@@ -12,6 +12,7 @@ from auvnn.diagnosis.hypotheses.layout import DETERMINED, Layout, priors, scales
 from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.estimation.normal_equations import Statistics
+from auvnn.estimation.nuisance import NormalEquations
 from auvnn.estimation.prediction_error import Fitted
 from auvnn.estimation.priors import Priors
 from auvnn.metrics.windows import Windows
@@ -207,10 +208,9 @@ def standard_errors(explanation: FittedHypothesis, columns: NDArray[np.int64]) -
     statistics, fitted = explanation.fitted.statistics, explanation.fitted
     covariance = fitted.covariance()
     others = np.setdiff1d(np.arange(len(fitted.theta)), columns)
-    total = statistics.total + np.diag(fitted.priors.precision)
-    carry = np.linalg.lstsq(total[np.ix_(others, others)], total[np.ix_(others, columns)], rcond=1e-12)[0]
-    by_window = statistics.slope[:, columns] - statistics.slope[:, others] @ carry
-    information = total[np.ix_(columns, columns)] - total[np.ix_(columns, others)] @ carry
-    factor = variance_inflation(by_window, information, statistics.run)
+    whole = NormalEquations(statistics.total + np.diag(fitted.priors.precision), statistics.slope.sum(0))
+    left = whole.eliminate(columns, others, rcond=1e-12)
+    by_window = left.scores(statistics.slope[:, columns], statistics.slope[:, others])
+    factor = variance_inflation(by_window, left.equations.square, statistics.run)
     std = np.sqrt(np.maximum(np.diag(covariance)[columns], 0.0) * factor)
     return np.where(determined(explanation, columns), std, np.nan), factor

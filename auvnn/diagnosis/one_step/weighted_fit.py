@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.estimation.scaling import unit_of
+from auvnn.estimation.nuisance import NormalEquations
 from auvnn.logs import Log
 
 Array = NDArray[np.float64]
@@ -46,9 +46,7 @@ def _sums(gap: Array, x: Array, weight: Array) -> tuple[Array, Array]:
 def _solved(square: Array, right: Array, precision: Array, mean: Array) -> Array:
     if not len(right):
         return np.zeros(0)
-    square, right = square + np.diag(precision), right + precision * mean
-    scale = unit_of(square)
-    return scale * np.linalg.lstsq(square * np.outer(scale, scale), scale * right, rcond=1e-13)[0]
+    return NormalEquations.with_priors(square, right, precision, -mean).solve(rcond=1e-13)
 
 
 def weights(gap: Array, x: Array, precision: Array, mean: Array) -> Array:

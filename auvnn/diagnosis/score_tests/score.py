@@ -20,6 +20,7 @@ from scipy import stats
 from auvnn.diagnosis.hypotheses.layout import DETERMINED, FREE, Layout, priors, scales
 from auvnn.diagnosis.score_tests.variance_inflation import TINY, variance_inflation
 from auvnn.estimation.normal_equations import Statistics
+from auvnn.estimation.nuisance import NormalEquations, carry_of
 from auvnn.estimation.priors import Priors, parameters_of
 
 Array = NDArray[np.float64]
@@ -113,13 +114,11 @@ def projection(
     movable = held.inside(theta)
     f, theta = f[movable], theta[movable]
     held = Priors(held.mean[movable], held.precision[movable])
-    inner = total[np.ix_(f, f)] + np.diag(held.precision)
-    carry = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
-    gradient = slope[c] - carry @ slope[f] + carry @ (held.precision * (theta - held.mean))
-    information = total[np.ix_(c, c)] - carry @ total[np.ix_(f, c)]
-    return Projection(
-        c, f, np.asarray(carry, dtype=np.float64), gradient, 0.5 * (information + information.T)
-    )
+    square, right = total.copy(), slope.copy()
+    square[f, f] += held.precision
+    right[f] -= held.precision * (theta - held.mean)
+    left = NormalEquations(square, right).eliminate(c, f)
+    return Projection(c, f, left.carry, left.equations.right, left.information)
 
 
 def _explained_share(
@@ -147,8 +146,7 @@ def following(
     others = [n for n in base if n != effect]
     f, c = layout.of(others), layout.columns[effect]
     inner = total[np.ix_(f, f)] + np.diag(priors(layout, others, free).precision)
-    carry = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
-    return c, f, np.asarray(carry, dtype=np.float64)
+    return c, f, carry_of(inner, total[np.ix_(f, c)])
 
 
 def score(
@@ -263,8 +261,8 @@ def similarity(statistics: Statistics, layout: Layout, base: Sequence[str], name
             ca, cb = layout.columns[a], layout.columns[b]
             both = np.concatenate([ca, cb])
             inner = total[np.ix_(f, f)] + np.diag(priors(layout, others).precision)
-            carry = np.linalg.solve(inner, total[np.ix_(f, both)]) if len(f) else np.zeros((0, len(both)))
-            left = total[np.ix_(both, both)] - total[np.ix_(both, f)] @ carry
+            across = total[np.ix_(f, both)]
+            left = total[np.ix_(both, both)] - carry_of(inner, across) @ across
             sa, sb = scales(layout, a), scales(layout, b)
             unit = np.concatenate([sa, sb])
             left = left * unit[:, None] * unit
