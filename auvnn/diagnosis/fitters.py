@@ -16,8 +16,7 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.layout import Layout, priors
 from auvnn.diagnosis.left_out_folds import Fold
 from auvnn.diagnosis.one_step.fit import fit_hypothesis_one_step
-from auvnn.diagnosis.score_tests.probes import null_is_no_start
-from auvnn.diagnosis.score_tests.shape_search import search_shapes
+from auvnn.diagnosis.score_tests.shape_search import searched_start
 from auvnn.errors import ConfigError
 from auvnn.estimation.nuisance import NormalEquations
 from auvnn.estimation.prediction_error import Fitted, fit
@@ -113,15 +112,14 @@ class ByWindows:
             effects: that are asked for, the newest last.
             start: a fit to go on from; measured states where None.
         """
-        looked = start is not None and bool(effects) and effects[-1] not in start.names
-        looked = looked and null_is_no_start(layout, effects[-1])
+        if start is None:
+            return fit_hypothesis(layout, self.windows, base, effects)
         guess = None
-        if start is not None and looked:
-            guess = search_shapes(layout, self.windows, start, base).start(effects[-1])
-        elif start is not None:
+        if effects and effects[-1] not in start.names:
+            guess = searched_start(layout, self.windows, start, base, effects[-1])
+        if guess is None:
             guess = started(layout, start, [*base, *effects])
-        fitted = None if start is None else start.fitted
-        return fit_hypothesis(layout, self.windows, base, effects, start=fitted, guess=guess)
+        return fit_hypothesis(layout, self.windows, base, effects, start=start.fitted, guess=guess)
 
     def without(self, layout: Layout, found: FittedHypothesis, fold: Fold, refit: bool) -> FittedHypothesis:
         """Fit again without the windows that share a sample with a fold; see `Fitter`.

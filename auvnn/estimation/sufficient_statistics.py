@@ -92,7 +92,7 @@ class WindowSums:
         return type(self)(**{name: mine[name] + theirs[name] for name in mine})
 
     def spread(self, floor: Array, parameters: int) -> Array:
-        """Return each channel's root-mean-square error, (18,), as `window_sums.spread` does."""
+        """Return each channel's root-mean-square error, (18,), as `normal_equations.residual_std` does."""
         spent = (12 * self.windows + parameters) * self.count / max(self.count.sum(), 1.0)
         with np.errstate(invalid="ignore", divide="ignore"):
             value = np.sqrt(self.channel / np.maximum(self.count - spent, 0.25 * self.count))

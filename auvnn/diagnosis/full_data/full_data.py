@@ -173,7 +173,7 @@ def _errors(
     priors: Priors,
     blocks: Sequence[NDArray[np.int64]],
 ) -> Array:
-    """Return standard errors as `explain.standard_errors` does, for each effect's columns at a time."""
+    """Return standard errors as `fit.standard_errors` does, for each effect's columns at a time."""
     size = len(sums.slope)
     whole = NormalEquations(sums.hessian + np.diag(priors.precision), sums.slope)
     covariance = whole.covariance()

@@ -1,7 +1,8 @@
 """What names leave, asked of every measured input: a force that goes with one refutes a name that stood in for it.
 
-`any_force` assumes nothing of a force's course and pays for that with power. A force that is a function of one measured
-input needs three or four parameters in a degree of freedom, and shows where a name has explained nine tenths of it.
+`variance_component` assumes nothing of a force's course and pays for that with power. A force that is a function of one
+measured input needs three or four parameters in a degree of freedom, and shows where a name has explained nine tenths
+of it.
 """
 
 from __future__ import annotations
@@ -64,7 +65,8 @@ def additive_force_test(
         explanation: the fit with the names.
         layout: stated values.
         windows: those it was fitted to.
-        sigma: (18,) standard deviations of the noise, infinite for channels that do not count; see `any_force.white`.
+        sigma: (18,) standard deviations of the noise, infinite for channels that do not count; see
+            `variance_component.white`.
         names: effects that were given as names.
         alpha: significance that a name must reach to be needed.
     """

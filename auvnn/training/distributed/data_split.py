@@ -147,7 +147,7 @@ def _split_rows(shared: tuple[Mapping, NDArray[np.void]], piece: Piece) -> NDArr
 
 
 def refuse_leakage(pool: Executor, log: Pieces, test: Pieces, mapping: Mapping) -> None:
-    """Refuse a test log that shares samples with what is fitted, as `logs.overlap.leakage` does, by some samples.
+    """Refuse a test log that shares samples with what is fitted, as `logs.leakage.leakage` does, by some samples.
 
     Args:
         pool: does it piece by piece.
