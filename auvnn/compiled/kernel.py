@@ -176,7 +176,7 @@ class _Run(torch.autograd.Function):
 
     @staticmethod
     @torch.autograd.function.once_differentiable
-    def backward(ctx: Any, *grads: Tensor) -> tuple:
+    def backward(ctx: Any, *grads: Tensor) -> tuple:  # pyright: ignore[reportIncompatibleMethodOverride]
         out, *tensors = ctx.saved_tensors
         y0, numbers = tensors[0], tensors[5]
         kernel: Kernel = ctx.kernel

@@ -9,8 +9,8 @@ Reference: Frisch and Waugh (1933), Econometrica 1(4), for the elimination.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from auvnn.estimation.priors import bounded_step
 from auvnn.estimation.scaling import unit_of
 
 Array = NDArray[np.float64]
-Columns = NDArray[np.int64] | NDArray[np.bool_] | Sequence[int]
+Columns = NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -155,4 +155,4 @@ def carry_of(inner: Array, across: Array, *, rcond: float | None = None) -> Arra
         return np.zeros((across.shape[1], 0))
     if rcond is None:
         return np.asarray(np.linalg.solve(inner, across).T, dtype=np.float64)
-    return np.linalg.lstsq(inner, across, rcond=rcond)[0].T
+    return np.asarray(np.linalg.lstsq(inner, across, rcond=rcond)[0].T, dtype=np.float64)

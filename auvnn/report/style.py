@@ -139,7 +139,7 @@ class Numbers(ScalarFormatter):
 class Drawing(Figure):
     """A Figure that a notebook can show without pyplot."""
 
-    def add_subplot(self, *args: Any, **options: Any) -> Axes:
+    def add_subplot(self, *args: Any, **options: Any) -> Axes:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Add axes whose numbers are plain text."""
         axes = super().add_subplot(*args, **options)
         for axis in (axes.xaxis, axes.yaxis):
