@@ -14,7 +14,13 @@ T = TypeVar("T")
 
 
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
-    """Return the one-line answer to an unknown name: what it might have been, and what there is."""
+    """Return the one-line answer to an unknown name: what it might have been, and what there is.
+
+    Args:
+        kind: what a member is, as a word for messages ("effect").
+        name: that was asked for.
+        known: names that there are.
+    """
     names = sorted(known)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f" Did you mean '{near[0]}'?" if near else ""

@@ -134,7 +134,16 @@ def run_of(log: Log, number: int | None) -> Run:
 def traces(
     log: Log, number: int | None, group: str, low: float | None, high: float | None, points: int
 ) -> dict[str, Any]:
-    """Return the traces of one group of a run between two times, thinned."""
+    """Return the traces of one group of a run between two times, thinned.
+
+    Args:
+        log: the log that is shown.
+        number: of the run; the first one where None.
+        group: which channels: a group of `series_of`.
+        low: begin, s on the run's clock; from its start where None.
+        high: end, s; to its end where None.
+        points: most points of each trace.
+    """
     run = run_of(log, number)
     piece = part(run.t, low, high)
     series = {name: values[piece] for name, values in series_of(run, group)}

@@ -59,14 +59,26 @@ def thin(
 
 
 def part(t: Array, low: float | None, high: float | None) -> slice:
-    """Return the samples from `low` to `high` s, with one more at each end so that lines reach the border."""
+    """Return the samples from `low` to `high` s, with one more at each end so that lines reach the border.
+
+    Args:
+        t: times, s, increasing, (N,).
+        low: begin, s; from the first sample where None.
+        high: end, s; to the last sample where None.
+    """
     first = 0 if low is None else max(int(np.searchsorted(t, low)) - 1, 0)
     last = len(t) if high is None else min(int(np.searchsorted(t, high, side="right")) + 1, len(t))
     return slice(first, max(last, first))
 
 
 def intervals(t: Array, mask: NDArray[np.bool_], most: int = 400) -> list[list[float]]:
-    """Return where a mask holds as [begin, end] in s; neighbours that are nearest are joined beyond `most`."""
+    """Return where a mask holds as [begin, end] in s; neighbours that are nearest are joined beyond `most`.
+
+    Args:
+        t: times, s, (N,).
+        mask: where it holds, (N,).
+        most: most intervals that are returned.
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     begin, end = edges[::2], edges[1::2] - 1
     if len(begin) > most:

@@ -41,7 +41,14 @@ class Where:
     def traces(
         self, number: int | None, low: float | None, high: float | None, points: int
     ) -> dict[str, Any]:
-        """Return measured and predicted velocities and the residual wrench of a run between two times, thinned."""
+        """Return measured and predicted velocities and the residual wrench of a run between two times, thinned.
+
+        Args:
+            number: of the run; the first one where None.
+            low: begin, s; from the run's start where None.
+            high: end, s; to its end where None.
+            points: most points of each trace.
+        """
         run = run_of(self.log, number)
         columns = self._runs[run.number]
         t = columns["t"]
@@ -81,6 +88,13 @@ def held_out_traces(
     folder: Path, number: int | None, low: float | None, high: float | None, points: int
 ) -> dict[str, Any]:
     """Return the held-out traces of an improvement: measured, before, refitted and after, thinned.
+
+    Args:
+        folder: of an improvement, with `series.npz` in it.
+        number: of the run; the first held-out one where None.
+        low: begin, s; from the run's start where None.
+        high: end, s; to its end where None.
+        points: most points of each trace.
 
     Raises:
         InputError: the answer has no such run.

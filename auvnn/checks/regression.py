@@ -113,6 +113,11 @@ def variance_inflation(rows_of: RegressionRows, residual: Array, regressor: Arra
 
     1 + 2 sum_k r_k s_k with the autocorrelations of residual and regressors, Bartlett's window over 5 s, and the
     worst of the columns, not less than one.
+
+    Args:
+        rows_of: the regression, for its time step `dt`, s.
+        residual: what the regression leaves, (N, outputs).
+        regressor: its columns, (N, columns).
     """
     lags = int(min(_LAGS_SECONDS / rows_of.dt, len(residual) / 4))
     a, b = _autocorrelation(residual, lags), _autocorrelation(regressor, lags)

@@ -56,7 +56,13 @@ def beside(
 
 
 def stands(model: GreyBox, log: Log, how: Derivative) -> dict[str, Any]:
-    """Return the same for a model as it is, over a log's windows of 5 s."""
+    """Return the same for a model as it is, over a log's windows of 5 s.
+
+    Args:
+        model: as it is.
+        log: whose windows are run.
+        how: how accelerations are obtained for the regression.
+    """
     scale = scale_of(log)
     rolled = {h: r for h in ("5",) if (r := roll(model, log, h, scale)) is not None}
     return beside(rolled, model.actuation, scale, log, how)

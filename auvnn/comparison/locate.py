@@ -111,6 +111,12 @@ def failures(
     A place's share is what its bin holds of the residual's energy above the noise floor, all six degrees of
     freedom together, forces and moments made comparable by their floors. Degrees of freedom whose residual is
     about as large as noise alone leaves it are left out.
+
+    Args:
+        parts: comparison one step ahead, run by run.
+        located: residual by bins of each quantity, as `locate` returns them.
+        floor: standard deviation that noise alone leaves in the residual, (6,), N and N m.
+        limit: most places that are named.
     """
     wrench = np.concatenate([p.wrench for p in parts])
     unit = np.where(floor > 0, floor, 1e-9)

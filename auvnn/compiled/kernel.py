@@ -78,7 +78,14 @@ class Kernel:
         return self._loaded[lanes]
 
     def rate(self, y: Tensor, u: Tensor, numbers: Tensor, batch: int | None = None) -> Tensor:
-        """Return the derivative at states (N, n) and inputs (N, m), by the code for so many trajectories."""
+        """Return the derivative at states (N, n) and inputs (N, m), by the code for so many trajectories.
+
+        Args:
+            y: states (N, n).
+            u: inputs (N, m).
+            numbers: parameters and constants of the code, (K,).
+            batch: for how many trajectories the code is compiled; N by default.
+        """
         y, u, numbers = (x.detach().contiguous() for x in (y, u, numbers))
         out = torch.empty_like(y)
         self.load(batch or len(y)).auvnn_rate(
@@ -89,7 +96,15 @@ class Kernel:
     def rate_back(
         self, y: Tensor, u: Tensor, numbers: Tensor, back: Tensor, batch: int | None = None
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """Return products of cotangents (N, n) with the Jacobians: in y (N, n), u (N, m), and summed in numbers."""
+        """Return products of cotangents (N, n) with the Jacobians: in y (N, n), u (N, m), and summed in numbers.
+
+        Args:
+            y: states (N, n).
+            u: inputs (N, m).
+            numbers: parameters and constants of the code, (K,).
+            back: cotangents of the derivative, (N, n).
+            batch: for how many trajectories the code is compiled; N by default.
+        """
         y, u, numbers, back = (x.detach().contiguous() for x in (y, u, numbers, back))
         gy, gu, found = torch.empty_like(y), torch.empty_like(u), numbers.new_zeros(len(self.places))
         given = (y, u, numbers, back, gy, gu, found)
@@ -161,7 +176,7 @@ class _Run(torch.autograd.Function):
 
     @staticmethod
     @torch.autograd.function.once_differentiable
-    def backward(ctx: Any, *grads: Tensor) -> tuple:
+    def backward(ctx: Any, *grads: Tensor) -> tuple:  # pyright: ignore[reportIncompatibleMethodOverride]
         out, *tensors = ctx.saved_tensors
         y0, numbers = tensors[0], tensors[5]
         kernel: Kernel = ctx.kernel

@@ -213,7 +213,13 @@ class _Plain(nn.Module):
 
 
 def recorded(recorder: Recorder, run: Callable[[], Program], gradient: bool) -> Program:
-    """Run under the recorder, and turn whatever goes wrong into one kind of refusal."""
+    """Run under the recorder, and turn whatever goes wrong into one kind of refusal.
+
+    Args:
+        recorder: notes the operations.
+        run: does what is to be recorded.
+        gradient: whether autograd is on meanwhile.
+    """
     try:
         with recorder, torch.set_grad_enabled(gradient):
             return run()

@@ -71,6 +71,12 @@ def _inverse(r: Recorder, out: Any, x: Tensor) -> None:
 def apply(r: Recorder, func: Any, args: tuple, kwargs: dict) -> Any:
     """Run one operation for real and in the graph.
 
+    Args:
+        r: keeps the graph.
+        func: the operation, an overload of `torch.ops.aten`.
+        args: its positional arguments, tensors among them.
+        kwargs: its keyword arguments.
+
     Raises:
         CannotCompile: there is no rule for it, or what it does depends on the values of the state.
     """

@@ -179,11 +179,23 @@ class Scalars:
         return self._node("abs", self.operands[a][0] if self.operation[a] == "neg" else a)
 
     def binary(self, name: str, a: int, b: int) -> int:
-        """Return pow(a, b), atan2(a, b), max(a, b) or min(a, b)."""
+        """Return pow(a, b), atan2(a, b), max(a, b) or min(a, b).
+
+        Args:
+            name: "pow", "atan2", "max" or "min".
+            a: number of the first operand's node.
+            b: number of the second operand's node.
+        """
         return self._node(name, a, b)
 
     def where(self, condition: int, a: int, b: int) -> int:
-        """Return a where the condition holds, else b."""
+        """Return a where the condition holds, else b.
+
+        Args:
+            condition: number of the condition's node.
+            a: number of the node that is taken where it holds.
+            b: number of the node that is taken elsewhere.
+        """
         known = self.value(condition)
         if known is not None:
             return a if known else b
@@ -194,7 +206,13 @@ class Scalars:
         return self._node("where", condition, a, b)
 
     def compare(self, name: str, a: int, b: int) -> int:
-        """Return whether a < b (lt), a <= b (le), a = b (eq) or not (ne)."""
+        """Return whether a < b (lt), a <= b (le), a = b (eq) or not (ne).
+
+        Args:
+            name: "lt", "le", "eq" or "ne".
+            a: number of the left operand's node.
+            b: number of the right operand's node.
+        """
         x, y = self.value(a), self.value(b)
         if x is not None and y is not None:
             return self.constant({"lt": x < y, "le": x <= y, "eq": x == y, "ne": x != y}[name])

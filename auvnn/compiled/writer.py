@@ -170,7 +170,13 @@ class Writer:
         ]
 
     def store(self, place: str, nodes: Sequence[int], sign: str = "=") -> list[str]:
-        """Return the statements that leave nodes in an array."""
+        """Return the statements that leave nodes in an array.
+
+        Args:
+            place: the array's name in C.
+            nodes: numbers of the nodes, in the array's order.
+            sign: "=" to set, "+=" to add.
+        """
         return [f"{place}[{k}] {sign} {self._name(n, True)};" for k, n in enumerate(nodes)]
 
 

@@ -80,6 +80,11 @@ class DampingForm(nn.Module):
 def positive_int(value: Any, what: str, *, most: int = 1000) -> int:
     """Return `value` if it is a whole number from 1 to `most`.
 
+    Args:
+        value: what was given.
+        what: its name, for the message.
+        most: largest value that is allowed.
+
     Raises:
         ConfigError: it is not.
     """
@@ -107,6 +112,13 @@ def redraw(generator: torch.Generator, *weights: tuple[Tensor, int]) -> None:
 
 
 def draw(shape: Sequence[int], bound: float, generator: torch.Generator, like: Tensor) -> Tensor:
-    """Return numbers drawn evenly from [-bound, bound], the same on every device and in every dtype."""
+    """Return numbers drawn evenly from [-bound, bound], the same on every device and in every dtype.
+
+    Args:
+        shape: of the numbers.
+        bound: largest size of a number.
+        generator: on the CPU; it decides all draws.
+        like: gives dtype and device.
+    """
     numbers = torch.rand(tuple(shape), generator=generator, dtype=torch.float64) * 2.0 - 1.0
     return (bound * numbers).to(dtype=like.dtype, device=like.device)

@@ -77,6 +77,14 @@ def diagnose(
     Raises:
         ConfigError: an unknown effect.
         InputError: the log has too little that can be used, or contradicts itself.
+
+    Example:
+        ```python
+        model = auvnn.load("rov95")
+        log = auvnn.simulate(model, noise="realistic", hidden={"ocean_current": {"v_north": 0.2}}).log
+        diagnosis = auvnn.diagnose(model, log, ["ocean_current", "net_buoyancy"])
+        diagnosis.verdict, diagnosis.missing  # "named", ["ocean_current"]
+        ```
     """
     log = as_log(log)
     model = as_model(model, log)
@@ -111,7 +119,22 @@ def searched(
     costs: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[Diagnosis, Searched]:
-    """Return what `diagnose` does, and the search that led to it."""
+    """Return what `diagnose` does, and the search that led to it.
+
+    Args:
+        model: as known; it is not changed.
+        log: measurements.
+        effects: names that may be missing; the whole catalogue by default.
+        max_effects: name at most this many.
+        window: length of the windows, s; chosen by the log's rate where None.
+        advice: say what to drive next where names cannot be told apart.
+        whiteness: test what is left for structure.
+        stochastic: allow for a force that wanders.
+        force: go on with a log that contradicts itself: signs, units, axes.
+        tolerance: what counts as small: a `Tolerance`, its options, or None.
+        costs: say what each name costs in free running.
+        progress: told in words what is being done.
+    """
     say = progress or (lambda words: None)
     if max_effects < 1:
         raise ConfigError(f"max_effects={max_effects} must be at least 1")

@@ -16,12 +16,11 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.layout import Layout, priors
 from auvnn.diagnosis.left_out_folds import Fold
 from auvnn.diagnosis.one_step.fit import fit_hypothesis_one_step
-from auvnn.diagnosis.score_tests.probes import null_is_no_start
-from auvnn.diagnosis.score_tests.shape_search import search_shapes
+from auvnn.diagnosis.score_tests.shape_search import searched_start
 from auvnn.errors import ConfigError
+from auvnn.estimation.nuisance import NormalEquations
 from auvnn.estimation.prediction_error import Fitted, fit
 from auvnn.estimation.priors import limits, parameters_of, set_parameters
-from auvnn.estimation.scaling import unit_of
 from auvnn.logs import Log
 from auvnn.metrics.derivative import Derivative, choose_derivative
 from auvnn.metrics.windows import Windows
@@ -49,7 +48,14 @@ class Fitter(Protocol):
         ...
 
     def without(self, layout: Layout, found: FittedHypothesis, fold: Fold, refit: bool) -> FittedHypothesis:
-        """Fit the same again without a fold; where not `refit`, by one Newton step from the fit to everything."""
+        """Fit the same again without a fold; where not `refit`, by one Newton step from the fit to everything.
+
+        Args:
+            layout: stated values.
+            found: the fit to everything.
+            fold: part of the log that is left out.
+            refit: whether to fit in full.
+        """
         ...
 
 
@@ -62,6 +68,13 @@ def fitter_for(
     derivative: dict[str, Any] | None = None,
 ) -> Fitter:
     """Return who fits by an objective.
+
+    Args:
+        model: that is to be fitted, for its actuation.
+        log: measurements.
+        objective: "rollout" (windows run free) or "one_step" (accelerations).
+        window: length of the windows, s; chosen by the log where None.
+        derivative: how accelerations are obtained, for "one_step".
 
     Raises:
         ConfigError: an unknown objective, or a window for one that has none.
@@ -91,19 +104,32 @@ class ByWindows:
     def fit(
         self, layout: Layout, base: Sequence[str], effects: Sequence[str], start: FittedHypothesis | None
     ) -> FittedHypothesis:
-        """Fit from measured states, or from another fit's; see `Fitter`."""
-        looked = start is not None and bool(effects) and effects[-1] not in start.names
-        looked = looked and null_is_no_start(layout, effects[-1])
+        """Fit from measured states, or from another fit's; see `Fitter`.
+
+        Args:
+            layout: stated values.
+            base: effects that are free anyway.
+            effects: that are asked for, the newest last.
+            start: a fit to go on from; measured states where None.
+        """
+        if start is None:
+            return fit_hypothesis(layout, self.windows, base, effects)
         guess = None
-        if start is not None and looked:
-            guess = search_shapes(layout, self.windows, start, base).start(effects[-1])
-        elif start is not None:
+        if effects and effects[-1] not in start.names:
+            guess = searched_start(layout, self.windows, start, base, effects[-1])
+        if guess is None:
             guess = started(layout, start, [*base, *effects])
-        fitted = None if start is None else start.fitted
-        return fit_hypothesis(layout, self.windows, base, effects, start=fitted, guess=guess)
+        return fit_hypothesis(layout, self.windows, base, effects, start=start.fitted, guess=guess)
 
     def without(self, layout: Layout, found: FittedHypothesis, fold: Fold, refit: bool) -> FittedHypothesis:
-        """Fit again without the windows that share a sample with a fold; see `Fitter`."""
+        """Fit again without the windows that share a sample with a fold; see `Fitter`.
+
+        Args:
+            layout: stated values.
+            found: the fit to everything.
+            fold: part of the log that is left out.
+            refit: whether to fit in full after the Newton step.
+        """
         keep = ~within(self.windows, fold.held)
         if not keep.any():
             raise FloatingPointError("nothing is left to fit to")
@@ -142,6 +168,12 @@ class OneStep:
     ) -> FittedHypothesis:
         """Fit all samples; see `Fitter`.
 
+        Args:
+            layout: stated values.
+            base: effects that are free anyway.
+            effects: that are asked for; none may have a shape.
+            start: a fit to go on from, or None.
+
         Raises:
             ConfigError: an effect has a time or a shape to be found.
         """
@@ -151,7 +183,14 @@ class OneStep:
         )
 
     def without(self, layout: Layout, found: FittedHypothesis, fold: Fold, refit: bool) -> FittedHypothesis:
-        """Fit the other samples, always in full: it is cheap; see `Fitter`."""
+        """Fit the other samples, always in full: it is cheap; see `Fitter`.
+
+        Args:
+            layout: stated values.
+            found: the fit to everything.
+            fold: part of the log that is left out.
+            refit: not used: the fit is always in full.
+        """
         log = replace(fold.fit, runs=tuple(run.cleaned for run in fold.fit.runs))
         base = [n for n in found.names if n not in found.effects]
         return fit_hypothesis_one_step(layout, log, base, found.effects, self.how, start=found.fitted)
@@ -166,14 +205,26 @@ def _shapeless(layout: Layout, effects: Sequence[str]) -> None:
 
 
 def at(layout: Layout, names: Sequence[str], theta: NDArray[np.float64]) -> GreyBox:
-    """Return the layout's model with some effects at given values."""
+    """Return the layout's model with some effects at given values.
+
+    Args:
+        layout: stated values.
+        names: effects, in the order of `theta`.
+        theta: their parameters side by side, (P,).
+    """
     model = layout.model.rebuilt(layout.model.copied_effects())
     set_parameters(model, names, theta)
     return model
 
 
 def started(layout: Layout, found: FittedHypothesis, names: Sequence[str]) -> Layout:
-    """Return the layout with those of some effects that a fit holds where it has them."""
+    """Return the layout with those of some effects that a fit holds where it has them.
+
+    Args:
+        layout: stated values.
+        found: a fit.
+        names: effects that take the fit's values where it has them.
+    """
     model = layout.model.rebuilt(layout.model.copied_effects())
     for name in names:
         if name in found.names:
@@ -182,17 +233,21 @@ def started(layout: Layout, found: FittedHypothesis, names: Sequence[str]) -> La
 
 
 def newton(fitted: Fitted, held: Any, keep: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the parameters one Newton step from a fit, some of its windows left out, (P,), within their bounds."""
+    """Return the parameters one Newton step from a fit, some of its windows left out, (P,), within their bounds.
+
+    Args:
+        fitted: the fit to all windows.
+        held: its priors, with the parameters' bounds.
+        keep: which windows stay, (B,).
+    """
     theta, sums = fitted.theta, fitted.statistics
     low, high = limits(fitted.model, fitted.names, held)
     free = held.inside(theta) & (theta > low) & (theta < high)
     step = np.zeros(len(theta))
     if free.any():
-        hessian = sums.hessian[keep].sum(0) + np.diag(held.precision)
-        slope = sums.slope[keep].sum(0) - held.precision * (theta - held.mean)
-        unit = unit_of(hessian[np.ix_(free, free)])
-        even = hessian[np.ix_(free, free)] * unit[:, None] * unit
-        step[free] = np.linalg.lstsq(even, slope[free] * unit, rcond=1e-12)[0] * unit
+        hessian, slope = sums.hessian[keep].sum(0), sums.slope[keep].sum(0)
+        whole = NormalEquations.with_priors(hessian, slope, held.precision, theta - held.mean)
+        step[free] = whole.part(free).solve()
     return np.clip(theta + step, low, high)
 
 

@@ -130,7 +130,19 @@ def each_name(
     refit: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> EachName:
-    """Return the errors on what is left out with all names, without each of them, and without any; see `left_out`."""
+    """Return the errors on what is left out with all names, without each of them, and without any; see `left_out`.
+
+    Args:
+        model: as known.
+        log: measurements, left out part by part.
+        names: effects that are judged.
+        window: length of the windows that are fitted, s; chosen by the log where None.
+        objective: "rollout" or "one_step".
+        derivative: how accelerations are obtained, for "one_step".
+        most: most parts into which the log is cut.
+        refit: fit anew without each part; by one Newton step where false.
+        progress: told in words what is being done.
+    """
     say = progress or (lambda words: None)
     layout = lay_out(model, list(names))
     fitter = fitter_for(model, log, objective, window=window, derivative=derivative)

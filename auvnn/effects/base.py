@@ -95,7 +95,13 @@ class Effect(nn.Module):
 
     @classmethod
     def build(cls, vehicle: Any, actuation: str, values: Mapping[str, float] | None = None) -> Effect:
-        """Make the effect for a vehicle, at `values` and otherwise at the null."""
+        """Make the effect for a vehicle, at `values` and otherwise at the null.
+
+        Args:
+            vehicle: the known numbers.
+            actuation: "thrusters" or "wrench".
+            values: parameters by name, SI units; those that are not given are at their nulls.
+        """
         effect = cls(cls.describe(vehicle, actuation), values)
         effect.settle(vehicle, actuation)
         return effect
@@ -134,6 +140,11 @@ class Effect(nn.Module):
 
         They are asked for where the best start promises much or nothing else does; an empty list, the default, says
         that there are none.
+
+        Args:
+            parameters: of the effect, as `describe` returns them.
+            extent: how far the log reaches in time and space.
+            start: the best start so far, parameters by name.
         """
         return []
 
@@ -145,6 +156,12 @@ class Effect(nn.Module):
 
         Asked for until the list is empty, which it is by default. An onset or a frequency that is off by more than the
         errors can tell ends in a valley of its own, out of which no fit gets.
+
+        Args:
+            parameters: of the effect, as `describe` returns them.
+            extent: how far the log reaches in time and space.
+            shape: the best one so far, parameters of shape by name.
+            level: how often has been looked closer before.
         """
         return []
 
@@ -219,7 +236,13 @@ class Effect(nn.Module):
         return command, torch.zeros_like(state)
 
     def advance(self, state: Tensor, command: Tensor, step: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the changed command, its mean while one is held for `step` seconds (..., 1), and the state after."""
+        """Return the changed command, its mean while one is held for `step` seconds (..., 1), and the state after.
+
+        Args:
+            state: of the effect before, (..., n).
+            command: that is held, (..., n).
+            step: for how long, s, (..., 1).
+        """
         return command, state
 
     def delay(self) -> Tensor:
@@ -231,6 +254,11 @@ class Effect(nn.Module):
 
         The answer must be linear in the gap: demand + (state - demand) f(step) for `end`, `mean` and `start`,
         (state - demand) f(step) for `slope`; long stretches are worked out from f alone.
+
+        Args:
+            state: thrust at the start, N, (..., n).
+            demand: thrust that is asked for, N, (..., n).
+            step: for how long, s, broadcast against both.
         """
         return Response(demand, demand, torch.zeros_like(demand), demand)
 

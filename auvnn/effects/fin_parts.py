@@ -47,7 +47,13 @@ class FinEffect(Effect):
         return moment.fins.to(moment.nu)
 
     def lift(self, moment: Moment, angles: Tensor, share: Tensor | float = 1.0) -> Tensor:
-        """Return the lift's wrench at fin angles, each fin's by its share, (..., 6)."""
+        """Return the lift's wrench at fin angles, each fin's by its share, (..., 6).
+
+        Args:
+            moment: state and water at the fins.
+            angles: of the fins, rad, (..., m).
+            share: of each fin's area that lifts, broadcast to (..., m).
+        """
         frame, area, slope, stall, density = (
             self.kept(n).to(moment.nu) for n in ("frame", "area", "lift_slope", "stall", "density")
         )

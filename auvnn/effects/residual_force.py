@@ -41,7 +41,13 @@ class ResidualForce(Effect):
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str, inputs: Sequence[str] = INPUTS) -> tuple[Parameter, ...]:
-        """Return the weights: `X_u_1` for the drag in surge by the speed u, `N_tilt_x_2` for a moment by tilt."""
+        """Return the weights: `X_u_1` for the drag in surge by the speed u, `N_tilt_x_2` for a moment by tilt.
+
+        Args:
+            vehicle: for its weight and length.
+            actuation: "thrusters" or "wrench".
+            inputs: what the force may depend on, of `INPUTS`.
+        """
         force = 0.02 * float(vehicle.mass) * float(vehicle.gravity)
         sizes = [force] * 3 + [0.2 * force * float(vehicle.length)] * 3
         drag = [f"{s}_{h + 1}" for s in SPEEDS for h in range(len(SLOPES))] if "velocity" in inputs else []
@@ -62,6 +68,12 @@ class ResidualForce(Effect):
         inputs: Sequence[str] | None = None,
     ) -> ResidualForce:
         """Make it for a vehicle, of chosen inputs; by default of those that the values name, or else of all.
+
+        Args:
+            vehicle: the known numbers.
+            actuation: "thrusters" or "wrench".
+            values: weights by name; those that are not given are nought.
+            inputs: what the force may depend on, of `INPUTS`.
 
         Raises:
             ConfigError: an input that there is not.

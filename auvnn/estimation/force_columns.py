@@ -73,7 +73,13 @@ class Cells:
         return torch.cat([slopes[..., :-6], self._by_cell(slopes[..., -6:], self.of_interval)], dim=-1)
 
     def part(self, at: int, slope: Tensor, end: int) -> tuple[int, Tensor]:
-        """Return a part of what is reported, (B, L, out, p), with cells where it is that of the wrench."""
+        """Return a part of what is reported, (B, L, out, p), with cells where it is that of the wrench.
+
+        Args:
+            at: column of the report at which the part begins.
+            slope: of the part in the parameters, (B, L, out, p).
+            end: number of columns of the whole report.
+        """
         return (at, self._by_cell(slope, self.of_sample)) if at == end - 6 else (at, slope)
 
     def parted(self, columns: Tensor) -> tuple[Tensor, Tensor]:

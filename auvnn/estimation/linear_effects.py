@@ -63,7 +63,13 @@ def record_slopes(effects: Sequence[LinearEffect], run: Callable[[], Any]) -> li
 
 
 def with_slopes(effects: Sequence[LinearEffect], parts: Sequence[Added], run: Callable[[], Tensor]) -> Tensor:
-    """Run something with what the effects add given, in the order in which it was noted."""
+    """Run something with what the effects add given, in the order in which it was noted.
+
+    Args:
+        effects: that are replayed.
+        parts: what each of them adds, call by call, as `record_slopes` noted it.
+        run: what is run with it.
+    """
     try:
         for effect, calls in zip(effects, parts, strict=True):
             effect._given = [list(call) for call in calls]

@@ -113,7 +113,14 @@ def motion(windows: Windows) -> Array:
 
 
 def linearise(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str]) -> Iterator[Response]:
-    """Yield the windows' answers chunk by chunk."""
+    """Yield the windows' answers chunk by chunk.
+
+    Args:
+        model: at the values about which it is linearised.
+        windows: of the log, B of them.
+        initial: their initial states, (B, 13).
+        names: effects whose parameters are differentiated by.
+    """
     model = model.without_absent(names)
     columns = sum(len(model.effect(n).parameters_of) for n in names)
     # What moves is the model itself; only its slopes are asked for with a force in it.
@@ -234,7 +241,13 @@ def _cost(response: Response, weight: Tensor) -> float:
 
 
 def residual_std(statistics: Statistics, floor: Array, parameters: int) -> Array:
-    """Return each channel's root-mean-square error, (18,), for the degrees of freedom spent; infinite unmeasured."""
+    """Return each channel's root-mean-square error, (18,), for the degrees of freedom spent; infinite unmeasured.
+
+    Args:
+        statistics: sums of the windows.
+        floor: least value of each channel, (18,), in the channel's unit.
+        parameters: how many were fitted to all windows together.
+    """
     count = statistics.count.sum(0)
     spent = (12 * len(statistics.cost) + parameters) * count / max(count.sum(), 1.0)
     if statistics.spent is not None:

@@ -20,13 +20,12 @@ from numpy.typing import NDArray
 from auvnn.effects.base import HOOKS as ALL_HOOKS
 from auvnn.errors import InputError
 from auvnn.estimation.normal_equations import Statistics
+from auvnn.estimation.nuisance import NormalEquations
 from auvnn.estimation.prediction_error import FitError, Fitted
 from auvnn.estimation.priors import Priors, parameters_of, set_parameters
-from auvnn.estimation.scaling import unit_of
-from auvnn.logs import Log, Run
-from auvnn.logs.signals.derivatives import LocalPolynomial
+from auvnn.logs import Log
 from auvnn.metrics.derivative import Derivative
-from auvnn.metrics.one_step import OneStepReplay
+from auvnn.metrics.one_step import RunComparison
 from auvnn.metrics.windows import ACCELERATION, CHANNELS
 from auvnn.models import GreyBox
 
@@ -36,27 +35,6 @@ Array = NDArray[np.float64]
 STEP = 1e-4
 # A fit has settled when a step gains less than this share of the cost, and the weights keep still within this.
 SETTLED, STILL = 1e-4, 0.01
-
-
-class _Part:
-    """One run: measured acceleration, and the model's through the same filter."""
-
-    def __init__(self, model: GreyBox, run: Run, how: Derivative) -> None:
-        self.replay = OneStepReplay(model, run)
-        self.filter = None
-        if how.method == "measured":
-            assert run.nu_dot is not None
-            self.measured = run.nu_dot
-        else:
-            self.filter = LocalPolynomial(run.t, how.half_width, how.order)
-            self.measured = self.filter(np.where(run.valid[:, None], run.nu, np.nan))[1]
-
-    def error(self) -> Array:
-        """Return measured minus predicted acceleration, (N, 6); zero where there is none."""
-        replay = self.replay
-        predicted = replay.acceleration() if self.filter is None else self.filter(replay.velocity())[1]
-        gap = self.measured - predicted
-        return np.where(np.isfinite(gap), gap, 0.0)
 
 
 def fit_one_step(
@@ -94,12 +72,13 @@ def fit_one_step(
     """
     model = model.rebuilt(model.copied_effects())
     names, fixed = tuple(names), sigma is not None
-    parts = [_Part(model, run, how) for run in log.runs]
+    parts = [RunComparison(model, run, how) for run in log.runs]
 
     def errors(hooks: Collection[str] = ALL_HOOKS) -> Array:
         for part in parts:
-            part.replay.update(hooks)
-        return np.concatenate([part.error() for part in parts])
+            part.update(hooks)
+        gap = np.concatenate([part.gap() for part in parts])
+        return np.where(np.isfinite(gap), gap, 0.0)
 
     theta = parameters_of(model, names)
     here = errors()
@@ -126,7 +105,7 @@ def fit_one_step(
             set_parameters(model, names, theta)
             if k + 1 == len(free) or free[k + 1][0] is not effect:
                 for part in parts:
-                    part.replay.update(effect.hooks())
+                    part.update(effect.hooks())
         return out
 
     def penalty(at: Array) -> float:
@@ -137,19 +116,15 @@ def fit_one_step(
     slope = slopes()
     for taken in range(1, iterations + 1):
         weighted = (slope / own[:, None]).reshape(-1, len(theta))
-        hessian = weighted.T @ weighted + np.diag(priors.precision)
-        gradient = weighted.T @ (here / own).ravel() - priors.precision * (theta - priors.mean)
-        if not np.isfinite(hessian).all():
+        pull = weighted.T @ (here / own).ravel()
+        known = NormalEquations.with_priors(
+            weighted.T @ weighted, pull, priors.precision, theta - priors.mean
+        )
+        if not np.isfinite(known.square).all():
             raise FitError(f"the accelerations of {model.vehicle.name} do not stay finite one step ahead")
-        unit = unit_of(hessian)
-        normal, gradient = hessian * unit[:, None] * unit, np.where(unit > 0.0, gradient, 0.0)
-        scale = 1.0 / np.where(unit > 0.0, unit, 1.0)
         now = float(((here / own) ** 2).sum()) + penalty(theta)
         for _attempt in range(10):
-            step = (
-                np.linalg.lstsq(normal + damping * np.eye(len(theta)), gradient / scale, rcond=1e-13)[0]
-                / scale
-            )
+            step = known.solve(damping=damping, rcond=1e-13)
             set_parameters(model, names, theta + step)
             reached, there = parameters_of(model, names), errors()
             then = float(((there / own) ** 2).sum()) + penalty(reached)

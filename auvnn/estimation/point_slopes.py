@@ -83,7 +83,15 @@ def flat(inputs: Inputs) -> tuple[Inputs, Inputs]:
 def differentiate(
     module: OperatingPoint, what: str, points: tuple, thetas: dict[str, Tensor], chunk: int
 ) -> list[Tensor]:
-    """Return derivatives of a function of a point by position, turn, velocity, thrust and each theta, (N, out, in)."""
+    """Return derivatives of a function of a point by position, turn, velocity, thrust and each theta, (N, out, in).
+
+    Args:
+        module: the model's functions of a point.
+        what: which of them; see `OperatingPoint.forward`.
+        points: position, rotation, velocity, thrust, time and inputs, N of each.
+        thetas: parameters by their names in the module.
+        chunk: points that are differentiated at a time.
+    """
     members = {f"model.effects.{k}.theta": e for k, e in enumerate(module.model.members)}
     replayed = {key: e for key, e in members.items() if key in thetas and isinstance(e, LinearEffect)}
     others = {key: theta for key, theta in thetas.items() if key not in replayed}

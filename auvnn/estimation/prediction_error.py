@@ -28,8 +28,8 @@ from auvnn.estimation.normal_equations import (
     normal_equations,
     residual_std,
 )
-from auvnn.estimation.priors import Priors, bounded_step, limits, parameters_of, set_parameters
-from auvnn.estimation.scaling import unit_of
+from auvnn.estimation.nuisance import NormalEquations
+from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
 from auvnn.estimation.sensitivity import Response
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import Windows
@@ -74,12 +74,11 @@ class Fitted:
 
     def covariance(self) -> Array:
         """Return the covariance (P, P) of the parameters under white noise of `sigma`."""
-        precision = self.statistics.total + np.diag(self.priors.precision)
-        # In units of each parameter's own: what is hardly known must not pass for rounding beside what is well known.
-        unit = unit_of(precision)
-        covariance = np.linalg.pinv(precision * unit[:, None] * unit, hermitian=True) * unit[:, None] * unit
+        whole = self.statistics.total + np.diag(self.priors.precision)
+        known = NormalEquations(whole, self.statistics.slope.sum(0))
+        covariance = known.covariance()
         # Of what the sums say nothing, no more is known than before.
-        dead = np.flatnonzero(unit == 0.0)
+        dead = np.flatnonzero(known.scaled[1] == 0.0)
         covariance[dead, dead] = 1.0 / np.maximum(self.priors.precision[dead], 1e-30)
         return covariance
 
@@ -157,22 +156,11 @@ def fit(
             here = back(before)
             theta, initial, sigma = before
             break
-        hessian = statistics.total + np.diag(priors.precision)
-        gradient = statistics.slope.sum(0) - priors.precision * (theta - priors.mean)
-        unit = unit_of(hessian)
-        normal, gradient = hessian * unit[:, None] * unit, np.where(unit > 0.0, gradient, 0.0)
-        scale = np.where(unit > 0.0, 1.0 / np.where(unit > 0.0, unit, 1.0), 1.0)
+        slope = statistics.slope.sum(0)
+        known = NormalEquations.with_priors(statistics.total, slope, priors.precision, theta - priors.mean)
         now = cost_of(here, sigma) + penalty(theta)
         for _attempt in range(8):
-            step = (
-                bounded_step(
-                    normal + damping * np.eye(len(theta)),
-                    gradient / scale,
-                    (low - theta) * scale,
-                    (high - theta) * scale,
-                )
-                / scale
-            )
+            step = known.bounded(low - theta, high - theta, damping=damping)
             set_parameters(model, names, theta + step)
             reached = parameters_of(model, names)
             change = a - np.einsum("bij,j->bi", slopes, reached - theta)

@@ -42,7 +42,13 @@ def parameters_of(model: GreyBox, names: Sequence[str]) -> Array:
 
 
 def set_parameters(model: GreyBox, names: Sequence[str], theta: Array) -> None:
-    """Set the values of the named effects' parameters, clipped to their bounds."""
+    """Set the values of the named effects' parameters, clipped to their bounds.
+
+    Args:
+        model: that is changed.
+        names: of effects, in the order of `theta`.
+        theta: their parameters side by side, SI units, (P,).
+    """
     at = 0
     with torch.no_grad():
         for name in names:
@@ -55,7 +61,13 @@ def set_parameters(model: GreyBox, names: Sequence[str], theta: Array) -> None:
 
 
 def limits(model: GreyBox, names: Sequence[str], priors: Priors) -> tuple[Array, Array]:
-    """Return least and largest values of the named effects' parameters, (P,) each: their bounds, within reach."""
+    """Return least and largest values of the named effects' parameters, (P,) each: their bounds, within reach.
+
+    Args:
+        model: with the effects.
+        names: of effects, in the order of the parameters.
+        priors: with how far from its mean each may go, or None.
+    """
     described = [p for name in names for p in model.effect(name).parameters_of]
     low = np.array([p.low for p in described], dtype=float)
     high = np.array([p.high for p in described], dtype=float)
@@ -68,6 +80,12 @@ def bounded_step(normal: Array, gradient: Array, low: Array, high: Array) -> Arr
     """Return the step that minimises x^T N x / 2 - g^T x between `low` and `high`, all (P,) but N (P, P).
 
     Parameters that would leave their range are put at its end, and the others solved for again.
+
+    Args:
+        normal: N, positive definite or nearly so, (P, P).
+        gradient: g, (P,).
+        low: least steps, (P,).
+        high: largest steps, (P,).
     """
     fixed = np.zeros(len(gradient), dtype=bool)
     step = np.zeros(len(gradient))

@@ -95,6 +95,16 @@ def respond_by(
     """Yield the same for `size` windows at a time.
 
     Differentiating is quickest for many windows at once, what follows for so few that they stay near the processor.
+
+    Args:
+        size: windows that are yielded at a time.
+        model: at the values about which it is differentiated.
+        windows: of the log, B of them.
+        initial: their initial states, (B, 13).
+        names: effects whose parameters are differentiated by.
+        chunk: points that are differentiated at a time.
+        weights: differentiate by the subnetworks' weights too.
+        ran: the windows as simulated already, or None.
     """
     order = [model.effect_names.index(name) for name in names]
     thetas = {f"model.effects.{k}.theta": model.members[k].theta.detach() for k in order}

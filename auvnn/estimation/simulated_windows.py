@@ -40,14 +40,27 @@ class Thrust(nn.Module):
 
 
 def output_error(model: GreyBox, windows: Windows, initial: Tensor) -> Tensor:
-    """Return measured minus predicted outputs, (B, L, 18); zero where nothing was measured."""
+    """Return measured minus predicted outputs, (B, L, 18); zero where nothing was measured.
+
+    Args:
+        model: that is run.
+        windows: of the log, B of L rows.
+        initial: their initial states, (B, 13).
+    """
     with torch.no_grad():
         eta, nu = predict(model, windows, initial)
         return window_error(model, windows, eta, nu)
 
 
 def window_error(model: GreyBox, windows: Windows, eta: Tensor, nu: Tensor) -> Tensor:
-    """Return measured minus predicted outputs of runs (B, L, 7) and (B, L, 6), (B, L, 18); differentiable."""
+    """Return measured minus predicted outputs of runs (B, L, 7) and (B, L, 6), (B, L, 18); differentiable.
+
+    Args:
+        model: for what its sensors report.
+        windows: of the log, B of L rows.
+        eta: position and quaternion of the runs, (B, L, 7).
+        nu: their velocity, (B, L, 6), m/s and rad/s.
+    """
     rate = None
     if windows.nu_dot is not None:
         _, thrust = Thrust(model)(windows, substeps_of(windows))
@@ -120,6 +133,12 @@ def simulate_windows(
     """Run windows free, and differentiate their thrusts by the parameters of the named effects.
 
     Both go step by step through time, which costs the same for few windows as for many.
+
+    Args:
+        model: that is run.
+        windows: of the log, B of L rows.
+        initial: their initial states, (B, 13).
+        names: effects by whose parameters the thrusts are differentiated.
     """
     module, substeps = Thrust(model), substeps_of(windows)
     with torch.no_grad():

@@ -92,7 +92,7 @@ class WindowSums:
         return type(self)(**{name: mine[name] + theirs[name] for name in mine})
 
     def spread(self, floor: Array, parameters: int) -> Array:
-        """Return each channel's root-mean-square error, (18,), as `window_sums.spread` does."""
+        """Return each channel's root-mean-square error, (18,), as `normal_equations.residual_std` does."""
         spent = (12 * self.windows + parameters) * self.count / max(self.count.sum(), 1.0)
         with np.errstate(invalid="ignore", divide="ignore"):
             value = np.sqrt(self.channel / np.maximum(self.count - spent, 0.25 * self.count))
@@ -205,6 +205,14 @@ def add_parts(parts: Iterable[S]) -> S:
 def reduce_windows(
     model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str], sigma: Array
 ) -> tuple[Statistics, Tensor]:
-    """Return windows' statistics towards the named effects' parameters, and their initial states after a step."""
+    """Return windows' statistics towards the named effects' parameters, and their initial states after a step.
+
+    Args:
+        model: at the values about which it is linearised.
+        windows: of the log, B of them.
+        initial: their initial states, (B, 13).
+        names: effects whose parameters are differentiated by.
+        sigma: standard deviation of each channel, (18,); infinite where it does not count.
+    """
     statistics, change, _ = normal_equations(windows, linearise(model, windows, initial, names), sigma)
     return statistics, moved(initial, as_tensor(change))

@@ -86,7 +86,13 @@ class Executor(ABC):
 
 
 def handed_ahead(hand: Callable[[Any], Any], tasks: Sequence[Any], most: int) -> Iterator[tuple[int, Any]]:
-    """Hand tasks to a cluster, at most so many at a time, and yield number and reference of each in their order."""
+    """Hand tasks to a cluster, at most so many at a time, and yield number and reference of each in their order.
+
+    Args:
+        hand: gives one task to the cluster and returns its reference.
+        tasks: in their order.
+        most: how many are under way at a time.
+    """
     handed: deque[tuple[int, Any]] = deque()
     for number, task in enumerate(tasks):
         handed.append((number, hand(task)))

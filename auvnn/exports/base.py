@@ -43,6 +43,11 @@ class Target(ABC):
     def write(self, system: System, folder: Path, precision: str) -> Written:
         """Write the system's files into a folder that exists.
 
+        Args:
+            system: the model as first-order equations.
+            folder: that exists.
+            precision: "double" or "float".
+
         Raises:
             AuvnnError: it cannot be written at all.
         """

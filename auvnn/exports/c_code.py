@@ -130,12 +130,25 @@ class Dialect:
     def function_of(
         self, head: str, graph: Graph, targets: Mapping[str, Sequence[int]], also: Sequence[str] = ()
     ) -> str:
-        """Return a whole function; arguments (and those in `also`) that may be without use are named all the same."""
+        """Return a whole function; arguments (and those in `also`) that may be without use are named all the same.
+
+        Args:
+            head: of the function in the target's language.
+            graph: of scalar operations.
+            targets: nodes that are written, by the name of their array.
+            also: further arguments that may be without use.
+        """
         unused = [f"(void){name};" for name in (*graph.arguments, *also)]
         return block(head, [*unused, *self.statements(graph, targets)])
 
     def array(self, name: str, values: Iterable[float], qualifier: str = "static const") -> str:
-        """Return an array of numbers."""
+        """Return an array of numbers.
+
+        Args:
+            name: of the array.
+            values: in their order.
+            qualifier: before the type.
+        """
         texts = [self.number(float(v)) for v in values]
         lines, line = [], "   "
         for text in texts:

@@ -105,6 +105,12 @@ def export(
         ConfigError: an unknown target or precision, a model that cannot be written, or with `strict` a loss.
         InputError: the folder is not empty.
         MissingExtra: the target needs a package that is not there.
+
+    Example:
+        ```python
+        answer = auvnn.export(auvnn.load("rov95"), to="sdf", out="simulated", overwrite=True)
+        answer.files, answer.lost
+        ```
     """
     target = TARGETS.get(to)()
     assert isinstance(target, Target)

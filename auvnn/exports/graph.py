@@ -102,7 +102,13 @@ def plain(graph: Graph) -> Graph:
 
 
 def apply(s: Scalars, name: str, operands: Sequence[int]) -> int:
-    """Return the node of an operation by its name, folded."""
+    """Return the node of an operation by its name, folded.
+
+    Args:
+        s: in which the node is made.
+        name: of the operation ("add", "lt", "sin", ...).
+        operands: numbers of their nodes.
+    """
     direct: dict[str, Callable[..., int]] = {
         "add": s.add, "sub": s.sub, "mul": s.mul, "div": s.div, "neg": s.neg, "abs": s.abs, "where": s.where,
         "and": s.both, "or": s.either, "not": s.negated,

@@ -169,7 +169,14 @@ class StepModule(nn.Module):
         self.space = space
 
     def forward(self, state: Tensor, inputs: Tensor, time: Tensor, h: Tensor) -> Tensor:
-        """Return the state after h seconds."""
+        """Return the state after h seconds.
+
+        Args:
+            state: (n,).
+            inputs: held over the step, (m,).
+            time: at its start, s, ().
+            h: length of the step, s, ().
+        """
         return self.space.step(state, inputs, time, h)
 
 
@@ -181,7 +188,13 @@ class RateModule(nn.Module):
         self.space = space
 
     def forward(self, state: Tensor, inputs: Tensor, time: Tensor) -> Tensor:
-        """Return the rate of the state."""
+        """Return the rate of the state.
+
+        Args:
+            state: (n,).
+            inputs: (m,).
+            time: s, ().
+        """
         return self.space.rate(state, inputs, time)
 
 

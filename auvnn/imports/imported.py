@@ -69,6 +69,13 @@ def import_model(file: str | Path) -> Imported:
     Raises:
         InputError: it is no such file, or what a vehicle cannot do without is not in it.
         ModelError: the vehicle in it is not physical.
+
+    Example:
+        ```python
+        auvnn.export(auvnn.load("rov95"), to="sdf", out="simulated", overwrite=True)
+        found = auvnn.import_model("simulated/model.sdf")
+        found.model, found.unread
+        ```
     """
     path = Path(file).expanduser()
     root = read_tree(path)

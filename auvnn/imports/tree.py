@@ -54,6 +54,12 @@ class Reader:
     ) -> np.ndarray:
         """Return the numbers of an element's text, or the default where the element is not there.
 
+        Args:
+            parent: element below which it is looked for; None where that is not there.
+            path: of the element, as `ElementTree.find` takes it.
+            count: how many numbers are allowed.
+            default: where the element is not there; it must be there where this is None.
+
         Raises:
             InputError: it is needed and not there, holds an expression, or another count of numbers.
         """
@@ -65,7 +71,13 @@ class Reader:
         return self.parsed(element.text or "", path, count)
 
     def parsed(self, text: str, what: str, count: tuple[int, ...]) -> np.ndarray:
-        """Return the numbers of a text."""
+        """Return the numbers of a text.
+
+        Args:
+            text: numbers apart by spaces or commas.
+            what: where it stands, for messages.
+            count: how many numbers are allowed.
+        """
         if "$" in text:
             raise InputError(
                 f"{self.where}: {what} is the expression '{one_line(text, 60)}', and none is evaluated here: "
@@ -84,11 +96,24 @@ class Reader:
         return values
 
     def number(self, parent: xml.Element | None, path: str, default: float | None = None) -> float:
-        """Return one number."""
+        """Return one number.
+
+        Args:
+            parent: element below which it is looked for; None where that is not there.
+            path: of the element, as `ElementTree.find` takes it.
+            default: where the element is not there; it must be there where this is None.
+        """
         return float(self.numbers(parent, path, (1,), None if default is None else [default])[0])
 
     def attribute(self, element: xml.Element, name: str, count: int, default: object) -> np.ndarray:
-        """Return the numbers of an attribute."""
+        """Return the numbers of an attribute.
+
+        Args:
+            element: that has it.
+            name: of the attribute.
+            count: how many numbers it must hold.
+            default: where the attribute is not there.
+        """
         text = element.get(name)
         return np.asarray(default, dtype=float) if text is None else self.parsed(text, name, (count,))
 

@@ -60,6 +60,14 @@ def add(
     Raises:
         ConfigError: an unknown effect or objective, an effect that is there already, or one named twice.
         InputError: the same data on both sides, `log` says nothing about an effect, or contradicts itself.
+
+    Example:
+        ```python
+        model = auvnn.load("rov95")
+        log = auvnn.simulate(model, noise="realistic", hidden={"ocean_current": {"v_north": 0.2}}).log
+        better = auvnn.add(model, log, "ocean_current")
+        better.accepted, better.gain, better.parameters["ocean_current"]
+        ```
     """
     log = as_log(log)
     model = as_model(model, log)

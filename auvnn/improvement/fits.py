@@ -102,6 +102,12 @@ def fit_steps(
 def unseen(layout: Layout, found: FittedHypothesis, names: Sequence[str], log: Log) -> list[str]:
     """Return a warning where the log says nothing about some parameters; refuse where it is all of an effect's.
 
+    Args:
+        layout: which parameters belong to which effect.
+        found: the fit.
+        names: effects that were asked for.
+        log: for its name in the message.
+
     Raises:
         InputError: the log says nothing about an effect.
     """

@@ -105,6 +105,12 @@ def fleet(
     Raises:
         ConfigError: an unknown effect, or none.
         InputError: there is no log, or no dive could be fitted.
+
+    Example:
+        ```python
+        found = auvnn.fleet("rov95", "dives/*.parquet", ["biofouling", "ballast_error"], workers=4)
+        found.trends  # of each parameter: constant or changing over the dives
+        ```
     """
     from auvnn.models import load
 

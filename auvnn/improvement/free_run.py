@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from auvnn.effects import Sensed
 from auvnn.estimation.normal_equations import linearise
-from auvnn.estimation.priors import Priors, bounded_step, limits, parameters_of, set_parameters
+from auvnn.estimation.nuisance import NormalEquations
+from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
 from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.rollouts import CUT, Scale
 from auvnn.metrics.windows import VELOCITY, Windows
@@ -108,11 +109,9 @@ class FreeRunFit:
 
 
 def _step(hessian: Array, slope: Array, theta: Array, low: Array, high: Array, damping: float) -> Array:
-    unit = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
-    normal = hessian / unit[:, None] / unit + damping * np.eye(len(theta))
-    if not (np.isfinite(normal).all() and np.isfinite(slope).all()):
+    if not (np.isfinite(hessian).all() and np.isfinite(slope).all()):
         return np.zeros(len(theta))
-    return bounded_step(normal, slope / unit, (low - theta) * unit, (high - theta) * unit) / unit
+    return NormalEquations(hessian, slope).bounded(low - theta, high - theta, damping=damping)
 
 
 def predicted(model: GreyBox, windows: Windows) -> Array:
@@ -133,7 +132,13 @@ def costs(model: GreyBox, task: Task) -> Array:
 
 
 def normal_equations(model: GreyBox, task: Task, names: Sequence[str]) -> tuple[Array, Array, Array]:
-    """Return J^T J, J^T e and e^T e of every window, robust weights in them: (B, P, P), (B, P), (B,)."""
+    """Return J^T J, J^T e and e^T e of every window, robust weights in them: (B, P, P), (B, P), (B,).
+
+    Args:
+        model: at the values about which it is linearised.
+        task: windows, scales and weights.
+        names: effects whose parameters are fitted, P parameters in all.
+    """
     weight, samples, at = task.weight(), task.samples(), 0
     if not names:
         count = len(task.windows)

@@ -15,6 +15,11 @@ def paired_gain(before: Rolled, after: Rolled, scale: Scale) -> tuple[float, flo
     """Return by how much the total error falls, and its standard error by leaving out blocks of windows.
 
     Blocks of neighbouring windows hold the correlation within them (Kuensch 1989, Annals of Statistics 17(3)).
+
+    Args:
+        before: free runs of the first model.
+        after: those of the second over the same windows.
+        scale: of the velocities, by which errors become comparable.
     """
     value = before.total(scale) - after.total(scale)
     count = len(before.windows)

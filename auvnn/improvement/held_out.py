@@ -97,7 +97,13 @@ def judge(
 
 
 def words(layout: Layout, found: FittedHypothesis, judged: Judged) -> list[str]:
-    """Return what to mind: what is not accepted and why, parameters at their bounds, and such as are alike."""
+    """Return what to mind: what is not accepted and why, parameters at their bounds, and such as are alike.
+
+    Args:
+        layout: bounds of the parameters.
+        found: the fit with everything.
+        judged: what it is worth on held-out data.
+    """
     out = []
     value, std = judged.gain
     if not _pays(value, std):

@@ -19,8 +19,7 @@ from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.layout import lay_out
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
 from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
-from auvnn.diagnosis.score_tests.probes import null_is_no_start
-from auvnn.diagnosis.score_tests.shape_search import search_shapes
+from auvnn.diagnosis.score_tests.shape_search import searched_start
 from auvnn.errors import AuvnnError, InputError, one_line
 from auvnn.estimation.normal_equations import TRUST, motion
 from auvnn.log_chunks.scan import WindowCut
@@ -85,8 +84,7 @@ def _fitted(question: Question, path: Path) -> dict[str, Any]:
     base = [n for n in layout.names if n not in names or n in layout.nuisance]
     found = fit_hypothesis(layout, windows, [n for n in base if n not in names], ())
     for k in range(1, len(names) + 1):
-        looked = null_is_no_start(layout, names[k - 1])
-        guess = search_shapes(layout, windows, found, base).start(names[k - 1]) if looked else None
+        guess = searched_start(layout, windows, found, base, names[k - 1])
         found = fit_hypothesis(layout, windows, base, names[:k], start=found.fitted, guess=guess)
     start, source = start_of(path, question.mapping), "t"
     if start is None:

@@ -269,7 +269,14 @@ def cut_at(pieces: Pieces, share: float, mapping: Mapping) -> tuple[Pieces, Piec
 
 
 def evenly_spread_runs(pieces: Pieces, most: int, mapping: Mapping, stretches: int = 8) -> list[Run]:
-    """Return at most about `most` samples as runs numbered from 1: all of them, or stretches evenly spread."""
+    """Return at most about `most` samples as runs numbered from 1: all of them, or stretches evenly spread.
+
+    Args:
+        pieces: of the files.
+        most: about how many samples.
+        mapping: by which the files are read.
+        stretches: into how many parts the samples are spread.
+    """
     chosen, length = pieces.pieces, most
     if pieces.samples > most:
         count = min(stretches, len(chosen))

@@ -32,6 +32,11 @@ def plan_files(
 ) -> Plan:
     """Plan the windows of many files.
 
+    Args:
+        paths: of the files.
+        cut: how windows are cut.
+        say: told in words what is being done.
+
     Raises:
         InputError: a file cannot be read, or none has a window.
     """

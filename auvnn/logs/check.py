@@ -16,6 +16,13 @@ def check(log: Log | str | Path | Sequence[str | Path] | Mapping[str, Any], mapp
     Args:
         log: a log, a file that a reader knows, a list of such files, or a table in memory.
         mapping: for files, how their columns are named; see `Log.read`.
+
+    Example:
+        ```python
+        made = auvnn.simulate(auvnn.load("rov95"), noise="realistic", runs=1, duration=8.0)
+        quality = auvnn.check(made.log)
+        [finding.what for finding in quality.findings]
+        ```
     """
     if isinstance(log, Mapping) or (hasattr(log, "columns") and not isinstance(log, Log)):
         return Log.from_dataframe(log, mapping).quality()

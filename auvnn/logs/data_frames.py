@@ -35,7 +35,8 @@ def from_dataframe(data: Any, mapping: Any = None, name: str = "data frame") -> 
     """
     from pathlib import Path
 
-    from auvnn.logs.reading.reading import Collector, Reading, collect
+    from auvnn.logs.reading.collect import Collector, collect
+    from auvnn.logs.reading.reading import Reading
 
     plan = Mapping.read(mapping)
     collector = Collector()

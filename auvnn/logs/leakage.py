@@ -42,6 +42,12 @@ def leakage(log: Log, test: Log) -> None:
 def refuse_shared(shared: int, held: int, test: str, log: str) -> None:
     """Refuse a test of which so many of its samples that were looked for are in the log that is fitted.
 
+    Args:
+        shared: samples that are in both.
+        held: samples that were looked for.
+        test: name of the test log.
+        log: name of the log that is fitted.
+
     Raises:
         InputError: they are too many.
     """

@@ -39,6 +39,12 @@ class Log(ShownLog):
 
     Raises:
         InputError: there is no run, a number occurs twice, or the runs' columns differ.
+
+    Example:
+        ```python
+        made = auvnn.simulate(auvnn.load("rov95"), runs=2, duration=5.0)
+        first, second = made.log.runs  # first.t (N,), first.nu (N, 6), first.command (N, n)
+        ```
     """
 
     runs: tuple[Run, ...]
@@ -90,6 +96,13 @@ class Log(ShownLog):
         Raises:
             InputError: a file cannot be read or its content must not be trusted.
             ConfigError: the mapping is wrong.
+
+        Example:
+            ```python
+            made = auvnn.simulate(auvnn.load("rov95"), runs=1, duration=8.0)
+            made.log.write("dive.csv", overwrite=True)
+            log = auvnn.Log.read("dive.csv", max_duration=4.0)
+            ```
         """
         from auvnn.logs.reading.reading import read
 
@@ -130,7 +143,13 @@ class Log(ShownLog):
 
     @classmethod
     def from_runs(cls, runs: Iterable[Run], name: str = "log", repairs: Iterable[Repair] = ()) -> Log:
-        """Make a log of runs in memory."""
+        """Make a log of runs in memory.
+
+        Args:
+            runs: in their order, each with a number of its own.
+            name: of the log.
+            repairs: what was mended on the way here.
+        """
         return cls(tuple(runs), name=name, repairs=tuple(repairs))
 
     @property

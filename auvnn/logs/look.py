@@ -163,6 +163,11 @@ def look(path: str | Path) -> Look:
 def write_mapping(found: Look, path: Path, overwrite: bool = False) -> Path:
     """Write the proposed mapping.
 
+    Args:
+        found: what was found in a file.
+        path: of the mapping file.
+        overwrite: replace a file that is there.
+
     Raises:
         InputError: there is such a file already, or nothing to propose.
     """

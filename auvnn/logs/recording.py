@@ -79,6 +79,11 @@ class Recording:
         `topic.column`; of a topic with one column its name alone; `BARO[1].Alt` for an instance, and without the
         brackets where there is one instance only.
 
+        Args:
+            path: as it stands in the mapping.
+            where: of the file, for messages.
+            mapping: its name, for messages.
+
         Raises:
             InputError: there is no such topic or column, or several instances of it.
         """

@@ -53,6 +53,11 @@ def to_frame(log: Log) -> pl.DataFrame:
 def write(log: Log, path: Path, overwrite: bool) -> Path:
     """Write the log to `path`, whole or not at all.
 
+    Args:
+        log: that is written.
+        path: with the suffix that decides the format.
+        overwrite: replace a file that is there.
+
     Raises:
         InputError: the file is there already and `overwrite` is false, or it cannot be written.
         ConfigError: the name ends in none of `.parquet`, `.csv`, `.mcap`.

@@ -68,6 +68,12 @@ def chosen_derivative(
 ) -> Derivative:
     """Return what `choose_derivative` does for a log of this name and median step, s, whose accelerations are measured.
 
+    Args:
+        name: of the log, for messages.
+        measured: whether it has accelerations.
+        dt: median step, s.
+        options: `method`, `half_width` (s) and `order`; those that are None or not given are chosen.
+
     Raises:
         ConfigError: an unknown option or method.
         InputError: measured accelerations are asked for and not there.

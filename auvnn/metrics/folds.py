@@ -90,7 +90,13 @@ class Folds:
     def stretches(
         self, run: NDArray, begin: Array, end: Array
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return the same of stretches of runs, from and to these times."""
+        """Return the same of stretches of runs, from and to these times.
+
+        Args:
+            run: number of each stretch's run, (N,).
+            begin: s, (N,).
+            end: s, (N,).
+        """
         own = np.zeros(len(run), dtype=np.int64)
         free = np.ones((len(run), len(self.numbers)), dtype=bool)
         for number in np.unique(run):

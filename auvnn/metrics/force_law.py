@@ -81,6 +81,11 @@ def correlation(count: int, cell: float, time: float) -> Array:
 
     With a = cell / time it is 2 (a - 1 + exp(-a)) / a^2 within a cell, and between cells that are k apart
     exp(-k a) (exp(a) - 2 + exp(-a)) / a^2, the integral of exp(-|t - s| / time) over both, divided by cell^2.
+
+    Args:
+        count: of cells.
+        cell: their length, s.
+        time: correlation time, s.
     """
     a = cell / time
     apart = np.abs(np.arange(count)[:, None] - np.arange(count))

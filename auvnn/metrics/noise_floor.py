@@ -19,6 +19,14 @@ def noise_floor(
 
     The model's own predictions stand for the truth; they are started again from states with noise as large
     as the log's and compared with noisy copies of themselves.
+
+    Args:
+        model: that stands for the truth.
+        rolled: its free runs.
+        log: whose noise is taken.
+        scale: of the velocities, by which errors become comparable.
+        seed: of the noise.
+        engine: as in `rollout`.
     """
     noise_nu = np.mean([white(r, r.nu) for r in log.runs], axis=0)
     angle = np.mean([attitude_noise(r) for r in log.runs], axis=0)

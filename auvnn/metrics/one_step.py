@@ -44,34 +44,6 @@ class OneStep:
     wrench_noise: Array
 
 
-def model_acceleration(model: GreyBox, run: Run) -> Array:
-    """Return the model's acceleration as the sensors would report it, at every measured state, (N, 6).
-
-    It is that just after the row's command has begun to act; NaN where a sample is missing.
-
-    Args:
-        model: the model.
-        run: measurements.
-
-    Raises:
-        InputError: the run lacks the commands that drive the model.
-    """
-    return OneStepReplay(model, run).acceleration()
-
-
-def model_velocity(model: GreyBox, run: Run) -> Array:
-    """Return what the model's accelerations at the measured states add up to, (N, 6), from zero at the start.
-
-    v_{k+1} = v_k + (t_{k+1} - t_k) [a(x_k, T_k) + a(x_{k+1}, T_k)] / 2, with T_k the mean thrust of the
-    interval: the command of row k is held over it, so that a step of the command belongs to one side only.
-    NaN where a sample is missing; what lies on either side of it must not be compared.
-
-    Raises:
-        InputError: the run lacks the commands that drive the model.
-    """
-    return OneStepReplay(model, run).velocity()
-
-
 def integrated(t: Array, begin: Array, end: Array | None = None) -> Array:
     """Return the trapezoidal integral of a signal, (N, k), zero at the start and NaN where the signal is.
 
@@ -154,11 +126,16 @@ class OneStepReplay:
         self.mean = torch.stack([part[0] for part in drive.mean])
 
     def acceleration(self) -> Array:
-        """Return the acceleration just after each row's command has begun to act, (N, 6)."""
+        """Return what the sensors would report just after each row's command has begun to act, (N, 6)."""
         return self._accelerations(self.start)
 
     def velocity(self) -> Array:
-        """Return what the accelerations add up to, (N, 6); see `model_velocity`."""
+        """Return what the model's accelerations at the measured states add up to, (N, 6), from zero at the start.
+
+        v_{k+1} = v_k + (t_{k+1} - t_k) [a(x_k, T_k) + a(x_{k+1}, T_k)] / 2, with T_k the mean thrust of the
+        interval: the command of row k is held over it, so that a step of the command belongs to one side only.
+        NaN where a sample is missing; what lies on either side of it must not be compared.
+        """
         before = torch.cat([self.mean[:1], self.mean[:-1]])
         return integrated(self.t, self._accelerations(self.mean), self._accelerations(before))
 
@@ -172,8 +149,50 @@ class OneStepReplay:
         return np.where(np.expand_dims(self.good, 1), seen.numpy(), np.nan)
 
 
+class RunComparison:
+    """Measured and predicted acceleration of one run through the same filter; asked again as parameters move.
+
+    Args:
+        model: the model; where its parameters change later, `update` before asking again.
+        run: measurements, as they are to be compared: `Run.cleaned` is without spikes of single samples.
+        derivative: how accelerations are obtained.
+
+    Raises:
+        InputError: the run lacks the commands that drive the model.
+    """
+
+    def __init__(self, model: GreyBox, run: Run, derivative: Derivative) -> None:
+        """Filter what was measured."""
+        self.replay = OneStepReplay(model, run)
+        self._filter: LocalPolynomial | None = None
+        if derivative.method == "measured":
+            assert run.nu_dot is not None
+            self.measured = run.nu_dot
+        else:
+            self._filter = LocalPolynomial(run.t, derivative.half_width, derivative.order)
+            self.measured = self._filter(np.where(run.valid[:, None], run.nu, np.nan))[1]
+
+    def update(self, hooks: Collection[str]) -> None:
+        """Work out again what depends on the parameters of effects with these hooks."""
+        self.replay.update(hooks)
+
+    def predicted(self) -> Array:
+        """Return the model's acceleration, (N, 6), m/s2 and rad/s2; NaN where a sample is missing."""
+        return self.replay.acceleration() if self._filter is None else self._filter(self.replay.velocity())[1]
+
+    def gap(self) -> Array:
+        """Return measured minus predicted acceleration, (N, 6)."""
+        return self.measured - self.predicted()
+
+
 def one_step(model: GreyBox, log: Log, derivative: Derivative) -> list[OneStep]:
-    """Compare accelerations run by run; see `OneStep`."""
+    """Compare accelerations run by run; see `OneStep`.
+
+    Args:
+        model: that is compared.
+        log: measurements.
+        derivative: how accelerations are obtained.
+    """
     found = []
     for run in log.runs:
         measured, predicted = accelerations(model, run, derivative)
@@ -193,14 +212,14 @@ def accelerations(model: GreyBox, run: Run, derivative: Derivative) -> tuple[Arr
     """Return measured and predicted acceleration of a run, after the same filter, (N, 6) each.
 
     Spikes of single samples count as missing.
+
+    Args:
+        model: that is compared.
+        run: N samples.
+        derivative: how accelerations are obtained.
     """
-    run = run.cleaned
-    if derivative.method == "measured":
-        assert run.nu_dot is not None
-        return run.nu_dot, model_acceleration(model, run)
-    smooth = LocalPolynomial(run.t, derivative.half_width, derivative.order)
-    velocity = np.where(run.valid[:, None], run.nu, np.nan)
-    return smooth(velocity)[1], smooth(model_velocity(model, run))[1]
+    comparison = RunComparison(model, run.cleaned, derivative)
+    return comparison.measured, comparison.predicted()
 
 
 def _rms(x: Array) -> Array:
@@ -210,7 +229,13 @@ def _rms(x: Array) -> Array:
 
 
 def inertia_of(model: GreyBox, run: Run, time: float | None = None) -> Array:
-    """Return the model's inertia matrix (6, 6); of a body that varies in time, that at a time or the run's start."""
+    """Return the model's inertia matrix (6, 6); of a body that varies in time, that at a time or the run's start.
+
+    Args:
+        model: whose matrix is asked for.
+        run: for its start.
+        time: s; the run's start where None.
+    """
     moment = None
     if model.time_varying:
         zero3, zero6 = torch.zeros(3, dtype=torch.float64), torch.zeros(6, dtype=torch.float64)

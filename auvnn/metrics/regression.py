@@ -33,7 +33,14 @@ LIMIT = 1e3
 
 
 def regressors(nu: Array, command: Array, fins: Array | None, down: Array) -> Array:
-    """Return velocities, |velocity| velocity, commands, fin angles, the direction of gravity in the body, and one."""
+    """Return velocities, |velocity| velocity, commands, fin angles, the direction of gravity in the body, and one.
+
+    Args:
+        nu: velocities, (..., 6), m/s and rad/s.
+        command: (..., n).
+        fins: fin angles, rad, (..., m), or None.
+        down: direction of gravity in body axes, (..., 3).
+    """
     parts = [nu, np.abs(nu) * nu, command, *([] if fins is None else [fins]), down]
     lead = nu.shape[:-1]
     return np.concatenate([*parts, np.ones((*lead, 1))], axis=-1)

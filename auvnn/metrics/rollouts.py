@@ -66,7 +66,13 @@ class Rolled:
     def nrmse(
         self, scale: Scale, chosen: NDArray[np.bool_] | slice = slice(None), held: bool = False
     ) -> Array:
-        """Return each velocity's error over its standard deviation, (6,); NaN where it is not excited."""
+        """Return each velocity's error over its standard deviation, (6,); NaN where it is not excited.
+
+        Args:
+            scale: of the velocities.
+            chosen: windows that count.
+            held: of holding the initial velocity, in the place of the model.
+        """
         squared = (self.held if held else self.squared)[chosen].sum(0)
         with np.errstate(invalid="ignore", divide="ignore"):
             value = np.sqrt(squared / self.count[chosen].sum(0)) / scale.std
@@ -75,7 +81,13 @@ class Rolled:
     def total(
         self, scale: Scale, chosen: NDArray[np.bool_] | slice = slice(None), held: bool = False
     ) -> float:
-        """Return the mean error of the excited velocities."""
+        """Return the mean error of the excited velocities.
+
+        Args:
+            scale: of the velocities.
+            chosen: windows that count.
+            held: of holding the initial velocity, in the place of the model.
+        """
         value = self.nrmse(scale, chosen, held)
         return float(np.nanmean(value)) if np.isfinite(value).any() else float("nan")
 
@@ -84,13 +96,26 @@ def roll(model: GreyBox, log: Log, horizon: str, scale: Scale, engine: str = "to
     """Run a model free over the windows of one horizon; None where no stretch is long enough.
 
     Windows start every half horizon, from measured states. Outliers of single samples do not count.
+
+    Args:
+        model: that is run.
+        log: measurements.
+        horizon: "full", or seconds as text.
+        scale: of the velocities.
+        engine: as in `rollout`.
     """
     windows = horizon_windows(log, horizon, model.actuation)
     return None if windows is None else roll_windows(model, windows, scale, engine)
 
 
 def horizon_windows(log: Log, horizon: str, kind: str) -> Windows | None:
-    """Return the windows of one horizon, "full" or seconds; None where no stretch is long enough."""
+    """Return the windows of one horizon, "full" or seconds; None where no stretch is long enough.
+
+    Args:
+        log: measurements.
+        horizon: "full", or seconds as text.
+        kind: of commands: "thrusters" or "wrench".
+    """
     length = np.inf if horizon == "full" else float(horizon)
     try:
         return cut_windows(log, length, None if np.isinf(length) else 0.5 * length, warmup=WARMUP, kind=kind)
@@ -99,7 +124,14 @@ def horizon_windows(log: Log, horizon: str, kind: str) -> Windows | None:
 
 
 def roll_windows(model: GreyBox, windows: Windows, scale: Scale, engine: str = "torch") -> Rolled:
-    """Run a model free over windows that have been cut; `engine` as in `rollout`."""
+    """Run a model free over windows that have been cut; `engine` as in `rollout`.
+
+    Args:
+        model: that is run.
+        windows: B of them.
+        scale: of the velocities.
+        engine: as in `rollout`.
+    """
     with torch.no_grad():
         start = initial_states(model, windows)
         first = windows.inputs.command[:, windows.warmup]
@@ -138,7 +170,14 @@ def scored(windows: Windows, seen: Array, scale: Scale) -> Rolled:
 def rollout_table(
     model: GreyBox, log: Log, scale: Scale, horizons: tuple[str, ...] = HORIZONS
 ) -> tuple[dict[str, dict], dict[str, Rolled]]:
-    """Return `rollout` of the comparison, and the runs behind it."""
+    """Return `rollout` of the comparison, and the runs behind it.
+
+    Args:
+        model: that is run.
+        log: measurements.
+        scale: of the velocities.
+        horizons: "full", or seconds as text.
+    """
     out: dict[str, dict] = {}
     kept: dict[str, Rolled] = {}
     for horizon in horizons:

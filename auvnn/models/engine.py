@@ -93,6 +93,16 @@ def compiled_run(
 ) -> tuple[Tensor, Tensor] | None:
     """Run by machine code; None where plain torch is to do it.
 
+    Args:
+        model: that is run.
+        state: position and quaternion (..., 7), velocity (..., 6).
+        inputs: held per interval, T rows.
+        times: s, (T,) or (..., T).
+        drive: thrust over each step.
+        substeps: steps per interval.
+        tableau: of the Runge-Kutta scheme.
+        engine: "auto", "torch", "compiled" or "firm".
+
     Raises:
         ConfigError: no such engine; or "compiled" was asked for, and it cannot be done.
     """

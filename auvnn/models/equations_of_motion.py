@@ -166,7 +166,17 @@ class EquationsOfMotion(nn.Module):
         time: Tensor,
         prepared: Prepared | None = None,
     ) -> Tensor:
-        """Return the acceleration from the thrust that acts now; see `forward` for shapes and units."""
+        """Return the acceleration from the thrust that acts now; see `forward` for shapes and units.
+
+        Args:
+            position: NED, m, (..., 3).
+            rotation: body to NED, (..., 3, 3).
+            nu: velocity over ground, m/s and rad/s, (..., 6).
+            thrust: of the actuators, N, (..., n).
+            inputs: at this moment.
+            time: s since the start of the run, (...).
+            prepared: body and inertia matrices; worked out here where None.
+        """
         terms, prepared = self._terms(position, rotation, nu, thrust, inputs, time, prepared)
         first, *others = terms.values()
         for term in others:
@@ -176,7 +186,16 @@ class EquationsOfMotion(nn.Module):
     def wrenches(
         self, position: Tensor, rotation: Tensor, nu: Tensor, thrust: Tensor, inputs: Inputs, time: Tensor
     ) -> dict[str, Tensor]:
-        """Return the wrench of each term on the right-hand side of M nu_dot = ..., N and N m, (..., 6)."""
+        """Return the wrench of each term on the right-hand side of M nu_dot = ..., N and N m, (..., 6).
+
+        Args:
+            position: NED, m, (..., 3).
+            rotation: body to NED, (..., 3, 3).
+            nu: velocity over ground, m/s and rad/s, (..., 6).
+            thrust: of the actuators, N, (..., n).
+            inputs: at this moment.
+            time: s since the start of the run, (...).
+        """
         return self._terms(position, rotation, nu, thrust, inputs, time, None)[0]
 
     def _terms(

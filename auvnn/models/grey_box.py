@@ -59,6 +59,13 @@ class GreyBox(ShownModel, EquationsOfMotion):
         ConfigError: effects repeat or exclude one another.
 
     Reference: Fossen (2011), equations 6.41 to 6.60 and 8.134; Van de Ven, Flanagan and Toal (2004), eq. 15.
+
+    Example:
+        ```python
+        import torch
+        model = auvnn.load("rov95")
+        nu_dot = model(torch.zeros(6).double(), torch.zeros(6).double(), torch.zeros(model.actuators.size).double())
+        ```
     """
 
     def __init__(
@@ -166,7 +173,13 @@ class GreyBox(ShownModel, EquationsOfMotion):
     def rebuilt(
         self, effects: Iterable[Effect], vehicle: Vehicle | None = None, actuation: str | None = None
     ) -> GreyBox:
-        """Return a model with the same learned parts (copied) but other effects, other numbers, or driven otherwise."""
+        """Return a model with the same learned parts (copied) but other effects, other numbers, or driven otherwise.
+
+        Args:
+            effects: of the new model, in order of action; not copied.
+            vehicle: other numbers, or None for the same.
+            actuation: "thrusters" or "wrench", or None for the same.
+        """
         return self._like(effects, vehicle or self.vehicle, actuation or self.actuation, shared=False)
 
     def sharing(self, effects: Iterable[Effect]) -> GreyBox:
@@ -211,7 +224,25 @@ class GreyBox(ShownModel, EquationsOfMotion):
     def rollout(
         self, eta0: Tensor, nu0: Tensor, commands: Tensor | Inputs, times: Tensor, **options: Any
     ) -> Trajectory:
-        """Run free from a state: see `auvnn.models.free_running.rollout.rollout`."""
+        """Run free from a state: see `auvnn.models.free_running.rollout.rollout`.
+
+        Args:
+            eta0: first position and quaternion (..., 7), or with Euler angles (..., 6); m and rad.
+            nu0: first velocity, (..., 6), m/s and rad/s.
+            commands: (..., T, n), each held until the next row, or `Inputs` with fins, voltage and altitude too.
+            times: s, increasing, (T,) or (..., T).
+            **options: method, `max_step`, `engine` and others of `rollout`.
+
+        Example:
+            ```python
+            import torch
+            model = auvnn.load("rov95")
+            times = torch.arange(0.0, 5.0, 0.05).double()
+            still = torch.zeros(6).double()
+            ahead = 0.3 * torch.ones(len(times), model.actuators.size).double()
+            trajectory = model.rollout(still, still, ahead, times)  # trajectory.nu: (100, 6)
+            ```
+        """
         from auvnn.models.free_running.rollout import rollout
 
         return rollout(self, eta0, nu0, commands, times, **options)
@@ -219,13 +250,28 @@ class GreyBox(ShownModel, EquationsOfMotion):
     def linearise(
         self, state: Tensor, command: Tensor, dt: float | None = None, **given: Any
     ) -> Linearisation:
-        """Return A and B at a state, with the actuators' states: see `auvnn.models.linear.linearise.linearise`."""
+        """Return A and B at a state, with the actuators' states: see `auvnn.models.linear.linearise.linearise`.
+
+        Args:
+            state: (..., n): position, quaternion or Euler angles, velocity, and the actuators' states if there are
+                any.
+            command: (..., k), held.
+            dt: s, for discrete time; continuous time where None.
+            **given: `time`, `fins`, `voltage`, `altitude` and `max_step`.
+        """
         from auvnn.models.linear.linearise import linearise
 
         return linearise(self, state, command, dt, **given)
 
     def discrete_step(self, state: Tensor, command: Tensor, dt: float, **given: Any) -> Tensor:
-        """Return the state after one step: see `auvnn.models.linear.linearise.discrete_step`."""
+        """Return the state after one step: see `auvnn.models.linear.linearise.discrete_step`.
+
+        Args:
+            state: (..., n) as in `linearise`.
+            command: (..., k), held over the step.
+            dt: length of the step, s.
+            **given: `time`, `fins`, `voltage`, `altitude` and `max_step`.
+        """
         from auvnn.models.linear.linearise import discrete_step
 
         return discrete_step(self, state, command, dt, **given)

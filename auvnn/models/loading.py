@@ -55,6 +55,12 @@ def load(source: str | Path, actuation: str | None = None) -> GreyBox:
     Raises:
         ModelError: the file is damaged, incomplete, not physical, or from a newer auvnn.
         ConfigError: an unknown name.
+
+    Example:
+        ```python
+        model = auvnn.load("bluerov2_heavy")  # or "my_vehicle.yaml", or a folder that was saved
+        by_wrench = auvnn.load("rov95", actuation="wrench")
+        ```
     """
     path = Path(source)
     if not folder_exists(path):
@@ -68,7 +74,13 @@ def load(source: str | Path, actuation: str | None = None) -> GreyBox:
 
 
 def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None = None) -> GreyBox:
-    """Return the model that the files of a folder describe; see `contents`."""
+    """Return the model that the files of a folder describe; see `contents`.
+
+    Args:
+        files: their contents by name.
+        path: of the folder, for messages.
+        actuation: "thrusters" or "wrench"; as it was saved where None.
+    """
     # Parsed from the bytes whose hash was checked, not from the file, which may have changed since.
     try:
         text = files[MODEL].decode("utf-8")
@@ -134,6 +146,12 @@ def remove(model: GreyBox, effects: str | list[str]) -> GreyBox:
 
     Raises:
         ConfigError: the model has no such effect.
+
+    Example:
+        ```python
+        model = auvnn.load("rov95").with_effects({"ocean_current": {"v_north": 0.2}})
+        plain = auvnn.remove(model, "ocean_current")
+        ```
     """
     effects = names_of(effects)
     names = [effects] if isinstance(effects, str) else list(effects)

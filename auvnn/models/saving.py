@@ -38,6 +38,11 @@ def save(model: GreyBox, folder: str | Path, *, overwrite: bool = False) -> Path
 
     The folder is staged beside its place and moved there, so that a kill leaves the old one intact.
 
+    Args:
+        model: that is written.
+        folder: where to.
+        overwrite: replace a model that is there.
+
     Raises:
         InputError: the folder exists, is not empty and `overwrite` is not set.
     """

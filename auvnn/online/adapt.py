@@ -89,6 +89,14 @@ def adapt(
     Raises:
         ConfigError: an unknown scheme, guard or option.
         InputError: the log is driven otherwise than the model.
+
+    Example:
+        ```python
+        model = auvnn.load("rov95")
+        log = auvnn.simulate(model, noise="realistic", hidden={"payload": None}, runs=1).log
+        found = auvnn.adapt(model, log, "rls")
+        found.changes  # what kind of change was seen, and when
+        ```
     """
     log = as_log(log)
     model = as_model(model, log)

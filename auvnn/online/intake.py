@@ -21,6 +21,11 @@ UNIT = 0.05
 def tensor(value: Any, name: str, sizes: tuple[int, ...]) -> Tensor:
     """Return numbers as a double vector of one of the sizes; 0 stands for a scalar.
 
+    Args:
+        value: numbers of any kind.
+        name: what they are, for the message.
+        sizes: that are allowed.
+
     Raises:
         ConfigError: they are no numbers, or of another size.
     """
@@ -50,6 +55,17 @@ def sample_of(
     altitude: Any = None,
 ) -> Sample | None:
     """Return a sample, or None where a number is missing or not finite; see `refusal` for what else is not used.
+
+    Args:
+        model: for the number of commands and fins.
+        t: s.
+        eta: position and quaternion (7,), or with Euler angles (6,).
+        nu: velocity, m/s and rad/s, (6,).
+        command: (n,).
+        nu_dot: measured acceleration, m/s2 and rad/s2, (6,), or None.
+        fins: fin angles, rad, (m,), or None.
+        voltage: V, or None.
+        altitude: m, or None.
 
     Raises:
         ConfigError: a vector has the wrong size.
@@ -83,7 +99,14 @@ def turned(sample: Sample) -> Sample | None:
 
 
 def refusal(sample: Sample, last: Sample | None, guards: Guards, now: float | None) -> str | None:
-    """Return why a sample is not used at all, or None."""
+    """Return why a sample is not used at all, or None.
+
+    Args:
+        sample: that came in.
+        last: that was used before, or None.
+        guards: with the limits.
+        now: when it came in, s, or None.
+    """
     if now is not None and guards.max_age is not None and now - sample.t > guards.max_age:
         return "stale"
     if last is None:

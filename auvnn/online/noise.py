@@ -75,7 +75,13 @@ class Gate:
         self.axis, self.sign, self.seen = 0, 0.0, 0
 
     def holds(self, t: float, error: Tensor, std: NDArray[np.float64]) -> tuple[bool, bool]:
-        """Return whether the residual is held back, and whether a sudden one is believed just now."""
+        """Return whether the residual is held back, and whether a sudden one is believed just now.
+
+        Args:
+            t: s.
+            error: scaled residual, (6,).
+            std: its usual standard deviation, (6,).
+        """
         ratio = error.numpy() / np.maximum(std, self.floor)
         axis = int(np.argmax(np.abs(ratio)))
         if abs(ratio[axis]) <= self.width:

@@ -57,7 +57,15 @@ class Sample:
 
     @classmethod
     def of(cls, t: float, eta: Tensor, nu: Tensor, command: Tensor, **channels: Tensor | None) -> Sample:
-        """Return a sample whose attitude may be given as Euler angles, (6,) in all."""
+        """Return a sample whose attitude may be given as Euler angles, (6,) in all.
+
+        Args:
+            t: s.
+            eta: position and quaternion (7,), or with Euler angles (6,).
+            nu: velocity, m/s and rad/s, (6,).
+            command: (n,).
+            **channels: `nu_dot`, `fins`, `voltage` and `altitude`, each a tensor or None.
+        """
         return cls(t, eta6_to_eta7(eta) if eta.shape[-1] == 6 else eta, nu, command, **channels)
 
 

@@ -68,7 +68,17 @@ def fin_wrench(
     stall: PerPart,
     density: Number,
 ) -> Wrench:
-    """Return the wrench of fins whose geometry is already in ``frame`` (see ``fin_frame``, ``fin_force``)."""
+    """Return the wrench of fins whose geometry is already in ``frame`` (see ``fin_frame``, ``fin_force``).
+
+    Args:
+        nu_r: velocity through the water, m/s and rad/s, (..., 6).
+        angle: of the fins, rad, (..., n).
+        frame: from `fin_frame`, (..., n, 2, 6).
+        area: m2, (..., n).
+        lift_slope: 1/rad, (..., n).
+        stall: angle in the middle of the transition, rad, (..., n).
+        density: of the water, kg/m3.
+    """
     rows = matvec(frame.flatten(-3, -2), nu_r)
     flow = rows.unflatten(-1, (-1, 2))
     along, across = flow[..., 0], flow[..., 1]

@@ -127,7 +127,13 @@ class Stretch(Protocol):
         ...
 
     def hold(self, command: Array, fins: Array | None, voltage: Array | None) -> None:
-        """Hold commands (R, n), fin angles (R, m) and voltage (R,) from this row to the next, and move there."""
+        """Hold commands (R, n), fin angles (R, m) and voltage (R,) from this row to the next, and move there.
+
+        Args:
+            command: (R, n).
+            fins: fin angles, rad, (R, m), or None.
+            voltage: V, (R,), or None.
+        """
         ...
 
     def motion(self) -> Motion:
@@ -136,7 +142,13 @@ class Stretch(Protocol):
 
 
 def drive(stretch: Stretch, task: PlantTask, look: Look) -> Motion:
-    """Move through all rows of a task, under its commands or its controller."""
+    """Move through all rows of a task, under its commands or its controller.
+
+    Args:
+        stretch: the vehicles on their way.
+        task: rows, commands or controller.
+        look: what the sensors make of a row.
+    """
     for k in range(len(task.t)):
         if task.controller is not None:
             command, fins = task.controller(k, *look(k, *stretch.report()))
@@ -185,7 +197,14 @@ def refuse_learned(plant: Plant, task: PlantTask) -> None:
 
 
 def diverged(name: str, run: int, time: float, term: str) -> AuvnnError:
-    """Return the error that says where a run left what is physical."""
+    """Return the error that says where a run left what is physical.
+
+    Args:
+        name: of the vehicle.
+        run: its number.
+        time: s.
+        term: the force that was largest.
+    """
     return AuvnnError(
         f"simulating {name}: run {run} diverged after {time:g} s; the largest term was {term}. Check its numbers"
     )

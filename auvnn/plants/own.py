@@ -92,6 +92,13 @@ def open_loop(plant: GreyBox, plan: Start, voltage: Tensor | None, t: Tensor, ma
               ) -> tuple[Trajectory, Inputs]:  # fmt: skip
     """Run the plant under the plan's commands.
 
+    Args:
+        plant: the model with what is hidden.
+        plan: starts and commands.
+        voltage: V, (R, T), or None.
+        t: times of the rows, s, (T,).
+        max_step: longest step of the integrator, s.
+
     Raises:
         AuvnnError: it diverges.
     """
@@ -117,6 +124,15 @@ def closed_loop(
     """Run the plant under a controller that sees only what the sensors report, all runs at once.
 
     Each row: look, decide, hold the commands until the next row, as a sampled controller does.
+
+    Args:
+        plant: the model with what is hidden.
+        plan: starts.
+        controller: makes commands of what is seen.
+        look: what it sees of a row.
+        voltage: V, (R, T), or None.
+        t: times of the rows, s, (T,).
+        max_step: longest step of the integrator, s.
 
     Raises:
         AuvnnError: it diverges.

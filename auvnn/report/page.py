@@ -140,7 +140,14 @@ class Page:
             return [Plot("nothing", "Figures", functools.partial(_missing, reason), str)]
 
     def part(self, view: View, plots: list[Plot], drawn: Drawn, prefix: str = "") -> Part:
-        """Return everything that the page shows, as the templates take it."""
+        """Return everything that the page shows, as the templates take it.
+
+        Args:
+            view: the answer that is shown.
+            plots: that are planned.
+            drawn: what came of drawing them.
+            prefix: before the names of parts, so that those of several pages differ.
+        """
         notes: list[str] = []
         safely = functools.partial(_safely, notes)
         parts = []

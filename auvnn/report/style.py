@@ -139,7 +139,7 @@ class Numbers(ScalarFormatter):
 class Drawing(Figure):
     """A Figure that a notebook can show without pyplot."""
 
-    def add_subplot(self, *args: Any, **options: Any) -> Axes:
+    def add_subplot(self, *args: Any, **options: Any) -> Axes:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Add axes whose numbers are plain text."""
         axes = super().add_subplot(*args, **options)
         for axis in (axes.xaxis, axes.yaxis):
@@ -181,7 +181,13 @@ def show_grid(axes: Axes, axis: Literal["x", "y", "both"] = "y") -> None:
 
 
 def note(axes: Axes, text: str, **where: Any) -> None:
-    """Write a small remark into a panel."""
+    """Write a small remark into a panel.
+
+    Args:
+        axes: of the panel.
+        text: in a few words.
+        **where: `x` and `y` in shares of the panel, and how it is aligned: `ha`, `va`.
+    """
     place = {"x": 0.5, "y": 0.5, "ha": "center", "va": "center", **where}
     remark = axes.text(s=text, transform=axes.transAxes, fontsize=8, color="#404040", **place)
     remark.set_in_layout(False)

@@ -47,7 +47,13 @@ def finite(value: Any) -> float | None:
 
 
 def number(value: Any, digits: int = 3, unknown: str = "–") -> str:
-    """Return a number with so many significant digits: `0.0123`, `4.56 × 10⁻⁷`, or `–` where unknown."""
+    """Return a number with so many significant digits: `0.0123`, `4.56 × 10⁻⁷`, or `–` where unknown.
+
+    Args:
+        value: any number, or None.
+        digits: significant ones.
+        unknown: what stands where it is no finite number.
+    """
     value = finite(value)
     if value is None:
         return unknown
@@ -83,7 +89,13 @@ def percent(share: Any) -> str:
 
 
 def interval(value: Any, std: Any, unit: str = "") -> str:
-    """Return `0.203 ± 0.004 m/s`: value and one standard deviation, both to two digits of the latter."""
+    """Return `0.203 ± 0.004 m/s`: value and one standard deviation, both to two digits of the latter.
+
+    Args:
+        value: any number, or None.
+        std: one standard deviation, or None.
+        unit: of both; "1" and "-" are left out.
+    """
     value, std = finite(value), finite(std)
     unit = f"{_SPACES[0]}{unit}" if unit and unit not in ("1", "-") else ""
     if value is None:
@@ -117,7 +129,13 @@ def listing(items: Iterable[Any], last: str = "and") -> str:
 
 
 def plural(n: Any, one: str, many: str | None = None) -> str:
-    """Return `1 run`, `3 runs`, `1 000 000 samples`."""
+    """Return `1 run`, `3 runs`, `1 000 000 samples`.
+
+    Args:
+        n: how many.
+        one: the word for one.
+        many: the word for several; with an s by default.
+    """
     value = finite(n)
     return f"{count(n, 'an unknown number of')} {one if value == 1 else many or one + 's'}"
 

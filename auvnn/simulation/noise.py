@@ -79,7 +79,13 @@ class Draws:
             self.blocks[names[0]] = (unit[..., first : first + len(names)], *noise.sizes(names))
 
     def added(self, first: str, truth: Array, rows: slice | int = slice(None)) -> Array:
-        """Return truth (R, T, c) or (R, c) with the noise of the block that begins with channel `first`."""
+        """Return truth (R, T, c) or (R, c) with the noise of the block that begins with channel `first`.
+
+        Args:
+            first: "x", "u", "du", ...: the block's first channel.
+            truth: in the block's unit.
+            rows: which of the T rows `truth` has.
+        """
         unit, absolute, relative = self.blocks[first]
         return truth + (absolute + relative * np.abs(truth)) * unit[:, rows]
 

@@ -101,7 +101,13 @@ def _is_body(inertia: Array, factors: Array) -> bool:
 def make_plant(
     model: GreyBox, hidden: Mapping[str, Mapping[str, float]], factors: Mapping[str, Mapping[str, float]]
 ) -> GreyBox:
-    """Return the model with the hidden effects and with its coefficients multiplied by the drawn factors."""
+    """Return the model with the hidden effects and with its coefficients multiplied by the drawn factors.
+
+    Args:
+        model: nominal.
+        hidden: effects, name to parameters.
+        factors: on the coefficients, by group and axis.
+    """
     effects = model.copied_effects()
     present = {str(e.name): i for i, e in enumerate(effects)}
     for group, values in factors.items():

@@ -109,6 +109,14 @@ def simulate(
         ConfigError: an option is unknown or out of range, or the plant does not know a hidden effect.
         MissingExtra: the plant's package is not installed.
         AuvnnError: the plant diverges; the message says when and by which term.
+
+    Example:
+        ```python
+        model = auvnn.load("rov95")
+        hidden = {"ocean_current": {"v_north": 0.2}}
+        made = auvnn.simulate(model, "multisine", "realistic", hidden, seed=1, runs=1, duration=8.0)
+        made.log, made.truth["hidden"]
+        ```
     """
     model = as_model(model)
     _check(seed, runs, duration, rate, coefficients, max_step)
@@ -218,6 +226,14 @@ def bottom_below(
     """Return the depth, m, of a bottom that the nominal model comes close to: 1.3 of its radii below.
 
     The radius is that of the sphere of the vehicle's volume.
+
+    Args:
+        model: nominal.
+        excitation: a manoeuvre's name or its options.
+        seed: of its draws.
+        runs: how many.
+        duration: of each, s.
+        rate: rows per second.
     """
     nominal = simulate(
         model, excitation, "none", None, seed, runs=runs, duration=duration, rate=rate, max_step=0.025

@@ -41,6 +41,13 @@ def oracle_information(
 
     The initial state of each window is not known; noise has the given standard deviations (18,). An effect
     with a shape is taken at the given one, otherwise at its null.
+
+    Args:
+        model: as known.
+        log: whose windows are taken.
+        name: of the effect, with p parameters.
+        sigma: standard deviation of each channel, (18,).
+        shape: values of its parameters of shape.
     """
     layout = lay_out(model, [name])
     member = layout.model.effect(name)
@@ -77,7 +84,14 @@ def _shape(
 def drawn_direction(
     model: GreyBox, effect: str, log: Log, seed: int
 ) -> tuple[tuple[Parameter, ...], Array, dict[str, float]]:
-    """Return an effect's parameters, a random direction in units of their scales, rms one, and a plausible shape."""
+    """Return an effect's parameters, a random direction in units of their scales, rms one, and a plausible shape.
+
+    Args:
+        model: as known.
+        effect: its name.
+        log: for plausible shapes.
+        seed: of the draws.
+    """
     member = model.with_effects({effect: {}}).effect(effect)
     described = tuple(member.parameters_of)
     generator = np.random.default_rng(np.random.SeedSequence(int(seed), spawn_key=(101,)))

@@ -14,6 +14,7 @@ from auvnn.damping.bank import DampingBank
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.layout import Layout, lay_out
 from auvnn.effects import effect_class
+from auvnn.estimation.nuisance import carry_of
 from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
@@ -170,7 +171,7 @@ def _left(total: Array, of: Mapping[str, list[int]], group: str) -> dict[str, fl
     def imitated(others: list[int]) -> float:
         cross = total[np.ix_(own, others)]
         inner = total[np.ix_(others, others)] + np.eye(len(others))
-        return float(np.clip(np.trace(cross @ np.linalg.solve(inner, cross.T)) / whole, 0.0, 1.0))
+        return float(np.clip(np.trace(cross @ carry_of(inner, cross.T).T) / whole, 0.0, 1.0))
 
     rest = [k for name, columns in of.items() if name != group for k in columns]
     return {"own": 1.0 - imitated(rest), **{n: imitated(c) for n, c in of.items() if n != group}}

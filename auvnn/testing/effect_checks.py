@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import torch
 
-from auvnn.effects import Effect, Extent
-from auvnn.effects.base import HOOKS
-from auvnn.errors import ConfigError
+from auvnn.effects import Extent
 from auvnn.models import GreyBox
 from auvnn.testing.effect_derivatives import has_right_gradient, recovers, transforms
+from auvnn.testing.effect_texts import Kind, _all_starts, describes_itself, refuses
 from auvnn.testing.scene import (
     EXAMPLE,
     THETA,
@@ -27,100 +24,19 @@ from auvnn.testing.scene import (
     together,
     typical_values,
 )
-from auvnn.testing.units import Units, powers
+from auvnn.testing.units import Units
 from auvnn.vehicle import Vehicle
-
-Kind = type[Effect]
-# An effect that wants to look around a start more often than this does not end.
-MOST_LEVELS = 20
-
-
-def describes_itself(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
-    """Check that cause, symbol, reference, units, scales and bounds are stated and make sense."""
-    name = getattr(kind, "name", "")
-    require(
-        bool(name) and name.isidentifier() and name == name.lower(),
-        f"name {name!r} is no lower-case identifier",
-    )
-    for what in ("cause", "symbol", "reference"):
-        text = getattr(kind, what, "")
-        require(bool(text.strip()) and "\n" not in text, f"{name}: {what} is not stated in one line")
-    for what in ("channels", "excludes"):
-        value = getattr(kind, what)
-        require(
-            isinstance(value, tuple) and all(isinstance(v, str) for v in value), f"{name}: {what} is no tuple"
-        )
-    require(bool(kind.hooks()), f"{name} overrides none of the hooks {', '.join(HOOKS)}")
-    described = kind.describe(vehicle, actuation)
-    require(bool(described), f"{name} has no parameters")
-    names = [p.name for p in described]
-    require(
-        len(set(names)) == len(names) and all(n.isidentifier() for n in names), f"{name}: parameters {names}"
-    )
-    for p in described:
-        powers(p.unit)
-        where = f"{name}.{p.name}"
-        require(math.isfinite(p.scale) and p.scale > 0, f"{where}: scale {p.scale} is not positive")
-        require(p.low <= p.null <= p.high and p.low < p.high, f"{where}: not {p.low} <= {p.null} <= {p.high}")
-        require(all(p.low <= x <= p.high for x in p.probes), f"{where}: a probe is out of bounds")
-    require(not all(p.shape for p in described), f"{name}: every parameter is a shape, none says how much")
-    shapes = {p.name for p in described if p.shape}
-    for start in _all_starts(kind, described, Extent(0.0, 60.0, 60.0, (3.0, 8.0))):
-        require(set(start) <= shapes, f"{name}: starts name {sorted(start)}, shapes are {sorted(shapes)}")
-    _looks_around(kind, described)
-    built = kind.build(vehicle, actuation)
-    require(built.values() == {p.name: p.null for p in described}, f"{name} does not start at its null")
-    values = typical_values(kind, vehicle, actuation)
-    require(kind.build(vehicle, actuation, values).values() == values, f"{name} does not keep its values")
-
-
-def _looks_around(kind: Kind, described: tuple[Any, ...]) -> None:
-    """Check that the looks around a start are at shapes within bounds, wherever it is in a log, and come to an end."""
-    extent = Extent(0.0, 600.0, 600.0, (3.0, 8.0))
-    bounds = {p.name: (p.low, p.high) for p in described if p.shape}
-    starts = kind.starts(described, extent)
-    for start in (starts[0], starts[-1]):
-        shape, level = {p.name: p.null for p in described if p.shape} | start, 0
-        while around := kind.closest(described, extent, shape, level):
-            for values in around:
-                out = [
-                    n for n, v in values.items() if n not in bounds or not bounds[n][0] <= v <= bounds[n][1]
-                ]
-                require(not out, f"{kind.name}: closest looks where {out} is no shape within its bounds")
-            shape, level = around[0], level + 1
-            require(level < MOST_LEVELS, f"{kind.name}: closest does not end")
-
-
-def _all_starts(kind: Kind, described: tuple[Any, ...], extent: Extent) -> list[dict[str, float]]:
-    """Return an effect's starts, a closer one than the first before the others where there are such."""
-    starts = kind.starts(described, extent)
-    return [*kind.closer(described, extent, starts[0])[:1], *starts]
-
-
-def refuses(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
-    """Check that unknown parameters and values that are out of bounds or no numbers are refused."""
-    for p in kind.describe(vehicle, actuation):
-        beyond = 1e-3 * (p.high - p.low)
-        wrong: list[Any] = [p.low - beyond, p.high + beyond, math.nan, math.inf, "1", True]
-        for value in wrong:
-            try:
-                kind.build(vehicle, actuation, {p.name: value})
-            except ConfigError as error:
-                require(p.name in str(error) and "\n" not in str(error), f"{kind.name}: unclear: {error}")
-            else:
-                raise AssertionError(f"{kind.name}.{p.name} = {value!r} was accepted")
-    try:
-        kind.build(vehicle, actuation, {"no_such_parameter": 1.0})
-    except ConfigError as error:
-        require("no_such_parameter" in str(error), f"{kind.name}: unclear: {error}")
-    else:
-        raise AssertionError(f"{kind.name} accepted an unknown parameter")
 
 
 def vanishes(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
     """Check that at the null nothing changes, to rounding: acceleration, free run and sensors.
 
     Neither does it where parameters of shape have other values, those of `starts` among them.
+
+    Args:
+        kind: class of the effect.
+        vehicle: in which it is tried.
+        actuation: "thrusters" or "wrench".
     """
     scene, expected = _without(vehicle, actuation)
     described = kind.describe(vehicle, actuation)
@@ -144,7 +60,13 @@ def _without(vehicle: Vehicle, actuation: str) -> tuple[Scene, dict[str, torch.T
 
 
 def batches(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
-    """Check that a batch gives what its members give one by one."""
+    """Check that a batch gives what its members give one by one.
+
+    Args:
+        kind: class of the effect.
+        vehicle: in which it is tried.
+        actuation: "thrusters" or "wrench".
+    """
     model, scene = built(kind, vehicle, actuation), make_scene(vehicle, actuation, runs=3)
     with torch.no_grad():
         whole = together(model(scene))
@@ -155,7 +77,13 @@ def batches(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters"
 
 
 def follows_precision(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
-    """Check that single precision stays single, is close to double, and that gradients have it too."""
+    """Check that single precision stays single, is close to double, and that gradients have it too.
+
+    Args:
+        kind: class of the effect.
+        vehicle: in which it is tried.
+        actuation: "thrusters" or "wrench".
+    """
     model, scene = built(kind, vehicle, actuation), make_scene(vehicle, actuation)
     exact = together(model(scene))
     require(exact.dtype == torch.float64, f"{kind.name}: double precision became {exact.dtype}")
@@ -174,7 +102,14 @@ def follows_precision(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "
 def follows_device(
     kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters", device: str = "meta"
 ) -> None:
-    """Check that no tensor is left on another device; "meta" needs no hardware."""
+    """Check that no tensor is left on another device; "meta" needs no hardware.
+
+    Args:
+        kind: class of the effect.
+        vehicle: in which it is tried.
+        actuation: "thrusters" or "wrench".
+        device: as torch calls it.
+    """
     model = built(kind, vehicle, actuation).to(device)
     scene = make_scene(vehicle, actuation).change(lambda x: x.to(device))
     effect, row = model.model.effect(kind.name), scene.inputs.each()[0]
@@ -196,7 +131,13 @@ def follows_device(
 
 
 def keeps_units(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
-    """Check the declared units: in other units of mass, length and time the same things must happen."""
+    """Check the declared units: in other units of mass, length and time the same things must happen.
+
+    Args:
+        kind: class of the effect.
+        vehicle: in which it is tried.
+        actuation: "thrusters" or "wrench".
+    """
     units, model, scene = Units(), built(kind, vehicle, actuation), make_scene(vehicle, actuation)
     described = model.model.effect(kind.name).parameters_of
     other = units.vehicle(vehicle)
@@ -212,7 +153,13 @@ def keeps_units(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrust
 
 
 def restores(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
-    """Check that a state dict brings back the predictions to the last bit, and that copies share nothing."""
+    """Check that a state dict brings back the predictions to the last bit, and that copies share nothing.
+
+    Args:
+        kind: class of the effect.
+        vehicle: in which it is tried.
+        actuation: "thrusters" or "wrench".
+    """
     model, scene = built(kind, vehicle, actuation), make_scene(vehicle, actuation)
     fresh = Predictor(GreyBox(vehicle, [kind.build(vehicle, actuation)], actuation=actuation))
     with torch.no_grad():
@@ -230,6 +177,11 @@ def answers_like_a_lag(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = 
     """Check actuator dynamics: linear in the gap, the same in one step as in two, right moments.
 
     An effect without dynamics passes.
+
+    Args:
+        kind: class of the effect.
+        vehicle: in which it is tried.
+        actuation: "thrusters" or "wrench".
     """
     if "respond" not in kind.hooks():
         return

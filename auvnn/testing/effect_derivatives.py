@@ -14,7 +14,13 @@ Kind = type[Effect]
 
 
 def has_right_gradient(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
-    """Check the derivatives in the parameters: `gradcheck` in reverse, differences in forward mode."""
+    """Check the derivatives in the parameters: `gradcheck` in reverse, differences in forward mode.
+
+    Args:
+        kind: class of the effect.
+        vehicle: in which it is tried.
+        actuation: "thrusters" or "wrench".
+    """
     model, scene = built(kind, vehicle, actuation), make_scene(vehicle, actuation, runs=2, rows=2, warmup=1)
     outputs, theta = as_function(model, scene)
     mix = torch.randn(
@@ -36,7 +42,13 @@ def has_right_gradient(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = 
 
 
 def transforms(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
-    """Check that `torch.func` sees through it, as the diagnosis needs: jacrev = jacfwd, vmap = loop."""
+    """Check that `torch.func` sees through it, as the diagnosis needs: jacrev = jacfwd, vmap = loop.
+
+    Args:
+        kind: class of the effect.
+        vehicle: in which it is tried.
+        actuation: "thrusters" or "wrench".
+    """
     model, scene = built(kind, vehicle, actuation), make_scene(vehicle, actuation, runs=2, rows=2, warmup=1)
     outputs, theta = as_function(model, scene)
     require_close(
@@ -59,6 +71,12 @@ def recovers(
     """Check that noise-free data made with the effect give its parameters back, by least squares.
 
     The tolerance is relative to the parameters' distance from the null.
+
+    Args:
+        kind: class of the effect.
+        vehicle: in which it is tried.
+        actuation: "thrusters" or "wrench".
+        tolerance: relative error that is allowed.
     """
     from scipy.optimize import least_squares
 

@@ -24,7 +24,14 @@ def require(condition: bool, message: str) -> None:
 
 
 def require_close(a: Tensor, b: Tensor, tolerance: float, message: str) -> None:
-    """Require that two tensors differ by less than `tolerance` times the largest value of the second."""
+    """Require that two tensors differ by less than `tolerance` times the largest value of the second.
+
+    Args:
+        a: found.
+        b: expected.
+        tolerance: relative to the largest value of `b`.
+        message: what is compared.
+    """
     error = float((a.detach().double() - b.detach().double()).abs().max())
     size = float(b.detach().abs().max())
     require(error <= tolerance * max(size, 1e-30), f"{message}: differs by {error:.3g} of {size:.3g}")
@@ -160,7 +167,16 @@ class Scene:
 def make_scene(
     vehicle: Vehicle, actuation: str, runs: int = 4, rows: int = 4, warmup: int = 2, seed: int = 0
 ) -> Scene:
-    """Return runs from random states at depth, with random commands within the vehicle's means."""
+    """Return runs from random states at depth, with random commands within the vehicle's means.
+
+    Args:
+        vehicle: for its thrusters and fins.
+        actuation: "thrusters" or "wrench".
+        runs: how many.
+        rows: of each, after the warm-up.
+        warmup: rows before.
+        seed: of the draws.
+    """
     make = torch.Generator().manual_seed(seed)
 
     def draw(*shape: int, size: float | Tensor = 1.0) -> Tensor:
@@ -231,7 +247,14 @@ def together(outputs: dict[str, Tensor]) -> Tensor:
 def typical_values(
     kind: type[Effect], vehicle: Vehicle, actuation: str, share: float = 0.4
 ) -> dict[str, float]:
-    """Return parameters away from the null by some of their scale, within bounds, with either sign."""
+    """Return parameters away from the null by some of their scale, within bounds, with either sign.
+
+    Args:
+        kind: class of the effect.
+        vehicle: in which it is tried.
+        actuation: "thrusters" or "wrench".
+        share: of each parameter's scale.
+    """
     values = {}
     for i, p in enumerate(kind.describe(vehicle, actuation)):
         step = share * (1 + 0.15 * (i % 3)) * p.scale * (1 if i % 2 else -1)
@@ -243,7 +266,14 @@ def typical_values(
 
 
 def built(kind: type[Effect], vehicle: Vehicle, actuation: str, share: float = 0.4) -> Predictor:
-    """Return a predictor of the vehicle with the effect away from its null, and nothing else."""
+    """Return a predictor of the vehicle with the effect away from its null, and nothing else.
+
+    Args:
+        kind: class of the effect.
+        vehicle: in which it is tried.
+        actuation: "thrusters" or "wrench".
+        share: of each parameter's scale by which it is away from its null.
+    """
     values = typical_values(kind, vehicle, actuation, share)
     return Predictor(GreyBox(vehicle, [kind.build(vehicle, actuation, values)], actuation=actuation))
 

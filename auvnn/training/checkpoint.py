@@ -54,7 +54,13 @@ class Checkpoints:
             )
 
     def save(self, iteration: int, tensors: Mapping[str, Tensor], plain: Mapping[str, Any]) -> Path:
-        """Write a checkpoint beside its place, move it there, and drop all but the newest two."""
+        """Write a checkpoint beside its place, move it there, and drop all but the newest two.
+
+        Args:
+            iteration: number of it.
+            tensors: of the state, by name.
+            plain: what JSON can hold of it.
+        """
         state = json.dumps({"identity": self.identity, "iteration": iteration, "state": plain})
         # A state may hold infinite costs of starts that failed; weights that are saved as a model may not.
         weights = tensors_to_bytes(tensors, finite=False)

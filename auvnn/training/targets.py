@@ -37,6 +37,11 @@ def targets(model: GreyBox, log: Log, derivative: Derivative) -> tuple[Array, Ar
     d(nu) = D(nu) nu = M (nu_dot of the model without it - nu_dot measured): equation 14 of Van de Ven, Flanagan
     and Toal (2004). Where accelerations are estimated, velocity and wrench have passed the same filter.
 
+    Args:
+        model: with or without subnetworks; what they give is left out.
+        log: measurements.
+        derivative: how accelerations are obtained.
+
     Returns:
         nu (N, 6) through the water; target (N, 6), NaN where a sample is missing; run (N,).
     """

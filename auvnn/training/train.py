@@ -121,6 +121,14 @@ def train(
     Raises:
         ConfigError: an unknown scheme, form or option.
         InputError: nothing to fit, the same data on both sides, or a log that contradicts itself.
+
+    Example:
+        ```python
+        model = auvnn.load("rov95")
+        log = auvnn.simulate(model, coefficients="drawn", noise="realistic").log
+        trained = auvnn.train(model, log, "levenberg_marquardt", "polynomial")
+        trained.metrics, trained.model
+        ```
     """
     log = as_log(log)
     model = as_model(model, log)
@@ -236,7 +244,15 @@ def _free_running(models: Mapping[str, GreyBox], test: Log) -> dict[str, Any]:
 
 
 def metrics_of(fit: Fit, before: dict, after: dict, samples: int, held: int) -> dict[str, Any]:
-    """Return `metrics` of the answer."""
+    """Return `metrics` of the answer.
+
+    Args:
+        fit: what came of it.
+        before: comparison before training.
+        after: comparison after training.
+        samples: that were fitted.
+        held: samples that decided when to stop.
+    """
     units = ("N", "N", "N", "N_m", "N_m", "N_m")
     found: dict[str, Any] = {
         "samples_fitted": samples,

@@ -113,6 +113,12 @@ def train_files(
     Raises:
         ConfigError: an unknown scheme, form, option or executor, or one that cannot be spread.
         InputError: nothing to fit, the same data on both sides, or a log that contradicts itself.
+
+    Example:
+        ```python
+        trained = auvnn.train_files(auvnn.load("rov95"), "dives/*.parquet", test="held_out.parquet", workers=8)
+        trained.model.save("trained")
+        ```
     """
     say = progress or (lambda words: None)
     if not spreads(objective=objective):

@@ -24,6 +24,11 @@ _ROUNDING = 1e-9
 def symmetrized(matrix: Array, where: str, field: str) -> Array:
     """Return the matrix, symmetric to the last bit.
 
+    Args:
+        matrix: (n, n).
+        where: of the file, for messages.
+        field: its name.
+
     Raises:
         ModelError: it differs from its transpose by more than rounding.
     """
@@ -78,6 +83,11 @@ def rigid_body(mass: float, inertia: Array, r: Array) -> Array:
 
 def check_added_mass(added_mass: Array, rigid_body: Array, where: str) -> str | None:
     """Refuse added mass of the wrong sign or with M_RB + M_A indefinite; return a doubt, or None.
+
+    Args:
+        added_mass: M_A, (6, 6).
+        rigid_body: M_RB, (6, 6).
+        where: of the file, for messages.
 
     Raises:
         ModelError: with the smallest eigenvalue of M_RB + M_A.

@@ -26,12 +26,26 @@ def shown(value: Any) -> str:
 
 
 def refuse(where: str, field: str, value: Any, problem: str, cure: str) -> ModelError:
-    """Return the error for one field."""
+    """Return the error for one field.
+
+    Args:
+        where: of the file.
+        field: its name.
+        value: what stands there.
+        problem: what is wrong with it.
+        cure: what to do.
+    """
     return ModelError(f"{where}: {field} is {shown(value)}: {problem}; {cure}")
 
 
 def number(where: str, field: str, value: Any) -> float:
-    """Return a finite float; strings, booleans, NaN and infinity are refused."""
+    """Return a finite float; strings, booleans, NaN and infinity are refused.
+
+    Args:
+        where: of the file, for messages.
+        field: its name.
+        value: what stands there.
+    """
     if isinstance(value, str):
         raise refuse(where, field, value, "a number is written as text", "remove the quotes and the unit")
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
@@ -45,7 +59,14 @@ def number(where: str, field: str, value: Any) -> float:
 
 
 def numbers(where: str, field: str, value: Any, shape: tuple[int, ...]) -> Array:
-    """Return a float64 array of the given shape (0 stands for any length) from nested lists."""
+    """Return a float64 array of the given shape (0 stands for any length) from nested lists.
+
+    Args:
+        where: of the file, for messages.
+        field: its name.
+        value: what stands there.
+        shape: that it must have.
+    """
     words = " x ".join(str(n) for n in shape) if shape != (0,) else "a list of"
     if isinstance(value, np.ndarray):
         value = value.tolist()
@@ -86,7 +107,13 @@ class Fields:
         return self.data[key]
 
     def refuse(self, key: str, problem: str, cure: str) -> ModelError:
-        """Return the error for one of these fields."""
+        """Return the error for one of these fields.
+
+        Args:
+            key: of the field.
+            problem: what is wrong with it.
+            cure: what to do.
+        """
         return refuse(self.where, key, self.data.get(key), problem, cure)
 
     def number(self, key: str, default: float | None = None) -> float:

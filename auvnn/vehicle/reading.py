@@ -49,7 +49,14 @@ _FLU: Array = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
 def vehicle_from_dict(
     kind: type[Vehicle], data: Mapping[str, Any], where: str, also: frozenset[str]
 ) -> Vehicle:
-    """Return the validated vehicle, of class `kind`, of a model file's mapping; see `Vehicle.from_dict`."""
+    """Return the validated vehicle, of class `kind`, of a model file's mapping; see `Vehicle.from_dict`.
+
+    Args:
+        kind: class of the vehicle.
+        data: of the model file.
+        where: it stands, for messages.
+        also: further keys that are allowed, such as those of saved models.
+    """
     fields = Fields(data, where, "vehicle", KEYS, also)
     warnings: list[str] = []
     turn = _frame(fields)

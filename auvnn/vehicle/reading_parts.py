@@ -17,7 +17,13 @@ def turned(turn: Array, vector: Array) -> Array:
 
 
 def read_element(data: Any, where: str, turn: Array) -> DampingElement:
-    """Return a displaced drag element; `turn` (3, 3) takes its frame to FRD."""
+    """Return a displaced drag element; `turn` (3, 3) takes its frame to FRD.
+
+    Args:
+        data: of the element.
+        where: it stands, for messages.
+        turn: from its frame to FRD, (3, 3).
+    """
     fields = Fields(data, where, "damping element", ("position", "axes", "linear", "quadratic"))
     axes = fields.array("axes", (3, 3)) if fields.has("axes") else np.eye(3)
     if np.abs(axes.T @ axes - np.eye(3)).max() > 1e-6 or np.linalg.det(axes) < 0:
@@ -32,7 +38,13 @@ def read_element(data: Any, where: str, turn: Array) -> DampingElement:
 
 
 def read_thruster(data: Any, where: str, turn: Array) -> Thruster:
-    """Return a thruster; `turn` (3, 3) takes its frame to FRD."""
+    """Return a thruster; `turn` (3, 3) takes its frame to FRD.
+
+    Args:
+        data: of the thruster.
+        where: it stands, for messages.
+        turn: from its frame to FRD, (3, 3).
+    """
     known = ("position", "direction", "max_forward", "max_reverse", "curve", "handedness")
     fields = Fields(data, where, "thruster", known)
     curve = fields.raw("curve") if fields.has("curve") else "quadratic"
@@ -81,7 +93,13 @@ def _table(data: Any, where: str) -> ThrustTable:
 
 
 def read_fin(data: Any, where: str, turn: Array) -> Fin:
-    """Return a fin; `turn` (3, 3) takes its frame to FRD."""
+    """Return a fin; `turn` (3, 3) takes its frame to FRD.
+
+    Args:
+        data: of the fin.
+        where: it stands, for messages.
+        turn: from its frame to FRD, (3, 3).
+    """
     fields = Fields(data, where, "fin", ("position", "axis", "area", "lift_slope", "stall"))
     stall = fields.positive("stall", 0.26)
     if stall > np.pi / 2:

@@ -47,6 +47,12 @@ class Vehicle(Shown):
 
     Raises:
         ModelError: a value is not physical; one line names the field, the value and the cure.
+
+    Example:
+        ```python
+        vehicle = auvnn.load("remus100").vehicle
+        vehicle.mass, vehicle.added_mass.shape  # kg, (6, 6)
+        ```
     """
 
     name: str

@@ -49,18 +49,18 @@ def machine() -> dict[str, Any]:
 
 def compiling(work: Work) -> list[dict[str, Any]]:
     """Return what the first run costs more than the second, and from how many runs on that pays."""
-    from auvnn.models import engine
+    from auvnn.models import model_kernels
 
     found = []
     for name, call in (("free run", "run"), ("free run and gradient", "run_and_gradient")):
-        engine._KERNELS.clear()
-        engine._MADE.clear()
+        model_kernels._KERNELS.clear()
+        model_kernels._MADE.clear()
         for kept in Path(CACHE).glob("*.so"):
             kept.unlink()
         ours, plain = Ours(work, "compiled"), Ours(work, "torch")
         first = once(getattr(ours, call))[0]
-        engine._KERNELS.clear()
-        engine._MADE.clear()
+        model_kernels._KERNELS.clear()
+        model_kernels._MADE.clear()
         kept_already = once(getattr(ours, call))[0]
         second = min(once(getattr(ours, call))[0] for _ in range(5))
         torch_s = once(getattr(plain, call))[0]

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 # `auvnn check`, whose work is to write a file, say so, and sleep.
 SLEEPER = """
 import sys, time
-from auvnn.cli import check
+from auvnn.cli.verbs import check
 from auvnn.cli.runs.job import Verb
 from auvnn.cli.main import main
 

@@ -9,6 +9,7 @@ from auvnn.compiled.program import Numbers
 from auvnn.damping.bank import DampingBank
 from auvnn.models import GreyBox, Inputs
 from auvnn.models import engine as engines
+from auvnn.models import model_kernels as kernels
 from auvnn.models.free_running.rate import unit_attitude
 from auvnn.vehicle import load_vehicle
 
@@ -130,9 +131,9 @@ def test_the_derivative_agrees_at_many_states_and_other_weights(compiler, case):
     inputs = Inputs(torch.zeros(1, model.actuators.size, dtype=DOUBLE))
     for seed in range(3):
         other = random_model(case, seed)
-        made = engines._made(other, inputs, False, engines_tableau())
-        side = engines._RightHandSide(other)
-        samples = engines._samples(made.kernel.layout, 40, seed=10 + seed)
+        made = kernels._made(other, inputs, False, engines_tableau())
+        side = kernels._RightHandSide(other)
+        samples = kernels._samples(made.kernel.layout, 40, seed=10 + seed)
         y, given = samples["y"], [samples.get(n) for n, _ in made.kernel.layout.inputs]
         u = torch.cat([x.reshape(40, -1) for x in given if x is not None], -1)
         with torch.no_grad():

@@ -14,8 +14,6 @@ from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.one_step import (
     OneStepReplay,
     integrated,
-    model_acceleration,
-    model_velocity,
     one_step,
     scores,
 )
@@ -74,7 +72,7 @@ def test_a_perfect_model_leaves_nothing_where_the_filter_changes_both_alike(movi
     left = np.sqrt(np.mean((part.measured - part.model) ** 2, 0)) / size
     assert (left < 0.004).all()
     # The smoothed value of the acceleration is another filter than the slope of the velocity.
-    other = savgol_filter(model_acceleration(model, log.runs[0]), 9, 2, axis=0)
+    other = savgol_filter(OneStepReplay(model, log.runs[0]).acceleration(), 9, 2, axis=0)
     assert (np.sqrt(np.mean((part.measured - other) ** 2, 0)) / size > 5 * left).all()
 
 
@@ -84,7 +82,9 @@ def test_held_commands_do_not_pass_for_half_a_sample_of_lag(stepped):
     run, part = stepped.runs[0], one_step(model, stepped, how)[0]
     held = np.sqrt(np.mean((part.measured - part.model)[:, 0] ** 2))
     # As if the command moved in a straight line from row to row: half a sample early at every jump.
-    ramp = savgol_filter(integrated(run.t, model_acceleration(model, run)), 9, 2, deriv=1, delta=0.05, axis=0)
+    ramp = savgol_filter(
+        integrated(run.t, OneStepReplay(model, run).acceleration()), 9, 2, deriv=1, delta=0.05, axis=0
+    )
     ramped = np.sqrt(np.mean((part.measured - ramp)[:, 0] ** 2))
     assert held < 1e-3 * part.measured[:, 0].std()
     assert ramped > 20 * held
@@ -92,7 +92,7 @@ def test_held_commands_do_not_pass_for_half_a_sample_of_lag(stepped):
 
 def test_the_velocity_that_the_model_adds_up_to_equals_the_measured_one(stepped):
     run = stepped.runs[0]
-    total = model_velocity(simple.model(), run)
+    total = OneStepReplay(simple.model(), run).velocity()
     gained = run.nu - run.nu[0]
     assert np.abs(total - gained).max() < 2e-3 * np.abs(gained).max()
 
@@ -242,8 +242,8 @@ def test_options_of_the_derivative_are_refused_where_they_make_no_sense(stepped)
 def test_commands_that_do_not_drive_the_model_are_refused(moving, stepped):
     model, log = moving
     with pytest.raises(InputError, match="no commands of the kind that drives the model"):
-        model_acceleration(model, stepped.runs[0])
+        OneStepReplay(model, stepped.runs[0]).acceleration()
     run = log.runs[0]
     fewer = Run(0, run.t, run.quaternion, run.nu, thrusters=run.thrusters[:, :5])
     with pytest.raises(InputError, match="5 thruster columns, but small has 8 thrusters"):
-        model_acceleration(model, fewer)
+        OneStepReplay(model, fewer).acceleration()

@@ -38,6 +38,11 @@ from auvnn.errors import AuvnnError, ConfigError, one_line
 def run_verb(name: str, verb: Verb, arguments: list[str]) -> int:
     """Run one verb with its command-line arguments and return the exit status.
 
+    Args:
+        name: of the verb, which its config has too.
+        verb: what it reads, writes and does.
+        arguments: the words after the verb, as in `sys.argv[2:]`.
+
     Raises:
         AuvnnError: the arguments are wrong; nothing has been touched.
     """

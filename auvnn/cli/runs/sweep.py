@@ -34,7 +34,13 @@ def jobs_of(overrides: Sequence[str]) -> list[list[str]]:
 
 
 def note(out: Path, number: int, status: int) -> None:
-    """Leave a job's exit status where `statuses` finds it."""
+    """Leave a job's exit status where `statuses` finds it.
+
+    Args:
+        out: folder of all jobs.
+        number: of the job.
+        status: with which it ended.
+    """
     write_text(out / WORK / _ENDED / str(number), str(status))
 
 

@@ -54,6 +54,11 @@ def refuse_foreign(out: Path) -> None:
 def refuse_links(root: Path, place: Path, *further: str) -> None:
     """Refuse links between the folder of many jobs and that of one of them, and among further names in `root`.
 
+    Args:
+        root: folder of many jobs, `out`.
+        place: of one job, below `root`.
+        *further: names in `root` that must be no links either.
+
     Raises:
         ConfigError: naming the link.
     """

@@ -26,7 +26,13 @@ def at_bound(layout: Layout, found: FittedHypothesis, name: str) -> list[str]:
 
 
 def reservations(layout: Layout, found: FittedHypothesis, names: Sequence[str]) -> list[str]:
-    """Return warnings where a fit must not be accepted silently."""
+    """Return warnings where a fit must not be accepted silently.
+
+    Args:
+        layout: stated values and bounds.
+        found: the fit.
+        names: effects whose parameters are looked at.
+    """
     out = []
     if not found.fitted.converged:
         out.append("the fit had not settled when it was stopped: read the parameters with care")

@@ -17,8 +17,13 @@ from auvnn.diagnosis.stages.state import Setting, State
 def joint(asked: Setting, state: State, found: Worth) -> dict[str, dict[str, Any]]:
     """Return of each name its joint values, the share of the force that it explains, its gain, and its look-alikes.
 
-    The share is that of the energy of what looks like a force (`any_force`) that comes back in a degree of freedom when
-    the name is taken out and everything else fitted again.
+    The share is that of the energy of what looks like a force (`variance_component_test`) that comes back in a degree
+    of freedom when the name is taken out and everything else fitted again.
+
+    Args:
+        asked: what was asked.
+        state: of the search at its end.
+        found: what each name is worth, with the fits without it.
     """
     last = state.current
     noise = white(last, asked.floor)

@@ -103,7 +103,13 @@ def fill_candidate(
 def values(
     layout: Layout, found: FittedHypothesis, wanted: Sequence[str]
 ) -> dict[str, dict[str, dict[str, Any]]]:
-    """Return the named effects' parameters as fitted, with their standard errors, as answers hold them."""
+    """Return the named effects' parameters as fitted, with their standard errors, as answers hold them.
+
+    Args:
+        layout: which columns belong to which effect.
+        found: the fit.
+        wanted: names of the effects that are told.
+    """
     places = {n: at for n, at in layout.places(found.names).items() if n in wanted}
     return {
         n: describe_parameters(layout.model.effect(n), found.fitted.theta[at], standard_errors(found, at)[0])

@@ -19,7 +19,13 @@ MOTIONS = judged_words.MOTIONS
 
 
 def number(value: float | None, std: float | None, unit: str) -> str:
-    """Return a value with its standard error and unit, to as many digits as the error deserves."""
+    """Return a value with its standard error and unit, to as many digits as the error deserves.
+
+    Args:
+        value: in `unit`; "unknown" where it is None or not finite.
+        std: its standard error; four digits are shown where it is unknown.
+        unit: SI; "1" is left out.
+    """
     shown = "" if unit == "1" else f" {unit}"
     if value is None or not np.isfinite(value):
         return f"unknown{shown}"

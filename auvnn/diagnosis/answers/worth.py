@@ -102,7 +102,13 @@ def worth(asked: Setting, state: State, beside: Mapping[str, FittedHypothesis]) 
 
 
 def small(asked: Setting, state: State, left: Unnamed) -> bool:
-    """Whether what is left is within the tolerance, by the upper limits of its force and its cost."""
+    """Whether what is left is within the tolerance, by the upper limits of its force and its cost.
+
+    Args:
+        asked: what was asked, with the tolerance.
+        state: of the search at its end.
+        left: sizes of the force that no name explains.
+    """
     if asked.tolerance.strict or not left.sizes:
         return False
     actuators = actuators_of(asked.layout.model, state.windows)

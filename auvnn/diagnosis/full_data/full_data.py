@@ -15,10 +15,11 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.layout import DETERMINED, Layout
 from auvnn.diagnosis.residuals.autocorrelation import slower_than_white
 from auvnn.diagnosis.score_tests.probes import Probed
-from auvnn.diagnosis.score_tests.score import Score, following, projection, ratio, score_from_sums
+from auvnn.diagnosis.score_tests.score import Score, following, projection, score_from_sums
+from auvnn.diagnosis.score_tests.variance_inflation import ratio
 from auvnn.effects import Extent
-from auvnn.estimation.priors import Priors, bounded_step, limits, parameters_of, set_parameters
-from auvnn.estimation.scaling import unit_of
+from auvnn.estimation.nuisance import NormalEquations
+from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
 from auvnn.estimation.sufficient_statistics import Combination, WindowSums
 from auvnn.log_chunks.scan import WindowCut
 
@@ -156,14 +157,9 @@ def refit(
         )
         if done or steps == STEPS or not len(theta):
             break
-        normal = sums.hessian + np.diag(priors.precision)
-        gradient = sums.slope - priors.precision * (theta - priors.mean)
-        unit = unit_of(normal)
-        scale = 1.0 / np.where(unit > 0.0, unit, 1.0)
-        step = unit * bounded_step(
-            normal * unit[:, None] * unit, gradient * unit, (low - theta) * scale, (high - theta) * scale
-        )
-        done = float(step @ normal @ step) < ENOUGH
+        known = NormalEquations.with_priors(sums.hessian, sums.slope, priors.precision, theta - priors.mean)
+        step = known.bounded(low - theta, high - theta)
+        done = float(step @ known.square @ step) < ENOUGH
         theta, steps = theta + step, steps + 1
     std = _errors(passes, point, sums, priors, list(layout.places(names).values()))
     slow = slower_than_white(sums.channel, sums.count, sums.rough, sums.pairs, sums.windows, floor)
@@ -177,19 +173,18 @@ def _errors(
     priors: Priors,
     blocks: Sequence[NDArray[np.int64]],
 ) -> Array:
-    """Return standard errors as `explain.standard_errors` does, for each effect's columns at a time."""
+    """Return standard errors as `fit.standard_errors` does, for each effect's columns at a time."""
     size = len(sums.slope)
-    total = sums.hessian + np.diag(priors.precision)
-    unit = unit_of(total)
-    covariance = np.linalg.pinv(total * unit[:, None] * unit, hermitian=True) * unit[:, None] * unit
+    whole = NormalEquations(sums.hessian + np.diag(priors.precision), sums.slope)
+    covariance = whole.covariance()
     combinations, informations = [], []
     for own in blocks:
         others = np.setdiff1d(np.arange(size), own)
-        carry = np.linalg.lstsq(total[np.ix_(others, others)], total[np.ix_(others, own)], rcond=1e-12)[0]
+        left = whole.eliminate(own, others, rcond=1e-12)
         scores = np.zeros((len(own), size))
-        scores[:, own], scores[:, others] = np.eye(len(own)), -carry.T
+        scores[:, own], scores[:, others] = np.eye(len(own)), -left.carry
         combinations.append(Combination(scores, scores, np.zeros(size)))
-        informations.append(total[np.ix_(own, own)] - total[np.ix_(own, others)] @ carry)
+        informations.append(left.equations.square)
     std = np.full(size, np.nan)
     spreads = [m.spread() for m in passes.moments(point, combinations, "standard errors")]
     for own, spread, information in zip(blocks, spreads, informations, strict=True):

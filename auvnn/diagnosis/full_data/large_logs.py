@@ -97,6 +97,12 @@ def diagnose_files(
     Raises:
         ConfigError: an unknown effect or executor, or a number that cannot be.
         InputError: the files have too little that can be used, or contradict themselves.
+
+    Example:
+        ```python
+        diagnosis = auvnn.diagnose_files(auvnn.load("rov95"), "dives/*.parquet", workers=8)
+        diagnosis.whole_log  # what all of the log says
+        ```
     """
     say = progress or (lambda words: None)
     check_window_length(window)

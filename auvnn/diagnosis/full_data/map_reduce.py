@@ -139,7 +139,13 @@ class MapReduce:
     def moments(
         self, point: LinearisationPoint, combinations: Sequence[Combination], words: str
     ) -> list[ScoreMoments]:
-        """Return the second moments of combinations of all windows' sums."""
+        """Return the second moments of combinations of all windows' sums.
+
+        Args:
+            point: where the windows are linearised.
+            combinations: of the columns of the sums.
+            words: what is being done, for the progress.
+        """
         if not combinations:
             return []
         asked = replace(point, combinations=tuple(combinations))

@@ -25,6 +25,11 @@ def with_fitted_parameters(model: GreyBox, layout: Layout, found: FittedHypothes
     Coefficients that were merely refitted become the vehicle's numbers; effects that were asked for, and
     those that the model had, stay effects, so that they can be seen and removed, with their standard errors as their
     uncertainty. A mass, a centre or a thrust that was stated to be uncertain becomes an effect too.
+
+    Args:
+        model: as it was given.
+        layout: which columns of the fit belong to which effect.
+        found: the explanation.
     """
     return holding(model, layout, found.names, found.fitted.theta, found.effects, found)
 

@@ -19,7 +19,13 @@ HORIZON, WARMUP = 5.0, 3.0
 def candidates_for(
     model: GreyBox, log: Log, wanted: str | Sequence[str] | None
 ) -> tuple[list[str], dict[str, list[str]]]:
-    """Return the effects that can be asked for, and for the others which channels they lack."""
+    """Return the effects that can be asked for, and for the others which channels they lack.
+
+    Args:
+        model: for its vehicle and actuation.
+        log: for the channels that it has.
+        wanted: one name or several; the whole catalogue where None.
+    """
     wanted = names_of(wanted)
     if isinstance(wanted, str):
         wanted = [wanted]

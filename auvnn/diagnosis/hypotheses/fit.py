@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.layout import DETERMINED, Layout, priors, scales, shapes
 from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
-from auvnn.diagnosis.score_tests.score import variance_inflation
+from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.estimation.normal_equations import Statistics
+from auvnn.estimation.nuisance import NormalEquations
 from auvnn.estimation.prediction_error import Fitted
 from auvnn.estimation.priors import Priors
 from auvnn.metrics.windows import Windows
@@ -66,6 +67,13 @@ def plausible(
 
     What is left out may be all that says anything of a parameter. It is then not foreseen anywhere, but where the
     evidence looks for it too; a shape near where it was found.
+
+    Args:
+        layout: stated values and plausible sizes.
+        names: effects that are free, in the order of `theta`.
+        effects: those of them that were asked for.
+        held: priors of the fit on everything.
+        theta: where it ended, (P,).
     """
     mean, precision = held.mean.copy(), held.precision.copy()
     for name, own in layout.places(names).items():
@@ -79,6 +87,12 @@ def left_out(statistics: Statistics, theta: Array, held: Priors, fold: NDArray[n
     """Return each window's weighted squared error under parameters fitted without its fold, (B,).
 
     The fit is linear about the fit on everything, from the windows' own sums: no run is simulated again.
+
+    Args:
+        statistics: sums of every window at the fit on everything.
+        theta: that fit, (P,).
+        held: its priors.
+        fold: of each window, (B,).
     """
     cost = np.empty(len(fold))
     free = held.inside(theta)
@@ -194,10 +208,9 @@ def standard_errors(explanation: FittedHypothesis, columns: NDArray[np.int64]) -
     statistics, fitted = explanation.fitted.statistics, explanation.fitted
     covariance = fitted.covariance()
     others = np.setdiff1d(np.arange(len(fitted.theta)), columns)
-    total = statistics.total + np.diag(fitted.priors.precision)
-    carry = np.linalg.lstsq(total[np.ix_(others, others)], total[np.ix_(others, columns)], rcond=1e-12)[0]
-    by_window = statistics.slope[:, columns] - statistics.slope[:, others] @ carry
-    information = total[np.ix_(columns, columns)] - total[np.ix_(columns, others)] @ carry
-    factor = variance_inflation(by_window, information, statistics.run)
+    whole = NormalEquations(statistics.total + np.diag(fitted.priors.precision), statistics.slope.sum(0))
+    left = whole.eliminate(columns, others, rcond=1e-12)
+    by_window = left.scores(statistics.slope[:, columns], statistics.slope[:, others])
+    factor = variance_inflation(by_window, left.equations.square, statistics.run)
     std = np.sqrt(np.maximum(np.diag(covariance)[columns], 0.0) * factor)
     return np.where(determined(explanation, columns), std, np.nan), factor

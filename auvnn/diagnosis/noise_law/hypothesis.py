@@ -115,7 +115,13 @@ def judged(layout: Layout, explanation: FittedHypothesis, sums: ForceSums, law: 
 
 
 def p_value_of(layout: Layout, after: Hypothesis, before: Hypothesis) -> float:
-    """Return the p-value of the effect that came last, by the likelihood ratio at laws of their own."""
+    """Return the p-value of the effect that came last, by the likelihood ratio at laws of their own.
+
+    Args:
+        layout: for the number of the effect's parameters.
+        after: the fit with it.
+        before: the fit without it.
+    """
     degrees = len(layout.columns[after.name])
     return float(chi2.sf(max(before.misfit - after.misfit, 0.0), degrees))
 

@@ -85,7 +85,13 @@ class Likelihood:
         self.prior = float(fixed) if len(sums.theta) else 0.0
 
     def law(self, axes: Sequence[int], rms: Array, time: Array) -> ForceLaw:
-        """Return a law with forces in some degrees of freedom."""
+        """Return a law with forces in some degrees of freedom.
+
+        Args:
+            axes: degrees of freedom with a force, 0 to 5.
+            rms: of each of them, N and N m.
+            time: correlation time of each of them, s.
+        """
         full, times = np.zeros(6), np.ones(6)
         full[list(axes)], times[list(axes)] = rms, time
         return ForceLaw(full, times, self.sums.cell, self.sums.span)

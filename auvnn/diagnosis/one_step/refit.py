@@ -13,6 +13,7 @@ from auvnn.diagnosis.one_step.slopes import AccelerationSlopes, extent_of_log
 from auvnn.diagnosis.one_step.weighted_fit import left_out, parts, solve, weights
 from auvnn.effects import effect_class
 from auvnn.errors import InputError
+from auvnn.estimation.nuisance import carry_of
 from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
 from auvnn.logs import Log
 from auvnn.metrics.derivative import Derivative
@@ -157,10 +158,11 @@ class OneStepRefit:
             return -np.inf
         described = world.model.effect(name).parameters_of
         loose = (FREE * np.array([p.scale for p in described])[live]) ** -2.0
-        carry = np.linalg.lstsq(self.square, self.heavy.T @ own, rcond=1e-13)[0]
+        across = self.heavy.T @ own
+        carry = carry_of(self.square, across, rcond=1e-13)
         weighted = own * self.weight[self.good].reshape(-1, 1)
-        right = weighted.T @ self.fit.gap[self.good].ravel() - carry.T @ self.right
-        square = weighted.T @ own - carry.T @ (self.heavy.T @ own) + np.diag(loose)
+        right = weighted.T @ self.fit.gap[self.good].ravel() - carry @ self.right
+        square = weighted.T @ own - carry @ across + np.diag(loose)
         return float(right @ np.linalg.lstsq(square, right, rcond=1e-13)[0])
 
     def jointly(self, name: str, start: RefittedEffect) -> RefittedEffect:

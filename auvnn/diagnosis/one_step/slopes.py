@@ -11,9 +11,8 @@ from auvnn.effects.base import HOOKS as ALL_HOOKS
 from auvnn.effects.hooks import Extent
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.logs import Log
-from auvnn.logs.signals.derivatives import LocalPolynomial
 from auvnn.metrics.derivative import Derivative
-from auvnn.metrics.one_step import OneStepReplay
+from auvnn.metrics.one_step import RunComparison
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
@@ -35,21 +34,7 @@ class AccelerationSlopes:
     def __init__(self, model: GreyBox, log: Log, how: Derivative) -> None:
         """Read the log once."""
         self.model = model.rebuilt(model.copied_effects())
-        self.runs = runs = [run.cleaned for run in log.runs]
-        self.replays = [OneStepReplay(self.model, run) for run in runs]
-        self.filters = (
-            None
-            if how.method == "measured"
-            else [LocalPolynomial(run.t, how.half_width, how.order) for run in runs]
-        )
-        parts = []
-        for k, run in enumerate(runs):
-            if self.filters is None:
-                assert run.nu_dot is not None
-                parts.append(run.nu_dot)
-            else:
-                parts.append(self.filters[k](np.where(run.valid[:, None], run.nu, np.nan))[1])
-        self.measured = np.concatenate(parts)
+        self.parts = [RunComparison(self.model, run.cleaned, how) for run in log.runs]
 
     def gap(self, hooks: Collection[str] = ALL_HOOKS) -> Array:
         """Return measured minus predicted acceleration, (N, 6); NaN where there is none.
@@ -57,21 +42,12 @@ class AccelerationSlopes:
         Args:
             hooks: of the effects whose parameters have changed since the last call.
         """
-        parts = []
         self._update(hooks)
-        for k, replay in enumerate(self.replays):
-            parts.append(
-                replay.acceleration() if self.filters is None else self.filters[k](replay.velocity())[1]
-            )
-        return self.measured - np.concatenate(parts)
+        return np.concatenate([part.gap() for part in self.parts])
 
     def _update(self, hooks: Collection[str]) -> None:
-        if "delay" in hooks and self.model.using("delay"):
-            # When the thrust comes is not asked again by `update`.
-            self.replays = [OneStepReplay(self.model, run) for run in self.runs]
-            return
-        for replay in self.replays:
-            replay.update(hooks)
+        for part in self.parts:
+            part.update(hooks)
 
     def at(self, names: Sequence[str], theta: Array) -> Array:
         """Set parameters of effects, clipped to their bounds, and return the gap, (N, 6)."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.estimation.scaling import unit_of
+from auvnn.estimation.nuisance import NormalEquations
 from auvnn.logs import Log
 
 Array = NDArray[np.float64]
@@ -46,13 +46,18 @@ def _sums(gap: Array, x: Array, weight: Array) -> tuple[Array, Array]:
 def _solved(square: Array, right: Array, precision: Array, mean: Array) -> Array:
     if not len(right):
         return np.zeros(0)
-    square, right = square + np.diag(precision), right + precision * mean
-    scale = unit_of(square)
-    return scale * np.linalg.lstsq(square * np.outer(scale, scale), scale * right, rcond=1e-13)[0]
+    return NormalEquations.with_priors(square, right, precision, -mean).solve(rcond=1e-13)
 
 
 def weights(gap: Array, x: Array, precision: Array, mean: Array) -> Array:
-    """Return weights (N, 6) by which each degree of freedom counts alike and outliers count little."""
+    """Return weights (N, 6) by which each degree of freedom counts alike and outliers count little.
+
+    Args:
+        gap: measured minus predicted acceleration, (N, 6).
+        x: its slopes in the parameters, (N, 6, P).
+        precision: of the priors, (P,).
+        mean: of the priors, (P,).
+    """
     weight = np.ones_like(gap) / np.maximum((gap**2).mean(0), 1e-300)
     for _ in range(ROUNDS):
         left = gap - x @ solve(gap, x, precision, weight, mean) if x.shape[-1] else gap
@@ -64,7 +69,16 @@ def weights(gap: Array, x: Array, precision: Array, mean: Array) -> Array:
 def left_out(
     gap: Array, x: Array, precision: Array, mean: Array, weight: Array, fifth: NDArray[np.int64]
 ) -> Array:
-    """Return each sample's weighted squared error by the fit on the other fifths, (N,)."""
+    """Return each sample's weighted squared error by the fit on the other fifths, (N,).
+
+    Args:
+        gap: measured minus predicted acceleration, (N, 6).
+        x: its slopes in the parameters, (N, 6, P).
+        precision: of the priors, (P,).
+        mean: of the priors, (P,).
+        weight: of each sample and degree of freedom, (N, 6).
+        fifth: number of the fifth to which a sample belongs, (N,).
+    """
     out = np.zeros(len(gap))
     held = [fifth == k for k in range(FIFTHS)]
     sums = [_sums(gap[h], x[h], weight[h]) for h in held]

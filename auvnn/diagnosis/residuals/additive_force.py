@@ -1,7 +1,8 @@
 """What names leave, asked of every measured input: a force that goes with one refutes a name that stood in for it.
 
-`any_force` assumes nothing of a force's course and pays for that with power. A force that is a function of one measured
-input needs three or four parameters in a degree of freedom, and shows where a name has explained nine tenths of it.
+`variance_component` assumes nothing of a force's course and pays for that with power. A force that is a function of one
+measured input needs three or four parameters in a degree of freedom, and shows where a name has explained nine tenths
+of it.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from scipy.stats import chi2
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.layout import Layout, shapes
 from auvnn.diagnosis.residuals.input_forces import AXES, InputForces
-from auvnn.diagnosis.score_tests.score import variance_inflation
+from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
-from auvnn.estimation.scaling import unit_of
+from auvnn.estimation.nuisance import NormalEquations
 from auvnn.estimation.sensitivity import Response
 from auvnn.metrics.windows import Windows
 
@@ -64,7 +65,8 @@ def additive_force_test(
         explanation: the fit with the names.
         layout: stated values.
         windows: those it was fitted to.
-        sigma: (18,) standard deviations of the noise, infinite for channels that do not count; see `any_force.white`.
+        sigma: (18,) standard deviations of the noise, infinite for channels that do not count; see
+            `variance_component.white`.
         names: effects that were given as names.
         alpha: significance that a name must reach to be needed.
     """
@@ -149,9 +151,18 @@ class _ForceSums:
             self._own[key].append(statistics.hessian[:, own[:, None], own])
         self._runs.append(statistics.run)
 
-    def products(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> Array:
-        """Return some of J^T J of all windows."""
-        return self.total[np.ix_(rows, columns)]
+    def held(self, columns: NDArray[np.int64], precision: Array, away: Array) -> NormalEquations:
+        """Return the equations of all windows, some of the columns held by priors.
+
+        Args:
+            columns: that are held, K of them.
+            precision: of their priors, (K,).
+            away: how far they are from the priors' means, (K,).
+        """
+        square, right = self.total.copy(), self.slope.sum(0)
+        square[columns, columns] += precision
+        right[columns] -= precision * away
+        return NormalEquations(square, right)
 
     @cached_property
     def slope(self) -> Array:
@@ -176,12 +187,9 @@ class _ForceSums:
 def _tested(sums: _ForceSums, key: str, scale: Array) -> tuple[float, float]:
     """Return the p-value of one force, what was fitted taking its share first, and the fall of the squared error."""
     own, inside = sums.blocks[key], sums.inside
-    inner = sums.products(inside, inside) + np.diag(sums.precision)
-    carry = np.linalg.lstsq(inner, sums.products(inside, own), rcond=1e-12)[0].T
-    whole = sums.slope.sum(0)
-    gradient = (whole[own] - carry @ (whole[inside] - sums.precision * sums.away)) * scale
-    information = (sums.products(own, own) - carry @ sums.products(inside, own)) * scale[:, None] * scale
-    information = 0.5 * (information + information.T)
+    left = sums.held(inside, sums.precision, sums.away).eliminate(own, inside, rcond=1e-12)
+    carry, gradient = left.carry, left.equations.right * scale
+    information = left.information * scale[:, None] * scale
     values, vectors = np.linalg.eigh(information)
     seen = values > SEEN * max(float(values.max()), 1.0)
     if not seen.any():
@@ -193,7 +201,7 @@ def _tested(sums: _ForceSums, key: str, scale: Array) -> tuple[float, float]:
     across = sums.across
     moved_own = sums.own(key) @ step + np.einsum("wij,i->wj", across[:, :, own], follow)
     moved_inside = across[:, :, own] @ step + across[:, :, inside] @ follow
-    by_window = sums.slope[:, own] - moved_own - (sums.slope[:, inside] - moved_inside) @ carry.T
+    by_window = left.scores(sums.slope[:, own] - moved_own, sums.slope[:, inside] - moved_inside)
     degrees = int(seen.sum())
     factor = variance_inflation(by_window * scale, information, sums.run, 1 + degrees)
     fall = float((along**2 * values[seen]).sum())
@@ -212,11 +220,10 @@ def _need(sums: _ForceSums, layout: Layout, own: NDArray[np.int64], scale: Array
     free = np.concatenate([inside, own])
     # Of the force as little is assumed as keeps what the log does not see at nought.
     precision = np.concatenate([sums.precision, 1e-4 * scale**-2.0])
-    inner = sums.products(free, free) + np.diag(precision)
-    unit = unit_of(inner)
-    covariance = np.linalg.pinv(inner * unit[:, None] * unit, hermitian=True) * unit[:, None] * unit
     away = np.concatenate([sums.away, np.zeros(len(own))])
-    step = covariance @ (sums.slope.sum(0)[free] - precision * away)
+    known = sums.held(free, precision, away).part(free)
+    covariance = known.covariance()
+    step = covariance @ known.right
     at = np.searchsorted(inside, wanted)
     moved = explanation.fitted.theta[wanted] + step[at] - null
     spread = covariance[np.ix_(at, at)]

@@ -1,10 +1,10 @@
 """How large a force without a name is: its root mean square, an upper limit, and the smallest that would have shown.
 
-The force is the one of `any_force`: in every window a Fourier series of its own, whose coefficients are independent
-normal ones with a common variance v in each degree of freedom. The variance is that of the largest marginal likelihood.
-Its upper limit is the one at which twice the logarithm has fallen by 2.71, which is exceeded in one of twenty logs
-(Wilks 1938, Annals of Mathematical Statistics 9(1) 60-62). With a mean and K pairs of sine and cosine of variance v each,
-the mean square over a window is v (1 + K).
+The force is the one of `variance_component`: in every window a Fourier series of its own, whose coefficients are
+independent normal ones with a common variance v in each degree of freedom. The variance is that of the largest marginal
+likelihood. Its upper limit is the one at which twice the logarithm has fallen by 2.71, which is exceeded in one of
+twenty logs (Wilks 1938, Annals of Mathematical Statistics 9(1) 60-62). With a mean and K pairs of sine and cosine of
+variance v each, the mean square over a window is v (1 + K).
 """
 
 from __future__ import annotations
@@ -81,14 +81,22 @@ def sizes(slope: Array, hessian: Array, found: list[str], unit: Array, period: f
         )
         if axis in found and variance > 0.0:
             # What acts here shows elsewhere too: that share is not another force.
-            inner = block + np.eye(count) / variance
-            across = hessian[:, :, own]
-            solved = np.linalg.solve(
-                inner, np.concatenate([slope[:, own, None], across.transpose(0, 2, 1)], axis=2)
-            )
-            slope = slope - (across @ solved[:, :, :1])[..., 0]
-            hessian = hessian - across @ solved[:, :, 1:]
+            slope, hessian = taken_out(slope, hessian, own, block + np.eye(count) / variance)
     return out
+
+
+def taken_out(slope: Array, hessian: Array, own: NDArray[np.int64], inner: Array) -> tuple[Array, Array]:
+    """Return the sums of every window without what a force explains in them, or could have explained.
+
+    Args:
+        slope: J^T e, (W, P).
+        hessian: J^T J, (W, P, P).
+        own: the force's columns, K of them.
+        inner: J^T J of these columns and the precision of their coefficients, (W, K, K).
+    """
+    across = hessian[:, :, own]
+    solved = np.linalg.solve(inner, np.concatenate([slope[:, own, None], across.transpose(0, 2, 1)], axis=2))
+    return slope - (across @ solved[:, :, :1])[..., 0], hessian - across @ solved[:, :, 1:]
 
 
 def _least(values: Array) -> float:

@@ -19,7 +19,7 @@ from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.residuals.input_forces import AXES
-from auvnn.diagnosis.residuals.unnamed_size import Size, sizes
+from auvnn.diagnosis.residuals.unnamed_size import Size, sizes, taken_out
 from auvnn.effects import Body, Effect, Moment, Parameter
 from auvnn.estimation.normal_equations import linearise, normal_equations
 from auvnn.metrics.windows import Windows
@@ -166,13 +166,8 @@ def acting(slope: Array, hessian: Array) -> dict[str, float]:
         found[axis] = max(odds, 1e-12)
         own = blocks.pop(axis)
         # What the force found explains is taken away from all, with what it could have explained.
-        block = hessian[:, own[:, None], own] + np.eye(count) / variance
-        across = hessian[:, :, own]
-        solved = np.linalg.solve(
-            block, np.concatenate([slope[:, own, None], across.transpose(0, 2, 1)], axis=2)
-        )
-        slope = slope - (across @ solved[:, :, :1])[..., 0]
-        hessian = hessian - across @ solved[:, :, 1:]
+        inner = hessian[:, own[:, None], own] + np.eye(count) / variance
+        slope, hessian = taken_out(slope, hessian, own, inner)
         if odds < LEAST_ODDS:
             break
     return found

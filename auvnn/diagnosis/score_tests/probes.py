@@ -169,7 +169,14 @@ class Probed:
     def score(
         self, statistics: Statistics, base: Sequence[str], name: str, free: Sequence[str]
     ) -> tuple[Score, str]:
-        """Test an effect; return the score, and the name under which the layout knows it at its best."""
+        """Test an effect; return the score, and the name under which the layout knows it at its best.
+
+        Args:
+            statistics: sums of the windows at the null.
+            base: effects that are free anyway.
+            name: of the effect that is tested.
+            free: effects whose priors are wide.
+        """
         return self.best(name, lambda label: score(statistics, self.layout, base, label, free))
 
     def best(self, name: str, test: Callable[[str], Score]) -> tuple[Score, str]:
@@ -189,7 +196,15 @@ class Probed:
     def seen(
         self, windows: Windows, at: FittedHypothesis, base: Sequence[str], name: str, free: Sequence[str]
     ) -> Score:
-        """Return an effect's score at a fit, at the best of its shapes here."""
+        """Return an effect's score at a fit, at the best of its shapes here.
+
+        Args:
+            windows: of the log.
+            at: the fit at which the effect is tested.
+            base: effects that are free anyway.
+            name: of the effect that is tested.
+            free: effects whose priors are wide.
+        """
         model = self.layout.model
         answered = linearise(model, windows, at.fitted.initial, model.effect_names)
         sums, _, _ = normal_equations(windows, answered, at.fitted.sigma)

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from auvnn.diagnosis.hypotheses.layout import DETERMINED, FREE, Layout, priors, scales
+from auvnn.diagnosis.score_tests.variance_inflation import TINY, variance_inflation
 from auvnn.estimation.normal_equations import Statistics
+from auvnn.estimation.nuisance import NormalEquations, carry_of
 from auvnn.estimation.priors import Priors, parameters_of
 
 Array = NDArray[np.float64]
-# Shares of a parameter's information below this are rounding.
-TINY = 1e-10
 # Information on a parameter in units of its plausible scale that leaves it no better known than its prior does.
 BLIND = (DETERMINED**-2 - 1.0) / FREE**2
 
@@ -61,6 +61,13 @@ def project(
     """Return score (B, p) by window, its gradient at the null (p,) and information (p, p), the base taken out.
 
     The effect itself is left out of the base where it stands for a stated uncertainty.
+
+    Args:
+        statistics: sums of the windows at the null.
+        layout: which columns belong to which effect.
+        base: nuisance parameters, by effect.
+        effect: that is tested.
+        free: effects of the base whose priors are wide.
     """
     found = projection(statistics.total, statistics.slope.sum(0), layout, base, effect, free)
     by_window = statistics.slope[:, found.own] - statistics.slope[:, found.others] @ found.carry.T
@@ -107,13 +114,11 @@ def projection(
     movable = held.inside(theta)
     f, theta = f[movable], theta[movable]
     held = Priors(held.mean[movable], held.precision[movable])
-    inner = total[np.ix_(f, f)] + np.diag(held.precision)
-    carry = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
-    gradient = slope[c] - carry @ slope[f] + carry @ (held.precision * (theta - held.mean))
-    information = total[np.ix_(c, c)] - carry @ total[np.ix_(f, c)]
-    return Projection(
-        c, f, np.asarray(carry, dtype=np.float64), gradient, 0.5 * (information + information.T)
-    )
+    square, right = total.copy(), slope.copy()
+    square[f, f] += held.precision
+    right[f] -= held.precision * (theta - held.mean)
+    left = NormalEquations(square, right).eliminate(c, f)
+    return Projection(c, f, left.carry, left.equations.right, left.information)
 
 
 def _explained_share(
@@ -129,54 +134,33 @@ def _explained_share(
 def following(
     total: Array, layout: Layout, base: Sequence[str], effect: str, free: Sequence[str] = ()
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-    """Return an effect's columns, those of the base, and how these follow a step of the effect's, (p, f)."""
+    """Return an effect's columns, those of the base, and how these follow a step of the effect's, (p, f).
+
+    Args:
+        total: normal matrix of all columns, (P, P).
+        layout: which columns belong to which effect.
+        base: nuisance parameters, by effect.
+        effect: that is tested.
+        free: effects of the base whose priors are wide.
+    """
     others = [n for n in base if n != effect]
     f, c = layout.of(others), layout.columns[effect]
     inner = total[np.ix_(f, f)] + np.diag(priors(layout, others, free).precision)
-    carry = np.linalg.solve(inner, total[np.ix_(f, c)]).T if len(f) else np.zeros((len(c), 0))
-    return c, f, np.asarray(carry, dtype=np.float64)
-
-
-def variance_inflation(by_window: Array, information: Array, run: NDArray[np.int64], spent: int = 1) -> float:
-    """Return how much more the scores vary from window to window than white noise would have it, at least one.
-
-    Neighbouring windows of a run count with Bartlett's weight of one half.
-
-    Args:
-        by_window: scores (B, p).
-        information: (p, p) of all windows.
-        run: run of each window (B,).
-        spent: degrees of freedom that have gone into the scores' mean.
-    """
-    centred = by_window - by_window.mean(0)
-    spread = centred.T @ centred
-    next_to = run[1:] == run[:-1]
-    lagged = centred[1:][next_to].T @ centred[:-1][next_to]
-    return ratio(spread + 0.5 * (lagged + lagged.T), information, len(by_window), spent)
-
-
-def ratio(spread: Array, information: Array, count: int, spent: int = 1) -> float:
-    """Return how much larger the scores' spread is than white noise would have it, at least one.
-
-    Args:
-        spread: sum of the products of the windows' centred scores, neighbours included, (p, p).
-        information: (p, p) of all windows.
-        count: windows.
-        spent: degrees of freedom that have gone into the scores' mean.
-    """
-    values, vectors = np.linalg.eigh(information)
-    keep = values > TINY * max(values.max(initial=0.0), 1e-300)
-    if not keep.any():
-        return 1.0
-    white = vectors[:, keep] / np.sqrt(values[keep])
-    size = np.trace(white.T @ spread @ white) / keep.sum() * count / max(count - spent, 1)
-    return float(max(1.0, size))
+    return c, f, carry_of(inner, total[np.ix_(f, c)])
 
 
 def score(
     statistics: Statistics, layout: Layout, base: Sequence[str], effect: str, free: Sequence[str] = ()
 ) -> Score:
-    """Test one effect at the fitted null; see the module's text."""
+    """Test one effect at the fitted null; see the module's text.
+
+    Args:
+        statistics: sums of the windows at the null.
+        layout: which columns belong to which effect.
+        base: nuisance parameters, by effect.
+        effect: that is tested.
+        free: effects of the base whose priors are wide.
+    """
     by_window, gradient, information = project(statistics, layout, base, effect, free)
 
     def factor(step: Array, spent: int) -> float:
@@ -259,6 +243,12 @@ def similarity(statistics: Statistics, layout: Layout, base: Sequence[str], name
 
     Entry (a, b) is the share of the squared sensitivity to a's parameters, each at its plausible scale, that
     lies in the span of b's, after what else is uncertain has been taken out of both.
+
+    Args:
+        statistics: sums of the windows.
+        layout: which columns belong to which effect.
+        base: nuisance parameters, by effect.
+        names: effects that are held against one another, n of them.
     """
     out = np.eye(len(names))
     total = statistics.total
@@ -271,8 +261,8 @@ def similarity(statistics: Statistics, layout: Layout, base: Sequence[str], name
             ca, cb = layout.columns[a], layout.columns[b]
             both = np.concatenate([ca, cb])
             inner = total[np.ix_(f, f)] + np.diag(priors(layout, others).precision)
-            carry = np.linalg.solve(inner, total[np.ix_(f, both)]) if len(f) else np.zeros((0, len(both)))
-            left = total[np.ix_(both, both)] - total[np.ix_(both, f)] @ carry
+            across = total[np.ix_(f, both)]
+            left = total[np.ix_(both, both)] - carry_of(inner, across) @ across
             sa, sb = scales(layout, a), scales(layout, b)
             unit = np.concatenate([sa, sb])
             left = left * unit[:, None] * unit

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.layout import Layout, initial_guess
-from auvnn.diagnosis.score_tests.probes import Probed, extent_of, narrowed, probed
+from auvnn.diagnosis.score_tests.probes import Probed, extent_of, narrowed, null_is_no_start, probed
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.effects import Extent, effect_class
 from auvnn.estimation.priors import set_parameters
@@ -126,6 +126,26 @@ def search_shapes(
     set_parameters(model, found.names, found.fitted.theta)
     held = [*base, *(e for e in found.effects if e not in base)]
     return ShapeSearch(replace(layout, model=model), windows, found, held, found.effects, extent_of(windows))
+
+
+def searched_start(
+    layout: Layout, windows: Windows, found: FittedHypothesis, base: Sequence[str], name: str
+) -> Layout | None:
+    """Return where the fit of one more effect begins if its null is no place to begin: at the best of its shapes.
+
+    Args:
+        layout: stated values.
+        windows: of the log.
+        found: the fit without the effect.
+        base: effects that were free in it whatever was asked for.
+        name: the effect.
+
+    Returns:
+        the layout with its values; None where the fit may begin at the null.
+    """
+    if not null_is_no_start(layout, name):
+        return None
+    return search_shapes(layout, windows, found, base).start(name)
 
 
 def _best(looks: Sequence[Score]) -> Score:

@@ -95,7 +95,14 @@ class ModelComparison:
     def together(
         self, best: FittedHypothesis, other: FittedHypothesis, at: Layout, base: list[str]
     ) -> FittedHypothesis:
-        """Return the fit of two explanations as one, the errors weighed as in the first's."""
+        """Return the fit of two explanations as one, the errors weighed as in the first's.
+
+        Args:
+            best: an explanation; its last effect is the one in question.
+            other: another one, likewise.
+            at: the layout at the current fit.
+            base: effects that are free anyway.
+        """
         self.say(f"fitting {best.effects[-1]} and {other.effects[-1]} together")
         guess = at.model.rebuilt(at.model.copied_effects())
         for each in (best, other):

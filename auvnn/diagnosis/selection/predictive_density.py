@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds
+from auvnn.estimation.nuisance import NormalEquations
 from auvnn.estimation.priors import limits
-from auvnn.estimation.scaling import unit_of
 
 Array = NDArray[np.float64]
 
@@ -43,29 +42,13 @@ def cross_validated_log_density(explanation: FittedHypothesis) -> Array:
     for f in np.unique(fold):
         own = np.nonzero(fold == f)[0]
         known = sums.hessian[fold != f].sum(0) + np.diag(precision)
-        step, volume = _solved(known, sums.slope[fold != f].sum(0) - pull)
+        step, volume = NormalEquations(known, sums.slope[fold != f].sum(0) - pull).solve_with_determinant()
         for w in own[np.lexsort((sums.first[own], sums.run[own]))]:
             hessian, slope = sums.hessian[w], sums.slope[w]
             out[w] += step @ hessian @ step - 2 * slope @ step
             ahead = slope - hessian @ step
             known = known + hessian
-            change, after = _solved(known, ahead)
+            change, after = NormalEquations(known, ahead).solve_with_determinant()
             out[w] += after - volume - ahead @ change
             step, volume = step + change, after
     return out
-
-
-def _solved(square: Array, right: Array) -> tuple[Array, float]:
-    """Return the solution of a symmetric system, and the logarithm of its determinant."""
-    # In units of each parameter's own: what is hardly known must not pass for rounding beside what is well known.
-    unit = unit_of(square)
-    dead = np.flatnonzero(unit == 0.0)
-    even, right = square * unit[:, None] * unit, right * unit
-    even[dead, dead] = 1.0
-    scale = 2.0 * float(np.log(unit[unit > 0.0]).sum())
-    try:
-        factor = np.linalg.cholesky(even)
-    except np.linalg.LinAlgError:
-        return np.linalg.lstsq(even, right, rcond=1e-12)[0] * unit, float(np.linalg.slogdet(even)[1]) - scale
-    solved = cho_solve((factor, True), right, check_finite=False)
-    return solved * unit, 2.0 * float(np.log(np.diagonal(factor)).sum()) - scale

@@ -62,7 +62,14 @@ def removed(first: FittedHypothesis, found: FittedHypothesis) -> float:
 
 
 def without(asked: Setting, state: State, found: FittedHypothesis, name: str) -> FittedHypothesis:
-    """Return a fit again without one of its names, everything else refitted."""
+    """Return a fit again without one of its names, everything else refitted.
+
+    Args:
+        asked: what was asked.
+        state: of the search.
+        found: the fit with all names.
+        name: of the effect to do without.
+    """
     chooser = asked.chooser(state.windows)
     if (
         found.effects == (name,)

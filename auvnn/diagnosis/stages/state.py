@@ -128,7 +128,13 @@ class State:
         return replace(self, **changes)
 
     def step(self, verdict: str, effects: list[str], p_value: float) -> State:
-        """Return the state with a further step."""
+        """Return the state with a further step.
+
+        Args:
+            verdict: "named", "ambiguous", "unknown" or "adequate".
+            effects: that the step is about.
+            p_value: of the step's test.
+        """
         return self.but(steps=(*self.steps, {"verdict": verdict, "effects": effects, "p_value": p_value}))
 
     @property

@@ -69,6 +69,15 @@ def improve(
     Raises:
         ConfigError: an unknown effect, or unknown kind of what may be learned.
         InputError: the same data on both sides, a log that contradicts itself, or one that is too short.
+
+    Example:
+        ```python
+        model = auvnn.load("rov95")
+        log = auvnn.simulate(model, noise="realistic", hidden=["ocean_current", "net_buoyancy"]).log
+        better = auvnn.improve(model, log, seconds=120.0)
+        better.story  # what was done and found, sentence by sentence
+        better.model.save("better-model")
+        ```
     """
     log = as_log(log)
     model = as_model(model, log)

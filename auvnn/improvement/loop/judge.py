@@ -88,7 +88,13 @@ class Judge:
         return Task(windows, self.scale), *self.folds.windows(windows)
 
     def left_out(self, models: Mapping[int, GreyBox], names: Sequence[str], how: str = NEWTON) -> LeftOut:
-        """Return the errors of models, one for each fold, over what each has not seen."""
+        """Return the errors of models, one for each fold, over what each has not seen.
+
+        Args:
+            models: by the number of the fold that each has not seen.
+            names: effects in them.
+            how: how they were fitted without the fold, in a word.
+        """
         seen = np.full(tuple(self.windows.nu.shape), np.nan)
         for fold, model in models.items():
             chosen = np.flatnonzero(self.own == fold)
@@ -97,7 +103,13 @@ class Judge:
         return self.scored(seen, names, how)
 
     def scored(self, seen: Array, names: Sequence[str], how: str) -> LeftOut:
-        """Return the errors of predictions (B, L, 6)."""
+        """Return the errors of predictions (B, L, 6).
+
+        Args:
+            seen: predicted velocity, (B, L, 6), m/s and rad/s; NaN where there is none.
+            names: effects in the models.
+            how: how they were fitted without the fold, in a word.
+        """
         r = scored(self.windows, seen, self.scale)
         return LeftOut(
             tuple(names), self.horizon, self.scale, r.squared, r.held, r.count,

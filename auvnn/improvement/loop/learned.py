@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.hypotheses.layout import Layout
 from auvnn.effects import Effect, effect_class
 from auvnn.effects.residual_force import INPUTS, ResidualForce
+from auvnn.estimation.nuisance import NormalEquations
 from auvnn.estimation.priors import set_parameters
 from auvnn.improvement.free_run import FreeRunFit, normal_equations
 from auvnn.improvement.loop.judge import Judge
@@ -165,11 +166,9 @@ def _foreseen(
             continue
         theta = fit.theta
         if keep.any():
-            total_h = fit.hessian[keep].sum(0) + weight * np.diag(precision)
-            downhill = fit.slope[keep].sum(0) - weight * precision * (theta - mean)
-            unit = 1.0 / np.sqrt(np.maximum(np.diag(total_h), 1e-300))
-            even = total_h * unit[:, None] * unit
-            theta = theta + np.linalg.lstsq(even, downhill * unit, rcond=1e-12)[0] * unit
+            hessian_of, slope_of = fit.hessian[keep].sum(0), fit.slope[keep].sum(0)
+            known = NormalEquations.with_priors(hessian_of, slope_of, weight * precision, theta - mean)
+            theta = theta + known.solve()
         total += max(fit.foreseen(theta, mine), 0.0)
     return total
 

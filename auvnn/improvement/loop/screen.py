@@ -46,6 +46,11 @@ def wanted(base: GreyBox, judge: Judge, recipe: Recipe) -> list[str]:
 
     What goes by the time since the start of a run tells a course of events. Where the diagnosis does not name it,
     there is no reason why another run should follow the same course: it is not taken for its prediction alone.
+
+    Args:
+        base: the model as given.
+        judge: with the log.
+        recipe: what has been added already.
     """
     usable, _ = candidates_for(base, judge.log, None)
     return [n for n in usable if n not in recipe.effects and n not in base.effect_names and n not in COURSES]
@@ -61,6 +66,13 @@ def promises(
     """Return what each of several effects promises beside a state, best first.
 
     Each is linearised where its fit would begin, everything else free beside it; a fold is foreseen by the others.
+
+    Args:
+        base: the model as given.
+        judge: folds and windows of the log.
+        state: beside which the effects are asked for.
+        names: of the effects.
+        say: told in words what is being done.
     """
     plain, shaped = [], []
     whole = lay_out(base, [*(n for n in state.recipe.effects if n not in state.recipe.built), *names])

@@ -83,7 +83,13 @@ def laid_out(base: GreyBox, recipe: Recipe) -> tuple[Layout, tuple[str, ...], Pr
 
 
 def held_by(layout: Layout, names: Sequence[str], recipe: Recipe) -> Priors:
-    """Return the priors of free effects: those asked for all but free, those held by a ridge closer to nothing."""
+    """Return the priors of free effects: those asked for all but free, those held by a ridge closer to nothing.
+
+    Args:
+        layout: stated values and scales.
+        names: effects that are free.
+        recipe: which were asked for, and which a ridge holds.
+    """
     found = priors(layout, names, free=recipe.effects)
     precision = found.precision.copy()
     for name, own in layout.places(names).items():
@@ -93,7 +99,15 @@ def held_by(layout: Layout, names: Sequence[str], recipe: Recipe) -> Priors:
 
 
 def starting(layout: Layout, names: Sequence[str], held: Priors, before: State | None, probes: bool) -> Array:
-    """Return where to begin a fit, (P,): where the state before is, what is new at its null or its probe."""
+    """Return where to begin a fit, (P,): where the state before is, what is new at its null or its probe.
+
+    Args:
+        layout: stated values.
+        names: effects that are free, P parameters in all.
+        held: their priors.
+        before: the state whose values are taken, or None.
+        probes: begin what is new at its first probe, because it may have no slope at its null.
+    """
     model = layout.model.rebuilt(layout.model.copied_effects())
     known = {} if before is None else before.layout.places(before.names)
     for name in names:
@@ -145,7 +159,15 @@ def fitted(
 def fitted_one_step(
     base: GreyBox, judge: Judge, recipe: Recipe, how: Derivative, before: State | None = None
 ) -> State:
-    """Fit a recipe one step ahead and judge it by free running on what was left out; see `fitted`."""
+    """Fit a recipe one step ahead and judge it by free running on what was left out; see `fitted`.
+
+    Args:
+        base: the model as given.
+        judge: of the log.
+        recipe: what is fitted.
+        how: how accelerations are obtained.
+        before: not used: the fit begins at the stated values.
+    """
     layout, names, _ = laid_out(base, recipe)
     log = replace(judge.log, runs=tuple(run.cleaned for run in judge.log.runs))
     free = [n for n in names if n not in recipe.effects]

@@ -43,7 +43,14 @@ class Proposal:
 def propose(
     recording: Recording, rules: Sequence[Rule], lies: Callable[[Topic], str], guesses: bool
 ) -> Proposal:
-    """Return the mapping that rules suggest for a recording."""
+    """Return the mapping that rules suggest for a recording.
+
+    Args:
+        recording: topics with their columns.
+        rules: which topics and fields are known, in order of preference.
+        lies: says of a topic why it must not be believed; empty where it may.
+        guesses: go by names that only sound right where no rule fits.
+    """
     columns: dict[str, Any] = {}
     topics: dict[str, Any] = {}
     notes: list[str] = []

@@ -115,7 +115,13 @@ def absolute(spec: Any, topic: str) -> Any:
 
 
 def triple(names: str, fields: str, **more: Any) -> dict[str, Any]:
-    """Return specifications of several columns that differ in their field alone: `triple("u v w", "VN VE VD")`."""
+    """Return specifications of several columns that differ in their field alone: `triple("u v w", "VN VE VD")`.
+
+    Args:
+        names: canonical names, apart by spaces.
+        fields: fields of the topic, as many, apart by spaces.
+        **more: further options that all of them have, as in a mapping file.
+    """
     pairs = zip(names.split(), fields.split(), strict=True)
     return {n: {"from": f, **more} if more else f for n, f in pairs}
 
@@ -128,6 +134,12 @@ def pwm_channels(topic: Topic, pattern: str, recording: Recording, base: int = 0
 
     The field of channel 1 is `pattern.format(1 - base)`. ArduPilot's functions 33 to 40 are motors 1 to 8, and
     `MOT_n_DIRECTION` -1 turns the output of a motor round.
+
+    Args:
+        topic: with the pulse widths.
+        pattern: of the names of its fields, with one place for a number.
+        recording: for the autopilot's parameters.
+        base: 1 where the fields count from nought.
     """
     parameters = recording.facts.get("parameters", {})
     motors: dict[int, int] = {}
@@ -161,7 +173,14 @@ def pwm_channels(topic: Topic, pattern: str, recording: Recording, base: int = 0
 
 
 def numbered_columns(topic: Topic, pattern: str, canonical: str, **more: Any) -> dict[str, Any]:
-    """Return columns 1, 2, ... of fields `pattern.format(0)`, `pattern.format(1)`, ... as far as they hold numbers."""
+    """Return columns 1, 2, ... of fields `pattern.format(0)`, `pattern.format(1)`, ... as far as they hold numbers.
+
+    Args:
+        topic: with the fields.
+        pattern: of their names, with one place for a number from 0.
+        canonical: what the columns are called, before `_1`, `_2`, ...
+        **more: further options that all of them have, as in a mapping file.
+    """
     out: dict[str, Any] = {}
     for i in range(64):
         if not _has(topic, pattern.format(i)):

@@ -39,7 +39,17 @@ def collect(
     clocks: dict[tuple[str, ...], Lag] | None = None,
     vertical: Vertical | None = None,
 ) -> list[Finding]:
-    """Return all findings, errors first."""
+    """Return all findings, errors first.
+
+    Args:
+        log: that is judged.
+        channels: quality by channel.
+        kinematics: agreement of velocities with positions and attitude, by channel.
+        excitation: by degree of freedom.
+        order: the quaternion's order where it looks like another one, else None.
+        clocks: lags between groups of channels.
+        vertical: how depth, altitude and w agree.
+    """
     found = [
         *(Finding(r.level, r.where, f"{r.what} ({r.count})", r.cure) for r in log.repairs),
         *_time(log),

@@ -27,7 +27,14 @@ def agreement(
     clocks: dict[tuple[str, ...], Lag],
     vertical: Vertical | None,
 ) -> list[Finding]:
-    """Return where velocities, attitude, position and depth contradict one another, in size, sign or time."""
+    """Return where velocities, attitude, position and depth contradict one another, in size, sign or time.
+
+    Args:
+        kinematics: agreement of velocities with positions and attitude, by channel.
+        order: the quaternion's order where it looks like another one, else None.
+        clocks: lags between groups of channels.
+        vertical: how depth, altitude and w agree.
+    """
     found = []
     elsewhen = {name for names in clocks for name in names}
     of_depth = vertical is not None and vertical.level != "info"

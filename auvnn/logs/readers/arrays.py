@@ -23,6 +23,11 @@ def to_recording(arrays: Mapping[str, NDArray], where: str, repairs: list[Repair
     A matrix with its time along the longer side gives columns `nu[0]`, `nu[1]`, ...; a group without a time of its own
     takes that of the group above it, or of the whole file, if it is as long.
 
+    Args:
+        arrays: of any shape, by path.
+        where: of the file, for messages.
+        repairs: to which notes are added.
+
     Raises:
         InputError: there are no arrays of numbers of at least three values.
     """

@@ -111,6 +111,12 @@ class Reader(ABC):
     def mapped_rows(self, path: Path, plan: Mapping, first: int, count: int) -> Table:
         """Return some of the rows under canonical names.
 
+        Args:
+            path: of the file.
+            plan: the mapping.
+            first: number of the first row, from 0.
+            count: of rows.
+
         Raises:
             InputError: as `mapped`.
         """
@@ -128,6 +134,11 @@ class Reader(ABC):
         """Read some of the rows; a format that cannot seek reads all of them, and remembers them for the next call.
 
         Columns that hold dates count their seconds from the file's first row, whichever rows are read.
+
+        Args:
+            path: of the file.
+            first: number of the first row, from 0.
+            count: of rows.
 
         Raises:
             InputError: as `read`.

@@ -47,6 +47,12 @@ def numbers_from_text(
 ) -> pl.Series | Text:
     """Return the column as Float64, null where a cell is empty or unreadable, or as text.
 
+    Args:
+        series: a column as text.
+        decimal_comma: a comma parts whole numbers from decimals.
+        where: of the file, for messages.
+        first_line: line of the file in which the column's first cell is.
+
     Raises:
         InputError: a cell is a number too large for a float64.
     """
@@ -71,6 +77,12 @@ def numbers_from_text(
 def refuse_overflow(value: pl.Series, where: str, name: str, first_line: int) -> None:
     """Refuse a column with a cell that no float64 can hold.
 
+    Args:
+        value: a column as Float64.
+        where: of the file, for messages.
+        name: of the column.
+        first_line: line of the file in which the column's first cell is.
+
     Raises:
         InputError: with the line of the first such cell.
     """
@@ -85,6 +97,11 @@ def to_table(frame: pl.DataFrame, where: str, text: dict[str, Text] | None = Non
 
     Numbers become float64 with NaN for null, NaN and infinity, all counted; integers that a float64
     cannot hold stay int64; dates and durations become seconds; everything else becomes text.
+
+    Args:
+        frame: the columns; notes on a column stand behind a null character in its name.
+        where: of the file, for messages.
+        text: columns that are text already.
     """
     table = Table({}, frame.height, dict(text or {}))
     missing = 0

@@ -11,7 +11,13 @@ MOST_ARRAYS, MOST_DEPTH = 5_000, 12
 
 
 def main(folder: str, memory: str, path: str) -> None:
-    """Write the arrays of the file into the folder."""
+    """Write the arrays of the file into the folder.
+
+    Args:
+        folder: where the arrays go.
+        memory: most bytes of address space.
+        path: of the file.
+    """
     resource.setrlimit(resource.RLIMIT_AS, (int(memory), int(memory)))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     out = Path(folder)

@@ -69,7 +69,13 @@ def chain(starts: Rows, lengths: Rows, end: int, first: int = 0) -> tuple[Rows, 
 
 
 def columns(data: Bytes, starts: Rows, record: np.dtype) -> NDArray:
-    """Return the records that begin at these places, as a structured array (N,)."""
+    """Return the records that begin at these places, as a structured array (N,).
+
+    Args:
+        data: bytes of the file, (M,).
+        starts: places at which the records begin, (N,).
+        record: layout of one record.
+    """
     size = record.itemsize
     if not len(starts):
         return np.zeros(0, record)

@@ -52,7 +52,14 @@ class Contents:
     summed: bool = False
 
     def ranges(self, first: int, count: int, size: int, columns: Sequence[str]) -> list[tuple[int, int]]:
-        """Return the ranges of bytes, in a file of some size, that a decoder needs for some rows of some columns."""
+        """Return the ranges of bytes, in a file of some size, that a decoder needs for some rows of some columns.
+
+        Args:
+            first: number of the first row, from 0.
+            count: of rows.
+            size: of the file, bytes.
+            columns: that are read.
+        """
         found, at = [(0, len(MAGIC)), (self.footer, size)], 0
         for k, rows in enumerate(self.groups):
             if at < first + count and first < at + rows:

@@ -26,6 +26,11 @@ class RecordingReader(Reader):
     def record(self, path: Path, wanted: Wanted | None = None, until: float | None = None) -> Recording:
         """Read the topics that are wanted, all of them where None, and their first `until` seconds.
 
+        Args:
+            path: of the file.
+            wanted: which topics; all of them where None.
+            until: s from the beginning; to the end where None.
+
         Raises:
             InputError: the file is damaged or holds no messages; no other error may leave a reader.
         """
@@ -60,6 +65,12 @@ class RecordingReader(Reader):
 
     def mapped_rows(self, path: Path, plan: Plan, first: int, count: int) -> Table:
         """Return some of the rows of the table that `mapped` makes of all.
+
+        Args:
+            path: of the file.
+            plan: the mapping, or None for messages that are known.
+            first: number of the first row, from 0.
+            count: of rows.
 
         Raises:
             InputError: as `mapped`.

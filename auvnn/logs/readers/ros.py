@@ -56,7 +56,14 @@ class RosReader(RecordingReader):
     def messages(
         self, path: Path, wanted: Callable[[Channel], bool], most: int | None, notes: Notes
     ) -> Iterator[Message]:
-        """Yield the messages of wanted topics in the order of the file, of its first `most` bytes."""
+        """Yield the messages of wanted topics in the order of the file, of its first `most` bytes.
+
+        Args:
+            path: of the file.
+            wanted: whether a channel's messages are asked for.
+            most: bytes of the file that are looked at; all of them where None.
+            notes: to which what was left out is added.
+        """
 
     def survey(self, path: Path) -> Recording:
         """Return the topics with their first messages, by the beginning of a long file."""

@@ -9,7 +9,14 @@ from pathlib import Path
 
 
 def main(folder: str, memory: str, path: str, lists: str) -> None:
-    """Write times and values of each sensor into the folder."""
+    """Write times and values of each sensor into the folder.
+
+    Args:
+        folder: where the arrays go.
+        memory: most bytes of address space.
+        path: of the file.
+        lists: folder with the lists of sensors.
+    """
     resource.setrlimit(resource.RLIMIT_AS, (int(memory), int(memory)))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     import numpy as np

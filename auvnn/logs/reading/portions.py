@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from auvnn.errors import InputError
 from auvnn.logs.readers import READERS, choose
 from auvnn.logs.readers.ros2_folder import ros2_files
+from auvnn.logs.reading.collect import Collector, collect
 from auvnn.logs.reading.mapping_file.mapping import Mapping
-from auvnn.logs.reading.reading import Collector, collect
 from auvnn.logs.run import Run
 from auvnn.logs.seal import compare, file_hash, sealed
 
@@ -58,6 +58,12 @@ def verify(path: Path) -> None:
 
 def read_portion(path: Path, mapping: Mapping, first: int, count: int) -> Portion:
     """Read `count` rows of a file from row `first` on.
+
+    Args:
+        path: of the file.
+        mapping: by which it is read.
+        first: number of the first row, from 0.
+        count: of rows.
 
     Raises:
         InputError: they cannot be read, or hold no run; runs that have names in the place of numbers.

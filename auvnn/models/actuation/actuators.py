@@ -116,14 +116,26 @@ class Actuators(nn.Module):
         return torch.stack(columns, dim=-1)
 
     def demand(self, command: Tensor, times: Tensor, effects: Sequence[Effect]) -> Tensor:
-        """Return the settled thrust (..., T, n) of held commands, after the effects on commands."""
+        """Return the settled thrust (..., T, n) of held commands, after the effects on commands.
+
+        Args:
+            command: held per interval, (..., T, n).
+            times: of the rows, s, (..., T).
+            effects: those on commands among them act.
+        """
         for effect in effects:
             if "command" in effect.hooks():
                 command = effect.command(command, times.to(command))
         return self.static(command)
 
     def signal(self, command: Tensor, times: Tensor, effects: Sequence[Effect]) -> ThrustSignal:
-        """Return the thrust as a function of time, a delay left out; shapes as in `drive`."""
+        """Return the thrust as a function of time, a delay left out; shapes as in `drive`.
+
+        Args:
+            command: held per interval, (..., T, n).
+            times: of the rows, s, (..., T).
+            effects: of the model that act on commands and thrust.
+        """
         demand = self.demand(command, times, effects)
         lag = _only(effects, "respond")
         states = demand if lag is None else _states(demand, times, lag, 1)[0]

@@ -43,7 +43,15 @@ def words_of(beyond: str) -> str:
 
 
 def through_water(model: GreyBox, times: Tensor, eta: Tensor, nu: Tensor, inputs: Inputs) -> Tensor:
-    """Return the velocity relative to the water along a run, (..., T, 6), m/s and rad/s."""
+    """Return the velocity relative to the water along a run, (..., T, 6), m/s and rad/s.
+
+    Args:
+        model: for the effects that move the water.
+        times: s, (T,) or (..., T).
+        eta: position and quaternion, (..., T, 7).
+        nu: velocity over ground, (..., T, 6).
+        inputs: at the rows.
+    """
     nu = nu.detach()
     if not model.using("water"):
         return nu

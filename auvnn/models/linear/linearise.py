@@ -132,6 +132,17 @@ def discrete_step(
 
     See `linearise` for the arguments. The state that comes back has the actuators' states at its end, also where they
     were not given (then they were settled at the command).
+
+    Args:
+        model: that is stepped.
+        state: (..., n) as in `linearise`.
+        command: (..., k), held over the step.
+        dt: length of the step, s.
+        time: at its start, s.
+        fins: fin angles, rad, (..., m).
+        voltage: V, (...).
+        altitude: m, (...).
+        max_step: longest step of the integrator, s.
     """
     like = own_tensor(model)
     state, command = as_tensor(state, like, "state"), as_tensor(command, like, "command")

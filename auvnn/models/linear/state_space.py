@@ -86,6 +86,12 @@ class StateSpace(nn.Module):
     ) -> Tensor:
         """Return u (..., m) from its parts; fins that are not given are at zero.
 
+        Args:
+            command: (..., n).
+            fins: fin angles, rad, (..., k), or None.
+            voltage: V, (...), or None.
+            altitude: m, (...), or None.
+
         Raises:
             ConfigError: what the model needs is missing, or is of the wrong size.
         """
@@ -125,11 +131,24 @@ class StateSpace(nn.Module):
         return torch.cat([p.expand(*lead, p.shape[-1]) for p in (eta, nu, own)], dim=-1)
 
     def motion(self, y: Tensor, thrust: Tensor, u: Tensor, time: Tensor) -> Tensor:
-        """Return the rate of position, quaternion and velocity y (..., 13) under a thrust (..., k), N."""
+        """Return the rate of position, quaternion and velocity y (..., 13) under a thrust (..., k), N.
+
+        Args:
+            y: position, quaternion and velocity, (..., 13).
+            thrust: N, (..., k).
+            u: inputs, (..., m).
+            time: s, (...).
+        """
         return state_rate(self.model, y, thrust, self.split(u), time, self.prepared)
 
     def rate(self, x: Tensor, u: Tensor, time: Tensor) -> Tensor:
-        """Return f (..., n), for a state space without `dt` or without a delay."""
+        """Return f (..., n), for a state space without `dt` or without a delay.
+
+        Args:
+            x: state, (..., n).
+            u: inputs, (..., m).
+            time: s, (...).
+        """
         thrust, own = self.actuators.rate(x[..., SIZE:], u[..., : self.actuators.size])
         return torch.cat([self.motion(x[..., :SIZE], thrust, u, time), own], dim=-1)
 
@@ -137,6 +156,13 @@ class StateSpace(nn.Module):
         """Return the state after `h` seconds (...), u held: RK4, with the actuators in closed form.
 
         With a delay `h` must be `dt`. The same as a rollout over one row whose step is cut into `substeps`.
+
+        Args:
+            x: state, (..., n).
+            u: inputs held over the step, (..., m).
+            time: at its start, s, (...).
+            h: its length, s, (...).
+            substeps: into how many it is cut.
         """
         y, step = x[..., :SIZE], h.unsqueeze(-1)
         parts, own = self.actuators.advance(x[..., SIZE:], u[..., : self.actuators.size], step, substeps)

@@ -88,7 +88,13 @@ class Networks(nn.Module):
             self.solve_outputs(x * self.input_scale, y * self.output_scale)
 
     def solve_outputs(self, x: Tensor, y: Tensor, ridge: float = 1e-8) -> None:
-        """Set the output layer to the least-squares solution for inputs x (N, inputs) and outputs y (N, outputs)."""
+        """Set the output layer to the least-squares solution for inputs x (N, inputs) and outputs y (N, outputs).
+
+        Args:
+            x: inputs, (N, inputs).
+            y: outputs, (N, outputs).
+            ridge: relative to the diagonal of the normal equations.
+        """
         with torch.no_grad():
             units, target = self._units(x / self.input_scale), y / self.output_scale
             for i in range(self.outputs):

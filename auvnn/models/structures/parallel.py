@@ -53,7 +53,13 @@ class Parallel(Structure):
         return {"hidden": cast(Networks, self.learned["parallel"]).hidden}
 
     def features(self, nu: Tensor, wrench: Tensor, rotation: Tensor) -> Tensor:
-        """Return the network's inputs (..., 21) from nu (..., 6), the wrench (..., 6) and rotation (..., 3, 3)."""
+        """Return the network's inputs (..., 21) from nu (..., 6), the wrench (..., 6) and rotation (..., 3, 3).
+
+        Args:
+            nu: velocity, m/s and rad/s, (..., 6).
+            wrench: of the known equations, N and N m, (..., 6).
+            rotation: body to NED, (..., 3, 3).
+        """
         parts = (nu, nu.abs(), wrench, rotation[..., 2, :])
         lead = torch.broadcast_shapes(*(p.shape[:-1] for p in parts))
         return torch.cat([p.expand(*lead, p.shape[-1]) for p in parts], dim=-1)

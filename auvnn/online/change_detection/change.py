@@ -82,7 +82,13 @@ class Monitor:
             self._kinds = {k: c for k, n in KINDS.items() if (c := self.sensitivities.of(n))}
 
     def add(self, sample: Sample, nu: Tensor, missing: Tensor) -> None:
-        """Take in what the original model lacks at a sample, N and N m."""
+        """Take in what the original model lacks at a sample, N and N m.
+
+        Args:
+            sample: what was measured.
+            nu: velocity at which the wrench is missing, (6,), m/s and rad/s.
+            missing: wrench, (6,), N and N m.
+        """
         if self._pending and sample.t - self._pending[0][0].t >= BLOCK:
             self._close_block()
         self._noise.add(missing)
@@ -256,7 +262,13 @@ class Monitor:
         return plain, tensors
 
     def load(self, plain: Mapping[str, Any], tensors: Mapping[str, Tensor], pending: list[Sample]) -> None:
-        """Take up a state; `pending` are the samples of the block that was being filled."""
+        """Take up a state; `pending` are the samples of the block that was being filled.
+
+        Args:
+            plain: numbers and words, as `state` returns them.
+            tensors: by name, likewise.
+            pending: samples of the block that was being filled.
+        """
         self._noise.load({"ring": tensors["noise.ring"]})
         self._baseline = tensors["baseline"].numpy().copy()
         self.changes = [Change(**c) for c in plain["changes"]]

@@ -34,7 +34,13 @@ class Block:
 
     @classmethod
     def of(cls, start: float, slopes: Array, missing: Array) -> Block:
-        """Return the block of samples with slopes (n, 6, P) and missing wrench (n, 6)."""
+        """Return the block of samples with slopes (n, 6, P) and missing wrench (n, 6).
+
+        Args:
+            start: time of the first sample, s.
+            slopes: of the wrench in the parameters, (n, 6, P).
+            missing: wrench, N and N m, (n, 6).
+        """
         return cls(
             start, float(len(missing)), np.einsum("nap,naq->apq", slopes, slopes),
             np.einsum("nap,na->ap", slopes, missing), (missing**2).sum(0), missing.sum(0),
@@ -94,7 +100,13 @@ def fit(hessian: Array, slope: Array, square: float, scale: Array, heat: float =
 
 
 def gains(hessians: Array, slopes: Array, scale: Array) -> Array:
-    """Return the evidence of many stretches at once: (n, p, p) and (n, p) to (n,)."""
+    """Return the evidence of many stretches at once: (n, p, p) and (n, p) to (n,).
+
+    Args:
+        hessians: sums of squared slopes, (n, p, p), by inverse variance.
+        slopes: sums of slopes times what is missing, (n, p), likewise.
+        scale: plausible size of each parameter, (p,).
+    """
     unit = hessians * scale[:, None] * scale
     along = slopes * scale
     precision = unit + np.eye(len(scale))

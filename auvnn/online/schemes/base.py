@@ -84,6 +84,12 @@ def build_online_scheme(description: str | Mapping[str, Any] | OnlineScheme) -> 
 def number(value: Any, name: str, low: float, high: float) -> float:
     """Return an option as a number from `low` to `high`.
 
+    Args:
+        value: what was given.
+        name: of the option, for the message.
+        low: least value that is allowed.
+        high: largest value that is allowed.
+
     Raises:
         ConfigError: it is none, or lies outside.
     """

@@ -58,6 +58,12 @@ class Bounds:
     def admit(self, weights: Weights, proposed: Tensor, nu: Tensor, dt: float) -> tuple[Tensor | None, bool]:
         """Set the proposed weights as far as they are admissible.
 
+        Args:
+            weights: that are set.
+            proposed: their new values, shaped as `weights.read()`.
+            nu: velocity of the sample, (6,).
+            dt: s since the sample before.
+
         Returns:
             The change of the scaled damping at `nu` (6,), or None where no step was taken; and whether the step
             was shortened.

@@ -42,7 +42,14 @@ class Shadow:
         return target - self._bank.value(nu)
 
     def verdict(self, t: float, error: Tensor, old: Tensor, variance: Tensor) -> str | None:
-        """Take in a sample; return "worse", "valid", or None while it is open."""
+        """Take in a sample; return "worse", "valid", or None while it is open.
+
+        Args:
+            t: s.
+            error: of the current weights before they learn from the sample, scaled, (6,).
+            old: of the validated weights, (6,).
+            variance: of the noise, (6,).
+        """
         if self.since is None:
             return None
         if self.since == -float("inf"):

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from auvnn.plants.independent.around import Around
 from auvnn.plants.independent.fins import Fins
+from auvnn.plants.independent.forces import Forces
 from auvnn.plants.independent.hull import build, curved, grasp
 from auvnn.plants.independent.loads import LOADS, Instant
 from auvnn.plants.independent.sizes import sphere_radius
 from auvnn.plants.independent.thrust import Actuators
-from auvnn.plants.independent.vectors import cross, cross_matrix, dot, times
+from auvnn.plants.independent.vectors import cross, cross_matrix, times
 from auvnn.plants.independent.water import water
 from auvnn.plants.laws import USUAL, Laws
 from auvnn.plants.strangers import STRANGERS
@@ -27,7 +28,7 @@ Values = Mapping[str, float]
 Held = tuple[Array, Array | None, Array | None]
 
 
-class Equations:
+class Equations(Forces):
     """Accelerations of R vehicles.
 
     With total mass m, first moment s = sum m_i r_i and inertia J about the origin of all rigid parts:
@@ -111,37 +112,16 @@ class Equations:
             total = [a + share * b for a, b in zip(total, moments, strict=True)]
         return total
 
-    def drag(self, flow: Array, turn: Array) -> Array:
-        """Return the stated drag with what effects made of it, (R, 6)."""
-        hull = self.hull
-        nu = np.concatenate([flow, turn], axis=-1)
-        out = np.zeros_like(nu)
-        if self.drags[0]:
-            out -= nu @ hull.linear.T
-        if self.drags[1]:
-            out -= self.curve.powers(nu) @ hull.quadratic.T
-        for place, axes, linear, quadratic in hull.parts:
-            arm = np.broadcast_to(place, flow.shape)
-            own = np.concatenate([(flow + cross(turn, arm)) @ axes, turn @ axes], axis=-1)
-            law = -linear * own - quadratic * self.curve.powers(own)
-            force, moment = law[:, :3] @ axes.T, law[:, 3:] @ axes.T
-            out += np.concatenate([force, moment + cross(arm, force)], axis=-1)
-        return out
-
-    def _wall(self, name: str, depth: Array) -> tuple[Array, Array]:
-        """Return f and its slope with depth, (R, 1), of a boundary's share in the added mass."""
-        values = self.effects[name]
-        above = name == "surface_proximity"
-        if not above and self.bottom is None:
-            return 0.0 * depth, 0.0 * depth
-        away = depth if above else (self.bottom or 0.0) - depth
-        h = np.maximum(away, self.radius)
-        f = (-1.0 if above else 1.0) * values["strength"] * (self.radius / h) ** values["exponent"]
-        slope = np.where(away > self.radius, -values["exponent"] * f / h, 0.0)
-        return f, slope if above else -slope
-
     def around(self, t: float, place: Array, rotation: Array, v: Array, turn: Array) -> Around:
-        """Return what the water does where the vehicles are."""
+        """Return what the water does where the vehicles are.
+
+        Args:
+            t: s.
+            place: NED, m, (R, 3).
+            rotation: body to NED, (R, 3, 3).
+            v: over ground, m/s, (R, 3).
+            turn: angular rate, rad/s, (R, 3).
+        """
         depth = place[:, 2:]
         flow, dragged, gain = v, v, None
         if self.moves:
@@ -157,7 +137,14 @@ class Equations:
         return Around(flow, dragged, gain, walls, grown)
 
     def inertial(self, t: float, v: Array, turn: Array, near: Around) -> dict[str, Array]:
-        """Return what motion itself asks for, of the body and of the water, (R, 6) each."""
+        """Return what motion itself asks for, of the body and of the water, (R, 6) each.
+
+        Args:
+            t: s.
+            v: over ground, m/s, (R, 3).
+            turn: angular rate, rad/s, (R, 3).
+            near: the water around.
+        """
         mass, first, inertia = self._rigid(t)
         s = np.broadcast_to(first, v.shape)
         swing = cross(turn, v)
@@ -185,7 +172,18 @@ class Equations:
         held: Held,
         near: Around,
     ) -> dict[str, Array]:
-        """Return every other force and moment by name, (R, 6) each; shapes as in `terms`."""
+        """Return every other force and moment by name, (R, 6) each; shapes as in `terms`.
+
+        Args:
+            t: s.
+            place: NED, m, (R, 3).
+            rotation: body to NED, (R, 3, 3).
+            v: over ground, m/s, (R, 3).
+            turn: angular rate, rad/s, (R, 3).
+            thrust: of the actuators, N, (R, n).
+            held: command, fin angles and voltage.
+            near: the water around.
+        """
         command, angles, voltage = held
         down, flow = rotation[:, 2, :], near.flow
         drag = self.drag(near.dragged, turn)
@@ -239,7 +237,17 @@ class Equations:
     def rate(
         self, t: float, place: Array, rotation: Array, v: Array, turn: Array, thrust: Array, held: Held
     ) -> Array:
-        """Return (v_dot, w_dot), (R, 6); arguments as in `terms`."""
+        """Return (v_dot, w_dot), (R, 6); arguments as in `terms`.
+
+        Args:
+            t: s.
+            place: NED, m, (R, 3).
+            rotation: body to NED, (R, 3, 3).
+            v: over ground, m/s, (R, 3).
+            turn: angular rate, rad/s, (R, 3).
+            thrust: of the actuators, N, (R, n).
+            held: command, fin angles and voltage.
+        """
         near = self.around(t, place, rotation, v, turn)
         first, *others = self.inertial(t, v, turn, near).values()
         total = first.copy()
@@ -250,47 +258,3 @@ class Equations:
         matrix = self.matrix(t, near.grown)
         inverse: Array = np.linalg.inv(matrix).astype(np.float64)
         return times(inverse, total) if self.walls else total @ inverse.T
-
-    def _more_drag(self, t: float, near: Around) -> Array | None:
-        """Return by what share the drag has grown, (R, 1) or (6,)."""
-        more = None
-        if "biofouling" in self.effects:
-            more = np.full(6, self.effects["biofouling"]["rate"] * t)
-        if self.held is not None:
-            load = self.effects["payload"]
-            part = self.held(t)[0] * (np.array([load[a] for a in "XYZKMN"]) - 1.0)
-            more = part if more is None else more + part
-        for f, _ in near.walls:
-            more = f if more is None else more + f
-        return more
-
-    def _walls(self, v: Array, turn: Array, down: Array, near: Around) -> Array:
-        """Return -(dM_A/dz) nu_r z_dot and the pull of the energy's gradient, (R, 6)."""
-        still = np.concatenate([near.flow, turn], axis=-1) @ self.hull.added.T
-        energy = 0.5 * (dot(near.flow, still[:, :3]) + dot(turn, still[:, 3:]))
-        slope = np.zeros_like(energy)
-        for i, (_, own) in enumerate(near.walls):
-            for j, (f, _) in enumerate(near.walls):
-                own = own if i == j else own * (1.0 + f)
-            slope = slope + own
-        out = -slope * dot(down, v) * still
-        out[:, :3] += slope * energy * down
-        return out
-
-    def _weight(self, t: float, down: Array, flow: Array, turn: Array) -> Array:
-        """Return weight and buoyancy, of hull and load, and what it takes to carry new mass along, (R, 6)."""
-        hull = self.hull
-        force = (hull.weight - hull.buoyancy) * down
-        hanging = hull.weight * hull.cg - hull.buoyancy * hull.cb
-        turning = np.zeros_like(down)
-        for lump in self.growing:
-            assert lump.share is not None
-            share, rate = lump.share(t)
-            pull = share * (lump.mass * self.vehicle.gravity - lump.lift)
-            hanging = hanging + pull * lump.place
-            arm = np.broadcast_to(lump.place, flow.shape)
-            jerk = -rate * lump.mass * (flow + cross(turn, arm))
-            force = force + pull * down + jerk
-            turning = turning + cross(arm, jerk)
-        turning = turning + cross(np.broadcast_to(hanging, down.shape), down)
-        return np.concatenate([force, turning], axis=-1)

@@ -160,7 +160,13 @@ def build(vehicle: Vehicle, effects: Mapping[str, Values]) -> Hull:
 
 
 def curved(laws: Laws, vehicle: Vehicle, effects: Mapping[str, Values]) -> Laws:
-    """Return the laws with the exponents that an effect gives the drag, beside those of the world."""
+    """Return the laws with the exponents that an effect gives the drag, beside those of the world.
+
+    Args:
+        laws: of the world.
+        vehicle: for its usual speeds.
+        effects: that act, name to parameters.
+    """
     if "drag_curve" not in effects:
         return laws
     own = _each(effects["drag_curve"], AXES)

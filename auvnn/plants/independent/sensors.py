@@ -72,7 +72,13 @@ SENSORS = {
 
 
 def report(effects: Mapping[str, Values], truth: Reported, gravity: float) -> Reported:
-    """Return what is reported of a state."""
+    """Return what is reported of a state.
+
+    Args:
+        effects: that act, name to parameters.
+        truth: what sensors without effects would report.
+        gravity: m/s2.
+    """
     for name, values in effects.items():
         if name in SENSORS:
             truth = SENSORS[name](values, truth, gravity)

@@ -31,7 +31,14 @@ SIZE = 18
 
 
 def one_step(rate: Callable[[float, Array], Array], begin: float, end: float, y: Array) -> Array:
-    """Return the state after one step of the classical Runge-Kutta method of order four."""
+    """Return the state after one step of the classical Runge-Kutta method of order four.
+
+    Args:
+        rate: of the state at a time, s.
+        begin: s.
+        end: s.
+        y: state at the beginning, of any shape.
+    """
     h = end - begin
     a = rate(begin, y)
     b = rate(begin + 0.5 * h, y + 0.5 * h * a)
@@ -86,7 +93,13 @@ class Stretch:
         return report(self.task.effects, truth, self.task.vehicle.gravity)
 
     def hold(self, command: Array, fins: Array | None, voltage: Array | None) -> None:
-        """Note the row, and integrate to the next."""
+        """Note the row, and integrate to the next.
+
+        Args:
+            command: (R, n).
+            fins: fin angles, rad, (R, m), or None.
+            voltage: V, (R,), or None.
+        """
         task, k = self.task, len(self.rows)
         last = k == len(task.t) - 1
         begin = float(task.t[k])
@@ -114,7 +127,13 @@ class Stretch:
             raise self._lost(far.run, begin, held) from None
 
     def rate(self, t: float, thrust: Array, held: Held) -> Array:
-        """Return the acceleration of the present state, (R, 6)."""
+        """Return the acceleration of the present state, (R, 6).
+
+        Args:
+            t: s.
+            thrust: of the actuators, N, (R, n).
+            held: command, fin angles and voltage.
+        """
         return self.equations.rate(t, self.place, self.rotation, self.v, self.turn, thrust, held)
 
     def _acting(self, t: float) -> Array:
@@ -123,6 +142,11 @@ class Stretch:
 
     def integrate(self, begin: float, end: float, held: Held) -> None:
         """Move the state over a stretch in which the thrust does not jump.
+
+        Args:
+            begin: s.
+            end: s.
+            held: command, fin angles and voltage.
 
         Raises:
             Beyond: a vehicle is faster than anything under water.

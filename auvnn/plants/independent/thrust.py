@@ -71,7 +71,13 @@ class Actuators:
         return self.laws.curved(out, command)
 
     def hold(self, command: Array, begin: float, end: float) -> None:
-        """Take new commands (R, n) at time `begin`, s, held up to `end`."""
+        """Take new commands (R, n) at time `begin`, s, held up to `end`.
+
+        Args:
+            command: in [-1, 1], or a wrench, N and N m, (R, n).
+            begin: s.
+            end: s.
+        """
         wanted: Signal = lambda t: command  # noqa: E731
         constant = True
         for name, values in self.effects.items():

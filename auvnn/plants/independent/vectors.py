@@ -43,7 +43,13 @@ def quaternion_of(matrix: Array, near: Array) -> Array:
 
 
 def mounted(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation from a sensor's axes to the body's, by yaw, pitch and roll in turn, (3, 3)."""
+    """Return the rotation from a sensor's axes to the body's, by yaw, pitch and roll in turn, (3, 3).
+
+    Args:
+        roll: rad.
+        pitch: rad.
+        yaw: rad.
+    """
     return Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()
 
 

@@ -14,13 +14,29 @@ Values = Mapping[str, float]
 
 
 def current(values: Values, vehicle: Vehicle, t: float, place: Array, moving: Array) -> tuple[Array, Array]:
-    """A steady current, the same everywhere."""
+    """A steady current, the same everywhere.
+
+    Args:
+        values: of the effect: `v_north`, `v_east` and `v_down`, m/s.
+        vehicle: not used.
+        t: not used.
+        place: NED, m, (R, 3).
+        moving: not used.
+    """
     steady = np.array([values["v_north"], values["v_east"], values["v_down"]])
     return np.broadcast_to(steady, place.shape), np.zeros_like(place)
 
 
 def shear(values: Values, vehicle: Vehicle, t: float, place: Array, moving: Array) -> tuple[Array, Array]:
-    """A horizontal current in proportion to depth, as one meets it who sinks."""
+    """A horizontal current in proportion to depth, as one meets it who sinks.
+
+    Args:
+        values: of the effect: `north` and `east`, 1/s.
+        vehicle: not used.
+        t: not used.
+        place: NED, m, (R, 3).
+        moving: velocity over ground, NED, m/s, (R, 3).
+    """
     gradient = np.array([values["north"], values["east"], 0.0])
     return place[:, 2:] * gradient, moving[:, 2:] * gradient
 
@@ -30,6 +46,13 @@ def waves(values: Values, vehicle: Vehicle, t: float, place: Array, moving: Arra
 
     Horizontal velocity is the real part of W, downward velocity minus its imaginary part, where
     W = a omega exp(-k z) exp(i (k xi - omega t + phase)); the acceleration follows by the factor -i omega.
+
+    Args:
+        values: of the effect: `amplitude` (m), `omega` (rad/s), `direction` and `phase` (rad).
+        vehicle: for its gravity.
+        t: s.
+        place: NED, m, (R, 3).
+        moving: velocity over ground, NED, m/s, (R, 3).
     """
     omega = values["omega"]
     k = omega**2 / vehicle.gravity
@@ -55,7 +78,15 @@ WATERS: dict[str, Field] = {"ocean_current": current, "current_shear": shear, "w
 def water(
     effects: Mapping[str, Values], vehicle: Vehicle, t: float, place: Array, moving: Array
 ) -> tuple[Array, Array]:
-    """Return the water's velocity and acceleration at the vehicles, NED, m/s and m/s2, (R, 3)."""
+    """Return the water's velocity and acceleration at the vehicles, NED, m/s and m/s2, (R, 3).
+
+    Args:
+        effects: that act, name to parameters.
+        vehicle: plain numbers.
+        t: s.
+        place: NED, m, (R, 3).
+        moving: velocity over ground, NED, m/s, (R, 3).
+    """
     velocity, acceleration = np.zeros_like(place), np.zeros_like(place)
     for name, values in effects.items():
         if name in WATERS:

@@ -40,7 +40,13 @@ def main_horizon(rollout: Mapping[str, Any]) -> str | None:
 
 
 def total(rollout: Mapping[str, Any], horizon: str | None, key: str = "total") -> float | None:
-    """Return one number of one horizon, None where it is unknown."""
+    """Return one number of one horizon, None where it is unknown.
+
+    Args:
+        rollout: by horizon, as the answer holds it.
+        horizon: "5", "full", ..., or None.
+        key: which number.
+    """
     return finite((rollout.get(horizon) or {}).get(key)) if horizon is not None else None
 
 
@@ -197,7 +203,13 @@ def worst_run(series: Sequence[Mapping[str, Any]], key: str) -> int:
 
 
 def excerpt(entry: Mapping[str, Any], key: str, length: float = EXCERPT) -> dict[str, Any]:
-    """Return the `length` seconds of a run in which the model called `key` errs most."""
+    """Return the `length` seconds of a run in which the model called `key` errs most.
+
+    Args:
+        entry: a run: `t`, `measured` and what models predict, arrays by name.
+        key: of the model.
+        length: s.
+    """
     part = telling_window(entry["t"], entry["measured"], entry[key], length)
     n = np.size(entry["t"])
     return {

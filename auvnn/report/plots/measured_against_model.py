@@ -45,7 +45,13 @@ def measured_against_model(
 def rms_remarks(
     measured: ArrayLike, models: dict[str, ArrayLike], symbols: Sequence[tuple[str, str]]
 ) -> list[str]:
-    """Return for each column `rms error 0.12 → 0.03 m/s`, in the order of the models."""
+    """Return for each column `rms error 0.12 → 0.03 m/s`, in the order of the models.
+
+    Args:
+        measured: (N, columns).
+        models: predictions by the model's name, (N, columns) each.
+        symbols: symbol and unit of each column.
+    """
     truth = columns(measured, "measured")
     errors = [rms(columns(model, "model") - truth) for model in models.values()]
     return [

@@ -143,6 +143,11 @@ def brackets(
     """Return the groups that cannot be told apart, each led by its best-ranked member, at most three.
 
     Only groups that matter: led by an effect that was chosen, or that explains a tenth of what the best does.
+
+    Args:
+        candidates: as the answer lists them, best first.
+        chosen: effects that were named.
+        most: groups at most.
     """
     best = max((e for c in candidates if (e := finite(c.get("explained"))) is not None), default=0.0)
     names = [str(c.get("effect", "?")) for c in candidates]

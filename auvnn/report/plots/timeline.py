@@ -100,7 +100,13 @@ def timeline(runs: Sequence[Mapping[str, Any]], *, bins: int = BINS) -> Figure:
 
 
 def occupancy(t: np.ndarray, values: Any, columns: int) -> np.ndarray:
-    """Return for equal slices of time whether the samples in them are there (one of the four classes)."""
+    """Return for equal slices of time whether the samples in them are there (one of the four classes).
+
+    Args:
+        t: times, s, (N,).
+        values: of a channel, (N,), NaN where missing; None where there is no such channel.
+        columns: number of slices.
+    """
     edges = np.linspace(t[0], t[-1], columns + 1)
     index = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, columns - 1)
     total = np.bincount(index, minlength=columns)

@@ -69,7 +69,13 @@ class Excitation(ABC):
 
     @abstractmethod
     def plan(self, model: GreyBox, t: Array, generators: Sequence[np.random.Generator]) -> Plan:
-        """Return the plan of one run per generator, at the times t (T,), s."""
+        """Return the plan of one run per generator, at the times t (T,), s.
+
+        Args:
+            model: nominal: nothing hidden is in it.
+            t: times of the rows, s, (T,).
+            generators: one for each run.
+        """
 
 
 def make_excitation(given: str | Mapping[str, Any], catalogue: Catalogue) -> Excitation:

@@ -65,7 +65,13 @@ class Manoeuvre(Excitation):
 
 
 def blocks(duration: float, length: float, generator: np.random.Generator) -> list[tuple[float, int, float]]:
-    """Return (start, s; axis; sign) of blocks of a length, each axis in turn in a random order."""
+    """Return (start, s; axis; sign) of blocks of a length, each axis in turn in a random order.
+
+    Args:
+        duration: of the run, s.
+        length: of a block, s.
+        generator: draws the order and the signs.
+    """
     found, start = [], 0.0
     while start < duration:
         for axis in generator.permutation(DRIVEN):

@@ -17,6 +17,12 @@ def random_starts(
     """Return eta (R, 7) and nu (R, 6): at rest, with any heading, and roll and pitch within `lean`, rad.
 
     A vehicle that must move to be steered starts under way instead.
+
+    Args:
+        generators: one for each of the R runs.
+        depth: m.
+        lean: rad.
+        steady: how the vehicle moves under way, or None for one that can hover.
     """
     angles = np.stack([np.array([*g.uniform(-lean, lean, 2), g.uniform(-np.pi, np.pi)]) for g in generators])
     nu = np.zeros((len(generators), 6))

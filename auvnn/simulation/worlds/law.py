@@ -25,7 +25,14 @@ SPACING = 0.025
 
 
 def drawn_laws(world: World, vehicle: Vehicle, actuation: str, generator: np.random.Generator) -> Laws:
-    """Return a world's laws, but for the force that wanders."""
+    """Return a world's laws, but for the force that wanders.
+
+    Args:
+        world: with the ranges.
+        vehicle: plain numbers.
+        actuation: "thrusters" or "wrench".
+        generator: draws within the ranges.
+    """
     shape, conventions = world.shape, world.conventions
     # Drawn whether they are needed or not: a world's draws must not hang on each other.
     place, count = generator.uniform(size=6), len(vehicle.thrusters) if actuation == "thrusters" else 6
@@ -44,7 +51,13 @@ def drawn_laws(world: World, vehicle: Vehicle, actuation: str, generator: np.ran
 
 
 def commanded_wrench(vehicle: Vehicle, actuation: str, motion: Motion) -> Array:
-    """Return the wrench that the commands of a motion stand for by the stated numbers, fins included, (R, T, 6)."""
+    """Return the wrench that the commands of a motion stand for by the stated numbers, fins included, (R, T, 6).
+
+    Args:
+        vehicle: plain numbers.
+        actuation: "thrusters" or "wrench".
+        motion: of R runs and T rows.
+    """
     shape = motion.command.shape[:2]
     actuators = Actuators(vehicle, actuation, {})
     thrust = actuators.settled(motion.command.reshape(-1, motion.command.shape[-1]))

@@ -100,7 +100,14 @@ class Sensing:
         return multiply(np.broadcast_to(self._turn, quaternion.shape), quaternion)
 
     def look(self, k: int, position: Array, quaternion: Array, nu: Array) -> tuple[Array, Array, Array]:
-        """Return what a controller sees at row k, from what sensors without noise report."""
+        """Return what a controller sees at row k, from what sensors without noise report.
+
+        Args:
+            k: number of the row.
+            position: NED, m, (R, 3).
+            quaternion: attitude, (R, 4).
+            nu: velocity, m/s and rad/s, (R, 6).
+        """
         seen = self.draws.added("u", nu, k)
         if k % self.hold == 0 or self._held is None:
             self._held = seen[:, :3].copy()
@@ -108,7 +115,13 @@ class Sensing:
         return self.draws.added("x", position, k), self.draws.turned(self.turned(quaternion), k), seen
 
     def record(self, position: Array, quaternion: Array, velocity: Array) -> tuple[Array, Array, Array]:
-        """Return what is recorded of all rows: position (R, T, 3), quaternion (R, T, 4) and nu (R, T, 6)."""
+        """Return what is recorded of all rows: position (R, T, 3), quaternion (R, T, 4) and nu (R, T, 6).
+
+        Args:
+            position: NED, m, (R, T, 3).
+            quaternion: attitude, (R, T, 4).
+            velocity: m/s and rad/s, (R, T, 6).
+        """
         place, nu = self.recorded.added("x", position), self.recorded.added("u", velocity)
         attitude = self.recorded.turned(self.turned(quaternion))
         nu = np.concatenate([self._since(nu[..., :3]), nu[..., 3:]], axis=-1)

@@ -196,7 +196,14 @@ def _names(
 
 
 def can_be_hidden(vehicle: Vehicle, noise: Any, accelerations: bool | None, plant: str = "own") -> list[str]:
-    """Return the effects of the catalogue for which vehicle, plant and log have what they need."""
+    """Return the effects of the catalogue for which vehicle, plant and log have what they need.
+
+    Args:
+        vehicle: for its fins and its reference voltage.
+        noise: condition: a name or its options.
+        accelerations: whether they are measured; as the noise says where None.
+        plant: what makes the motion.
+    """
     actuation = "thrusters" if vehicle.thrusters else "wrench"
     measured = make_noise(noise).accelerations if accelerations is None else accelerations
     absent = set() if measured else {"du", "dv", "dw", "dp", "dq", "dr"}
@@ -228,6 +235,12 @@ def refusing(plant: str) -> Callable[[str], str]:
 
 def together(names: Sequence[str], sizes: Sequence[str], count: int, seed: int) -> tuple[str, str]:
     """Return effects to be hidden together and the size of each, both joined by "+", as a seed draws them.
+
+    Args:
+        names: of the effects.
+        sizes: of which one is drawn for each.
+        count: how many are hidden together.
+        seed: of the draw.
 
     Raises:
         ConfigError: there are not as many that go together.

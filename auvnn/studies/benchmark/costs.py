@@ -28,6 +28,11 @@ def cost_of(model: GreyBox, log: Log, hidden: Values) -> float | None:
     """Return (E without - E with) / E with, E the 5 s error of the model without and with what is hidden.
 
     None where the model with it cannot be run.
+
+    Args:
+        model: without what is hidden.
+        log: measurements.
+        hidden: effects, name to parameters.
     """
     from auvnn.metrics.rollouts import roll, scale_of
 

@@ -216,6 +216,11 @@ def errors_of(
 
     Of several effects, a parameter is called by its effect and its own name. A shape, an onset or a frequency, has
     no distance from its null and so no relative error.
+
+    Args:
+        case: of the benchmark.
+        truth: what was hidden, name to parameters.
+        parameters: as the diagnosis answered them.
     """
     out: dict[str, dict[str, float | None]] = {}
     for effect, hidden in truth.items():

@@ -24,6 +24,11 @@ def run_all(todo: Sequence[Case], workers: int, run: Runner) -> Iterator[dict[st
 
     A process that dies, for want of memory perhaps, takes the logs that were under way with it. They are tried
     again; whoever has died twice runs alone, and a log that dies alone is a row with that fault.
+
+    Args:
+        todo: the logs.
+        workers: processes.
+        run: makes the row of a case.
     """
     if workers <= 1 or len(todo) <= 1:
         yield from map(run, todo)

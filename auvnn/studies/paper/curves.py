@@ -24,7 +24,14 @@ def drag(model: GreyBox, nu: torch.Tensor) -> torch.Tensor:
 
 
 def damping_curves_of(model: GreyBox, plant: GreyBox, log: Log, points: int = 121) -> list[dict[str, Any]]:
-    """Return for each degree of freedom the learned and the true damping over the velocities of a log and beyond."""
+    """Return for each degree of freedom the learned and the true damping over the velocities of a log and beyond.
+
+    Args:
+        model: with subnetworks.
+        plant: the truth.
+        log: for the range of the velocities.
+        points: of each curve.
+    """
     out = []
     nu = np.concatenate([run.nu for run in log.runs])
     for k in range(6):

@@ -48,6 +48,12 @@ class Cylinder:
     def build(cls, mass: float, described: Mapping[str, Any], density: float, gravity: float) -> Cylinder:
         """Return the cylinder of a mass that displaces what its net weight says.
 
+        Args:
+            mass: kg.
+            described: `diameter` (m), `net_weight` (N), `axis` and `position` (m).
+            density: of the water, kg/m3.
+            gravity: m/s2.
+
         Raises:
             ConfigError: it is not a body.
         """
@@ -139,6 +145,12 @@ def factored(
     The factors are drawn evenly on a log scale; the smallest and the largest are then stretched to the range's ends,
     so that it is the stated range. Rows and columns of a full matrix are scaled by the roots of their factors, which
     keeps it positive definite.
+
+    Args:
+        vehicle: plain numbers.
+        low: least factor.
+        high: largest factor.
+        generator: draws them.
 
     Raises:
         ConfigError: the range is not one.

@@ -178,6 +178,12 @@ def frozen_ahead(
 def window_rows(run: Run, horizon: float, stride: int, first: float = 0.0) -> list[int]:
     """Return the rows at which windows of a horizon begin that fit into a run.
 
+    Args:
+        run: that is cut.
+        horizon: s.
+        stride: rows between the beginnings.
+        first: s from the run's start before which no window begins.
+
     Raises:
         ConfigError: none does.
     """

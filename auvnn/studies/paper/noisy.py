@@ -128,6 +128,11 @@ def offline(plant: GreyBox, options: Options, log: Log) -> tuple[GreyBox, Fit]:
     """Return the six networks trained on equation 14 as it is, noise and all; random samples decide when to stop.
 
     The noise is white, so that samples drawn at random are an honest judge of the others.
+
+    Args:
+        plant: for the known equations.
+        options: of the study.
+        log: that is fitted.
     """
     how = options.case["offline"]
     known = build_structure("known", plant.vehicle, actuation="wrench")

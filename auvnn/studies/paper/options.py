@@ -118,6 +118,12 @@ def _cut(values: Mapping[str, Any]) -> dict[str, Any]:
 def number(value: Any, what: str, low: float = 0.0, high: float = 1e9) -> float:
     """Return a finite number within bounds.
 
+    Args:
+        value: what was given.
+        what: its name, for the message.
+        low: least value that is allowed.
+        high: largest value that is allowed.
+
     Raises:
         ConfigError: it is none.
     """
@@ -129,6 +135,11 @@ def number(value: Any, what: str, low: float = 0.0, high: float = 1e9) -> float:
 
 def word(value: Any, what: str, known: tuple[str, ...]) -> str:
     """Return one of the known words.
+
+    Args:
+        value: what was given.
+        what: its name, for the message.
+        known: words that are allowed.
 
     Raises:
         ConfigError: it is none of them.

@@ -38,7 +38,14 @@ def load_plant(source: str) -> GreyBox:
 def manoeuvre_log(
     plant: GreyBox, options: Options, noise: str | Mapping[str, Any] = "none", seed: int = 0
 ) -> Log:
-    """Return the paper's manoeuvre as a log: a constant wrench for a time, then none, from rest."""
+    """Return the paper's manoeuvre as a log: a constant wrench for a time, then none, from rest.
+
+    Args:
+        plant: the truth.
+        options: of the study, with the manoeuvre.
+        noise: condition: a name or its options.
+        seed: of the noise.
+    """
     excitation = {"name": "paper", **options.manoeuvre}
     return simulate(
         plant, excitation, noise, None, seed, runs=1, duration=options.duration, rate=options.rate,
@@ -53,7 +60,15 @@ def rich_log(
     seed: int,
     noise: str | Mapping[str, Any] = "none",
 ) -> Log:
-    """Return runs of random-phase multisines in all six degrees of freedom."""
+    """Return runs of random-phase multisines in all six degrees of freedom.
+
+    Args:
+        plant: the truth.
+        options: of the study.
+        rich: `runs`, `duration` (s), `rate` (1/s) and the options of the multisine.
+        seed: of multisine and noise.
+        noise: condition: a name or its options.
+    """
     excitation = {"name": "multisine", **dict(rich.get("excitation") or {})}
     return simulate(
         plant, excitation, noise, None, seed, runs=int(rich["runs"]), duration=float(rich["duration"]),
@@ -63,6 +78,11 @@ def rich_log(
 
 def training_log(plant: GreyBox, options: Options, noise: str | Mapping[str, Any]) -> Log:
     """Return what the networks are trained on offline: the manoeuvre, repeated, and with `data: rich` multisines too.
+
+    Args:
+        plant: the truth.
+        options: of the study.
+        noise: condition: a name or its options.
 
     Raises:
         ConfigError: `case.offline` asks for something else.
@@ -95,6 +115,13 @@ def free_run(model: GreyBox, run: Run, step: float, *, start: int = 0, end: int 
     """Return the velocity (T, 6) of a model that runs free from row `start` on the run's commands alone.
 
     A run that diverges holds its last sound state, as everywhere.
+
+    Args:
+        model: that is run.
+        run: with commands, positions and attitudes.
+        step: longest step of the integrator, s.
+        start: row at which it starts.
+        end: row before which it ends; the last one where None.
     """
     rows = slice(start, end)
     command = run.command
@@ -112,7 +139,13 @@ def free_run(model: GreyBox, run: Run, step: float, *, start: int = 0, end: int 
 
 
 def free_runs(model: GreyBox, runs: Mapping[str, Run], step: float) -> dict[str, Array]:
-    """Return `free_run` of several runs from their start; those with the same times are integrated side by side."""
+    """Return `free_run` of several runs from their start; those with the same times are integrated side by side.
+
+    Args:
+        model: that is run.
+        runs: by name.
+        step: longest step of the integrator, s.
+    """
     out: dict[str, Array] = {}
     left = dict(runs)
     while left:

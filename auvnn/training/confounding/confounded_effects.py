@@ -135,6 +135,12 @@ def traces(model: GreyBox, log: Log, how: Derivative, name: str) -> tuple[Array,
     """Return the wrench that subnetworks would take up of each parameter of an effect, per unit, (N, 6, p).
 
     That is the slope at the null of M (nu_dot measured - nu_dot of the model with the effect).
+
+    Args:
+        model: with its subnetworks.
+        log: N samples in all.
+        how: accelerations are obtained.
+        name: of the effect, with p parameters.
     """
     described = list(EFFECTS.get(name).describe(model.vehicle, model.actuation))
     none = _lacking(model, log, how)

@@ -135,6 +135,11 @@ def correlated(x: Array, run: NDArray[np.int64]) -> Array:
 def curves(learned: NetworkPosterior, nu: Array, points: int = 121) -> list[dict[str, object]]:
     """Return what the subnetworks make of each velocity alone, over half as much again as the log covered.
 
+    Args:
+        learned: subnetworks with their uncertainty.
+        nu: velocities of the log, (N, 6), m/s and rad/s.
+        points: of each curve, k.
+
     Returns:
         Six of {nu: (k,), learned: (k,), band: 95 % limits (2, k), low and high: the range that the log covered}.
     """

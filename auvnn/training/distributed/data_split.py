@@ -77,6 +77,12 @@ def _plan_one(reading: Reading, path: Path) -> Pieces | InputError:
 def plan_files(pool: Executor, paths: Sequence[Path], reading: Reading, say: Say) -> Pieces:
     """Cut files into pieces.
 
+    Args:
+        pool: does it file by file.
+        paths: of the files.
+        reading: how they are read.
+        say: told in words what is being done.
+
     Raises:
         InputError: none of them can be read, or they do not have the same columns.
     """
@@ -100,7 +106,16 @@ def split_data(
     name: str,
     test_name: str,
 ) -> tuple[DataSplit, Derivative]:
-    """Say what is fitted, what decides when to stop and what is held out, and how accelerations are obtained."""
+    """Say what is fitted, what decides when to stop and what is held out, and how accelerations are obtained.
+
+    Args:
+        whole: pieces of the log.
+        tested: pieces of the test log, or None to hold out a part of the log.
+        derivative: how accelerations are obtained.
+        mapping: by which files are read.
+        name: of the log.
+        test_name: of the test log.
+    """
     rest, test, held_words = whole, tested, f"{test_name} is held out"
     if test is None:
         rest, test, held_words = _split(whole, HELD_OUT, mapping, name)
@@ -132,7 +147,14 @@ def _split_rows(shared: tuple[Mapping, NDArray[np.void]], piece: Piece) -> NDArr
 
 
 def refuse_leakage(pool: Executor, log: Pieces, test: Pieces, mapping: Mapping) -> None:
-    """Refuse a test log that shares samples with what is fitted, as `logs.overlap.leakage` does, by some samples."""
+    """Refuse a test log that shares samples with what is fitted, as `logs.leakage.leakage` does, by some samples.
+
+    Args:
+        pool: does it piece by piece.
+        log: pieces that are fitted.
+        test: pieces that are held out.
+        mapping: by which files are read.
+    """
     held = rows_of(evenly_spread_runs(test, COMPARED, mapping))
     shared = np.zeros(len(held), dtype=bool)
     for found in pool.run(_split_rows, (mapping, held), list(log.pieces)):

@@ -54,6 +54,12 @@ class DistributedProblem:
     ) -> DistributedProblem:
         """Work out the samples of pieces.
 
+        Args:
+            pool: does it piece by piece.
+            source: of samples: model, mapping and derivative.
+            pieces: of the files.
+            size: about how many samples make a group.
+
         Raises:
             InputError: none of them can be used.
         """
@@ -146,7 +152,14 @@ class DistributedProblem:
     def ask(
         self, name: str, *values: Any, thing: bytes = b"", scales: tuple[Tensor, Tensor] | None = None
     ) -> Iterator[Any]:
-        """Ask every group, and yield the answers in the order of the groups; see `Question`."""
+        """Ask every group, and yield the answers in the order of the groups; see `Question`.
+
+        Args:
+            name: of what is asked.
+            thing: what else it depends on, as bytes.
+            scales: of inputs and outputs, or None.
+            *values: that it depends on.
+        """
         question = Request(self.source, name, thing, to_wire(values), to_wire(scales))
         return map(from_wire, self.pool.run(serve, question, self.groups))
 

@@ -18,14 +18,8 @@ from torch import Tensor
 from auvnn.damping.base import DampingForm
 from auvnn.damping.mlp import MLP
 from auvnn.training.least_squares.forms import FormProblems, form_draw, size_of
-from auvnn.training.least_squares.networks import (
-    RIDGE,
-    NetworkProblems,
-    Normal,
-    Problems,
-    draw_units,
-    output_layers,
-)
+from auvnn.training.least_squares.networks import NetworkProblems, Normal, Problems
+from auvnn.training.least_squares.output_layers import RIDGE, draw_units, output_layers
 
 GROUP = 32_768
 T = TypeVar("T")
@@ -86,7 +80,15 @@ def problems_of(form: DampingForm, nu: Tensor, targets: Tensor, weights: Tensor 
 def group_problems(
     form: DampingForm, nu: Tensor, targets: Tensor, weights: Tensor | None, first: int = 0
 ) -> FormProblems | NetworkProblems:
-    """Return the problems of a form on the samples of one group, of which the first is sample number `first`."""
+    """Return the problems of a form on the samples of one group, of which the first is sample number `first`.
+
+    Args:
+        form: of the damping.
+        nu: velocities, (N, 6), m/s and rad/s.
+        targets: what the subnetworks should give, (N, 6).
+        weights: of the samples, (N, 6), or None.
+        first: number of the group's first sample.
+    """
     if type(form) is not MLP:
         return FormProblems(form, nu, targets, weights)
     inputs = form.features(nu)

@@ -62,11 +62,23 @@ class FormProblems:
         return beta, self.cost(theta, beta, member)
 
     def cost(self, theta: Tensor, beta: Tensor, member: Tensor) -> Tensor:
-        """Return the weighted mean of the squared residual (B,)."""
+        """Return the weighted mean of the squared residual (B,).
+
+        Args:
+            theta: parameters of B fits, (B, P).
+            beta: not used: there is no output layer apart.
+            member: degree of freedom that each fit is for, (B,).
+        """
         return self.squares(theta, beta, member) / self.total[member]
 
     def squares(self, theta: Tensor, beta: Tensor, member: Tensor) -> Tensor:
-        """Return the weighted sum of the squared residual (B,)."""
+        """Return the weighted sum of the squared residual (B,).
+
+        Args:
+            theta: parameters of B fits, (B, P).
+            beta: not used: there is no output layer apart.
+            member: degree of freedom that each fit is for, (B,).
+        """
         total = theta.new_zeros(len(theta))
         for number, rows, part, y, w in self._parts(member):
             output = vmap(lambda t, n=number, p=part: self._output(t, self.nu[p], n))(theta[rows])
@@ -75,7 +87,13 @@ class FormProblems:
         return total
 
     def normal(self, theta: Tensor, beta: Tensor, member: Tensor) -> Normal:
-        """Return the normal equations at theta."""
+        """Return the normal equations at theta.
+
+        Args:
+            theta: parameters of B fits, (B, P).
+            beta: not used: there is no output layer apart.
+            member: degree of freedom that each fit is for, (B,).
+        """
         count, size = theta.shape
         inner, slope = theta.new_zeros(count, size, size), theta.new_zeros(count, size)
         for number, rows, part, y, w in self._parts(member):

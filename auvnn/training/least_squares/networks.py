@@ -9,15 +9,16 @@ g_k g_l with the 91 series x_i x_j, which all networks share, gives all blocks.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 import torch
 from torch import Tensor
 
+from auvnn.training.least_squares.output_layers import RIDGE, _at_rest, draw_units, output_layers
+
 KEPT_BYTES = 64 * 1024**2
-RIDGE = 1e-10
 
 
 @dataclass
@@ -56,11 +57,23 @@ class Problems(Protocol):
         ...
 
     def cost(self, theta: Tensor, beta: Tensor, member: Tensor) -> Tensor:
-        """Return the weighted mean of the squared residual (B,)."""
+        """Return the weighted mean of the squared residual (B,).
+
+        Args:
+            theta: parameters of B fits, (B, P).
+            beta: their output layers, (B, q).
+            member: degree of freedom that each fit is for, (B,).
+        """
         ...
 
     def normal(self, theta: Tensor, beta: Tensor, member: Tensor) -> Normal:
-        """Return the normal equations at (theta, beta)."""
+        """Return the normal equations at (theta, beta).
+
+        Args:
+            theta: parameters of B fits, (B, P).
+            beta: their output layers, (B, q).
+            member: degree of freedom that each fit is for, (B,).
+        """
         ...
 
 
@@ -186,11 +199,23 @@ class NetworkProblems:
         return gram, right
 
     def cost(self, theta: Tensor, beta: Tensor, member: Tensor) -> Tensor:
-        """Return the weighted mean of the squared residual (B,)."""
+        """Return the weighted mean of the squared residual (B,).
+
+        Args:
+            theta: parameters of B fits, (B, P).
+            beta: their output layers, (B, q).
+            member: degree of freedom that each fit is for, (B,).
+        """
         return self.squares(theta, beta, member) / self.total[member]
 
     def squares(self, theta: Tensor, beta: Tensor, member: Tensor) -> Tensor:
-        """Return the weighted sum of the squared residual (B,)."""
+        """Return the weighted sum of the squared residual (B,).
+
+        Args:
+            theta: parameters of B fits, (B, P).
+            beta: their output layers, (B, q).
+            member: degree of freedom that each fit is for, (B,).
+        """
         return self._squares_of(theta, beta, member, [])
 
     def _squares_of(self, theta: Tensor, beta: Tensor, member: Tensor, kept: list[Tensor]) -> Tensor:
@@ -202,7 +227,13 @@ class NetworkProblems:
         return total
 
     def normal(self, theta: Tensor, beta: Tensor, member: Tensor) -> Normal:
-        """Return the normal equations at (theta, beta); see the head of this file."""
+        """Return the normal equations at (theta, beta); see the head of this file.
+
+        Args:
+            theta: parameters of B fits, (B, P).
+            beta: their output layers, (B, q).
+            member: degree of freedom that each fit is for, (B,).
+        """
         count, h, p = len(theta), self.hidden, self.x.shape[1]
         first, second = self._pairs_of_units
         left, right = self._pairs
@@ -240,58 +271,3 @@ class NetworkProblems:
             wide[..., h + 1].contiguous(),
             plain[:, :q, h + 1].contiguous(),
         )
-
-
-def draw_units(
-    members: int,
-    hidden: int,
-    samples: int,
-    mean: Tensor,
-    covariance: Tensor,
-    inputs_at: Callable[[Tensor], Tensor],
-    generator: torch.Generator,
-) -> Tensor:
-    """Return hidden layers (members, Q) as `NetworkProblems.draw` describes them.
-
-    Args:
-        members: networks.
-        hidden: units of each.
-        samples: how many there are.
-        mean: of the inputs, (p,).
-        covariance: of the inputs, (p, p).
-        inputs_at: gives the inputs of some samples.
-        generator: draws.
-    """
-    shape = (members, hidden)
-    weight = torch.randn((*shape, len(mean)), generator=generator, dtype=torch.float64)
-    rows = torch.randint(samples, shape, generator=generator)
-    spread = ((weight @ covariance) * weight).sum(-1, keepdim=True).clamp_min(0).sqrt()
-    weight = 0.5 * weight / spread.clamp_min(1e-6)
-    bias = -(inputs_at(rows) * weight).sum(-1, keepdim=True)
-    return torch.cat([weight, bias], -1).reshape(members, -1)
-
-
-def output_layers(gram: Tensor, right: Tensor, ridge: float) -> Tensor:
-    """Return the output layers (B, q) that solve the normal equations of (B, q, q) and (B, q, 1)."""
-    factor, _ = torch.linalg.cholesky_ex(gram + _ridge(gram, ridge))
-    beta = torch.cholesky_solve(right, factor)
-    # One step of refinement takes most of the ridge's bias away.
-    return (beta + torch.cholesky_solve(right - gram @ beta, factor))[..., 0]
-
-
-def _at_rest(inner: Tensor, cross: Tensor, plain: Tensor, slope: Tensor) -> tuple[Tensor, Tensor]:
-    """Turn derivatives g_k x into g_k x - g_k(0) e, e picking the bias: the value at rest is subtracted."""
-    h = slope.shape[1]
-    sums = cross[..., h]  # (B, h, p): sum_n g_k x
-    inner = inner.clone()
-    inner[..., -1] -= sums[..., None] * slope[:, None, None, :]
-    inner[:, :, -1] -= slope[:, :, None, None] * sums[:, None]
-    inner[:, :, -1, :, -1] += slope[:, :, None] * slope[:, None, :] * plain[:, h, h, None, None]
-    cross = cross.clone()
-    cross[:, :, -1] -= slope[..., None] * plain[:, None, h]
-    return inner, cross
-
-
-def _ridge(matrix: Tensor, relative: float) -> Tensor:
-    diagonal = torch.diagonal(matrix, dim1=-2, dim2=-1)
-    return torch.diag_embed(relative * diagonal.clamp_min(1e-300))

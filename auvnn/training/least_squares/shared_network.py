@@ -14,7 +14,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from auvnn.training.least_squares.networks import NetworkProblems, Normal, _ridge
+from auvnn.training.least_squares.networks import NetworkProblems, Normal
+from auvnn.training.least_squares.output_layers import _ridge
 
 
 class SharedProblems(NetworkProblems):

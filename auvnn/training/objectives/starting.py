@@ -24,6 +24,12 @@ def sound_shots(
 
     Where there is nothing to learn, or the runs of most windows diverge, the answer is the model as it is.
 
+    Args:
+        model: with its subnetworks.
+        fitted: log that is fitted.
+        stopping: log that decides when to stop.
+        window: length of the windows, s.
+
     Raises:
         InputError: a log has too few windows.
     """
@@ -49,7 +55,13 @@ def sound_shots(
 
 
 def best_start(starts: Sequence[GreyBox], log: Log, window: float) -> int:
-    """Return which model follows the windows of a log best, initial states fitted; 0 where none does."""
+    """Return which model follows the windows of a log best, initial states fitted; 0 where none does.
+
+    Args:
+        starts: models.
+        log: that they are to follow.
+        window: length of the windows, s.
+    """
     errors = []
     for model in starts:
         shots = Shots(model, training_windows(model, log, window))

@@ -34,6 +34,11 @@ def training_windows(model: GreyBox, log: Log, horizon: float) -> Windows:
     Measured accelerations are left out, because the velocities of a window hold what they say and more;
     positions, because they are known far worse than the velocities that they are the sums of.
 
+    Args:
+        model: for its actuation and its lags.
+        log: that is cut.
+        horizon: length of the windows, s.
+
     Raises:
         InputError: no stretch is long enough, or there are too few windows.
     """
@@ -99,14 +104,26 @@ class Shots:
         self.windows, self.initial = self.windows.pick(index), self.initial[torch.as_tensor(index)]
 
     def cost(self, model: GreyBox, initial: Tensor, sigma: Array) -> float:
-        """Return the weighted squared error of all windows from given states; infinite where one diverges."""
+        """Return the weighted squared error of all windows from given states; infinite where one diverges.
+
+        Args:
+            model: that is run.
+            initial: states of the windows, (B, 13).
+            sigma: standard deviation of each channel, (18,); infinite where it does not count.
+        """
         total = float((output_error(model, self.windows, initial) * _weights(sigma)).square().sum())
         return total if np.isfinite(total) else np.inf
 
     def settle(
         self, model: GreyBox, sigma: Array | None = None, rounds: int = 2
     ) -> tuple[ShootingSums, Array]:
-        """Fit the initial states alone; return the sums without weights and each channel's error, (18,)."""
+        """Fit the initial states alone; return the sums without weights and each channel's error, (18,).
+
+        Args:
+            model: that is run.
+            sigma: standard deviation of each channel, (18,); from the errors themselves where None.
+            rounds: of Gauss-Newton steps.
+        """
         fixed = sigma
         if sigma is None:
             seen = self.windows.mask.sum((0, 1)).numpy() > 0
@@ -143,7 +160,14 @@ class Shots:
         return np.where(sums.count > 0, np.maximum(value, self.floor), np.inf)
 
     def sums(self, model: GreyBox, sigma: Array, *, weights: bool, names: Sequence[str] = ()) -> ShootingSums:
-        """Linearise towards the initial states, effects' parameters and, if asked for, the subnetworks' weights."""
+        """Linearise towards the initial states, effects' parameters and, if asked for, the subnetworks' weights.
+
+        Args:
+            model: about which it is linearised.
+            sigma: standard deviation of each channel, (18,); infinite where it does not count.
+            weights: whether by the subnetworks' weights too.
+            names: effects by whose parameters.
+        """
         used = np.flatnonzero(np.isfinite(sigma) & (self.windows.mask.sum((0, 1)).numpy() > 0))
         scale = torch.as_tensor(1.0 / sigma[used])
         parts = []

@@ -84,13 +84,24 @@ class Scheme:
 
 
 def relative_errors(bank: DampingBank, samples: SampleSums, spread: Tensor) -> Tensor:
-    """Return the weighted root-mean-square error of the bank divided by the spread, (6,) float64."""
+    """Return the weighted root-mean-square error of the bank divided by the spread, (6,) float64.
+
+    Args:
+        bank: of subnetworks.
+        samples: on which it is judged.
+        spread: of the targets, (6,), N and N m.
+    """
     square, weight = samples.error_sums(bank)
     return (square / weight.clamp_min(1e-300)).sqrt() / spread
 
 
 def whole(value: Any, what: str, *, least: int = 1) -> int:
     """Return `value` if it is a whole number of at least `least`.
+
+    Args:
+        value: what was given.
+        what: name of the option, for the message.
+        least: value that is allowed.
 
     Raises:
         ConfigError: it is not.
@@ -102,6 +113,11 @@ def whole(value: Any, what: str, *, least: int = 1) -> int:
 
 def positive(value: Any, what: str, *, zero: bool = False) -> float:
     """Return `value` if it is a positive finite number, or with `zero` also zero.
+
+    Args:
+        value: what was given.
+        what: name of the option, for the message.
+        zero: whether zero is allowed.
 
     Raises:
         ConfigError: it is not.

@@ -30,6 +30,11 @@ def quaternion_to_ned_frd(q: Array, body: str, world: str) -> Array:
     """Return attitudes body to world (N, 4) as FRD to NED, given in these frames.
 
     With R' = W R B, where B turns FRD into FLU and W turns ENU into NED.
+
+    Args:
+        q: quaternions (w, x, y, z), (N, 4).
+        body: "FRD" or "FLU".
+        world: "NED" or "ENU".
     """
     if body == "FLU":
         q = multiply(q, _BODY_TURN)

@@ -17,6 +17,11 @@ from auvnn.logs.signals import differences
 def settle(run: Run, plan: Mapping, where: str) -> tuple[Run, list[Repair]]:
     """Return the run with its heading offset added and velocities that were given along north, east, down turned.
 
+    Args:
+        run: as it was assembled.
+        plan: the mapping.
+        where: of the file, for messages.
+
     Raises:
         ConfigError: some of u, v, w are given in the world and others in the body.
     """

@@ -168,7 +168,15 @@ class Mapping:
     def mixed(
         self, each: list[NDArray[Any]], column: Column, name: str, where: str, result: Table
     ) -> NDArray[np.float64]:
-        """Return the weighed sum of inputs that have passed the column's curve, (N,), cut to [-1, 1] for a thruster."""
+        """Return the weighed sum of inputs that have passed the column's curve, (N,), cut to [-1, 1] for a thruster.
+
+        Args:
+            each: raw values of the inputs, (N,) each.
+            column: with the weights.
+            name: canonical name of the column.
+            where: of the file, for messages.
+            result: takes the notes.
+        """
         inside = [self._convert(raw, column, name, where, result, last=False) for raw in each]
         total = sum(weight * x for (_, weight), x in zip(column.more.mix, inside, strict=True))
         total = np.asarray(total) * column.scale + column.offset
@@ -177,7 +185,15 @@ class Mapping:
     def convert(
         self, raw: NDArray[Any], column: Column, name: str, where: str, result: Table
     ) -> NDArray[Any]:
-        """Return a column's values in its own unit: curve, scale, offset and unit applied; notes go to `result`."""
+        """Return a column's values in its own unit: curve, scale, offset and unit applied; notes go to `result`.
+
+        Args:
+            raw: values as they stand in the file, (N,).
+            column: how they are converted.
+            name: canonical name of the column.
+            where: of the file, for messages.
+            result: takes the notes.
+        """
         return self._convert(raw, column, name, where, result)
 
     def _convert(

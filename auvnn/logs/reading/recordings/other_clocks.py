@@ -33,6 +33,12 @@ _STEP, _REACH = 0.02, 60  # s, and steps to either side, of the second look
 def align(series: list[Series], rules: Mapping[str, TopicRule], where: str, repairs: list[Repair]) -> None:
     """Shift the times of the topics whose offset is to be found; `series` is changed in place.
 
+    Args:
+        series: time series of all topics.
+        rules: of the topics whose offset is to be found, by topic.
+        where: of the file, for messages.
+        repairs: to which what was done is added.
+
     Raises:
         InputError: what such a topic measured has nothing in common with the others, or no shift stands out.
     """

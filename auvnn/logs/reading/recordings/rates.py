@@ -245,7 +245,13 @@ def _commands(
 
 
 def sparse(columns: dict[str, Array], required: Sequence[str], most: float) -> bool:
-    """Say whether a table holds sensors of several rates: more than a share of some required column is missing."""
+    """Say whether a table holds sensors of several rates: more than a share of some required column is missing.
+
+    Args:
+        columns: by name, (N,) each.
+        required: names that are looked at.
+        most: share of missing samples up to which a column counts as full.
+    """
     return any(float(np.isnan(columns[n]).mean()) > most for n in required if n in columns)
 
 

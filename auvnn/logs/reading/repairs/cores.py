@@ -83,7 +83,14 @@ def chosen(
 
 
 def note_switches(table: Table, by: NDArray[Any], source: str, where: str) -> None:
-    """Keep the core in use as the column `reset`, once, and count its switches."""
+    """Keep the core in use as the column `reset`, once, and count its switches.
+
+    Args:
+        table: that is changed.
+        by: number of the core in use, (N,).
+        source: of these numbers, for messages.
+        where: of the file, for messages.
+    """
     if RESET not in table.columns:
         used = _held(by.astype(np.float64))
         table.columns[RESET] = used

@@ -67,6 +67,13 @@ class Validity:
     ) -> tuple[NDArray[np.float64], list[Repair]]:
         """Return the values with those missing that do not count, and their number.
 
+        Args:
+            values: of the column, (N,).
+            table: with the column that says what counts.
+            name: canonical name of the column.
+            where: of the file, for messages.
+            mapping: its name, for messages.
+
         Raises:
             InputError: the file has no such column, or no row of it is good.
         """

@@ -12,7 +12,13 @@ from auvnn.report.words import finite, number, percent
 
 
 def verdict(horizon: str, error: float, held: float | None) -> str:
-    """Return how the model compares with holding the initial velocity."""
+    """Return how the model compares with holding the initial velocity.
+
+    Args:
+        horizon: in words.
+        error: of the model, as a share of the motion's spread.
+        held: of holding the initial velocity, likewise; None where it is unknown.
+    """
     words = f"Running free for {horizon}, the model's error is {percent(error)} of the spread of the motion"
     if held is None:
         return f"{words}."

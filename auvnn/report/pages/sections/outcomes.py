@@ -26,7 +26,13 @@ def rows_of(view: View) -> list[Row]:
 
 
 def text(row: Row, key: str, unknown: str = "?") -> str:
-    """Return one entry that is a text."""
+    """Return one entry that is a text.
+
+    Args:
+        row: of the benchmark.
+        key: of the entry.
+        unknown: what stands where there is none.
+    """
     value = row.get(key)
     return value if isinstance(value, str) and value else unknown
 

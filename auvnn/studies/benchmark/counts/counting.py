@@ -70,7 +70,14 @@ def in_group(row: Row) -> bool:
 
 
 def tied(row: Row, effect: str, others: list[str], limit: float = TIED) -> bool:
-    """Whether the log cannot tell a hidden effect from any of the others: see `information`."""
+    """Whether the log cannot tell a hidden effect from any of the others: see `information`.
+
+    Args:
+        row: of the benchmark.
+        effect: that was hidden.
+        others: that were named.
+        limit: largest distance at which two count as alike.
+    """
     distance = (row.get("plant_imitation") or row.get("imitation") or {}).get(effect) or {}
     return all(distance.get(name) is not None and distance[name] <= limit for name in others)
 

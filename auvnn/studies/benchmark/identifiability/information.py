@@ -25,7 +25,8 @@ from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.layout import FREE, Layout, lay_out
 from auvnn.diagnosis.score_tests.probes import Probed, extent_of, probed
 from auvnn.estimation.normal_equations import TRUST, linearise, motion, normal_equations
-from auvnn.estimation.priors import bounded_step, set_parameters
+from auvnn.estimation.nuisance import NormalEquations
+from auvnn.estimation.priors import set_parameters
 from auvnn.logs import Log
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import CHANNELS, Windows
@@ -96,11 +97,7 @@ class Information:
             high.append(np.full(size, np.inf))
         inner = self.total[np.ix_(columns, columns)] + np.diag(np.concatenate(precision))
         gradient = self.total[np.ix_(columns, mine)] @ away
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(inner), 1e-300))
-        step = unit * bounded_step(
-            inner * unit[:, None] * unit, gradient * unit,
-            np.concatenate(low) / unit, np.concatenate(high) / unit,
-        )  # fmt: skip
+        step = NormalEquations(inner, gradient).bounded(np.concatenate(low), np.concatenate(high))
         whole = away @ self.total[np.ix_(mine, mine)] @ away
         return float(np.sqrt(max(whole - 2 * step @ gradient + step @ inner @ step, 0.0)))
 
@@ -145,7 +142,15 @@ class TruthPoint:
 def truth_point(
     model: GreyBox, log: Log, truth: Truth, rivals: Sequence[str], noise: str | Mapping[str, Any]
 ) -> TruthPoint:
-    """Return where the information is asked for: the truth, with the rivals at their nulls."""
+    """Return where the information is asked for: the truth, with the rivals at their nulls.
+
+    Args:
+        model: nominal.
+        log: whose windows are taken.
+        truth: what is hidden, and the drawn coefficients.
+        rivals: effects that might be taken for it.
+        noise: condition: a name or its options.
+    """
     names = list(dict.fromkeys([*truth.hidden, *rivals]))
     layout = lay_out(model, names)
     at = layout.model.rebuilt(layout.model.copied_effects())

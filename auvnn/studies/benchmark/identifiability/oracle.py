@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.hypotheses.layout import FREE
 from auvnn.diagnosis.score_tests.probes import extent_of
 from auvnn.effects import Parameter, effect_class
-from auvnn.estimation.priors import bounded_step
+from auvnn.estimation.nuisance import NormalEquations
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
 from auvnn.simulation import Simulation
@@ -201,9 +201,8 @@ def _missed(total: Array, mine: int, columns: list[int], known: Sequence[Column]
         return float(np.sqrt(max(whole, 0.0)))
     inner = total[np.ix_(columns, columns)] + np.diag([c.precision for c in known])
     gradient = total[columns, mine]
-    unit = 1.0 / np.sqrt(np.maximum(np.diag(inner), 1e-300))
-    low, high = (np.array([getattr(c, side) for c in known]) / unit for side in ("low", "high"))
-    step = unit * bounded_step(inner * unit[:, None] * unit, gradient * unit, low, high)
+    low, high = (np.array([getattr(c, side) for c in known]) for side in ("low", "high"))
+    step = NormalEquations(inner, gradient).bounded(low, high)
     return float(np.sqrt(max(whole - 2.0 * step @ gradient + step @ inner @ step, 0.0)))
 
 

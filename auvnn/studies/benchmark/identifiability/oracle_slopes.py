@@ -45,7 +45,13 @@ class Course:
 
     @classmethod
     def of(cls, task: PlantTask, motion: Motion, runs: int) -> Course:
-        """Return the course of the first runs of a motion."""
+        """Return the course of the first runs of a motion.
+
+        Args:
+            task: of the plant.
+            motion: that came of it.
+            runs: how many.
+        """
         dt = float(task.t[1] - task.t[0])
         each = max(1, round(FINE / dt))
         rows = np.arange(0, len(task.t), each)
@@ -150,6 +156,11 @@ def transitions(course: Course, effects: Values, correlation: Array) -> Array:
     """Return how a small change of (position, attitude, velocity, wandering force) goes over each step, (R, K, 18, 18).
 
     Position in NED, attitude by a rotation in the body; the force fades with its correlation times, s, (6,).
+
+    Args:
+        course: R runs of K steps.
+        effects: that act, name to parameters.
+        correlation: times of the wandering force, s, (6,).
     """
     kicks = STEP * np.concatenate([np.eye(12), -np.eye(12)])
     found = accelerations(course, effects, kicks)

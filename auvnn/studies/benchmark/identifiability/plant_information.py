@@ -85,7 +85,14 @@ def change(before: Array, after: Array) -> Array:
 
 
 def state_slopes(outputs: PlantOutputs, states: Array, now: Array, effects: Mapping[str, Any]) -> Array:
-    """Return the change with the initial states, (B, L, 18, 12)."""
+    """Return the change with the initial states, (B, L, 18, 12).
+
+    Args:
+        outputs: of the plant, from states and effects.
+        states: initial, (B, 13).
+        now: outputs from these states, (B, L, 18).
+        effects: that act, name to parameters.
+    """
     begin = torch.as_tensor(states)
     kicked = [moved(begin, torch.as_tensor(row).expand(len(begin), 12)) for row in STATE * np.eye(12)]
     after = outputs(torch.cat(kicked).numpy(), effects).reshape(12, *now.shape)

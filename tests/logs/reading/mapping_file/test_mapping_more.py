@@ -13,7 +13,7 @@ from auvnn.errors import AuvnnError, ConfigError, InputError
 from auvnn.logs import Log, Run
 from auvnn.logs.readers.base import Table
 from auvnn.logs.reading.mapping_file.mapping import Mapping
-from auvnn.logs.reading.mapping_file.mapping_more import UNITS
+from auvnn.logs.reading.mapping_file.units import UNITS
 from auvnn.logs.reading.recordings.assemble import from_recording
 from auvnn.logs.recording import Recording, Topic
 from auvnn.logs.signals import differences
@@ -48,7 +48,7 @@ IDENTITY = {
 
 def made(topics: list[Topic], columns: dict[str, Any], /, **more: Any) -> tuple[Run, Table]:
     """Return the run that a mapping makes of topics, by the same steps as from a file."""
-    from auvnn.logs.reading.reading import Collector, collect
+    from auvnn.logs.reading.collect import Collector, collect
 
     plan = Mapping.read({"columns": columns} | more)
     table = from_recording(Recording({t.name: t for t in topics}), plan, "made")
