@@ -11,7 +11,7 @@ def _run(job: Job) -> Answering:
     from auvnn.comparison import compare
     from auvnn.comparison.beside import words
 
-    log = job.log()
+    log = job.log(partial=True)
     comparison = compare(job.model(log), log, horizons=job["horizons"], derivative=job["derivative"])
     comparison.write(job.folder)
     data = comparison.to_dict()

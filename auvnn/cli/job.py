@@ -132,7 +132,7 @@ class Job:
 
     def held_out(self) -> Log | None:
         """Read the log of `test=`, if one is named."""
-        return None if self.options.get("test") is None else self.log("test")
+        return None if self.options.get("test") is None else self.log("test", partial=True)
 
     def warn(self, warnings: list[str]) -> None:
         """Say what the answer warns of."""

@@ -19,6 +19,7 @@ from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.one_step import OneStep, one_step, scores
 from auvnn.metrics.rollouts import HORIZONS, NAMES, Rolled, rollout_table, scale_of
+from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
 from auvnn.models.excursions import region_of, words_of
 from auvnn.threads import on_one_thread
@@ -92,7 +93,7 @@ def compare(
         ConfigError: a horizon that is no positive number.
     """
     wanted = tuple(_horizon(h) for h in horizons)
-    log.refuse_unmeasured()
+    log = completed(model, log)
     how = choose_derivative(log, derivative)
     parts = one_step(model, log, how)
     scale = scale_of(log)
@@ -104,8 +105,8 @@ def compare(
     with np.errstate(invalid="ignore"):
         residual = {
             axis: {
-                "rms": float(np.sqrt(np.nanmean(wrench[:, k] ** 2))),
-                "mean": float(np.nanmean(wrench[:, k])),
+                "rms": float(np.sqrt(_mean(wrench[:, k] ** 2))),
+                "mean": _mean(wrench[:, k]),
                 "noise_floor": float(noise[k]),
             }
             for k, axis in enumerate(AXES)
@@ -122,12 +123,18 @@ def compare(
         residual,
         failures(parts, located, noise),
         _warnings(model, log, rolled),
-        [_series(run.number, run.nu, p, shown) for run, p in zip(log.runs, parts, strict=True)],
+        [_series(run.number, run.measured.nu, p, shown) for run, p in zip(log.runs, parts, strict=True)],
         located,
         noise,
         None,
         beside(rolled, model.actuation, scale, log, how),
     )
+
+
+def _mean(x: Array) -> float:
+    """Return the mean of what is known; NaN where nothing is."""
+    known = x[~np.isnan(x)]
+    return float(np.mean(known)) if len(known) else float("nan")
 
 
 def _horizon(value: str | float) -> str:
@@ -205,7 +212,7 @@ def write_predictions(series: list[dict[str, Any]], path: Path) -> Path:
 
 
 def _warnings(model: GreyBox, log: Log, rolled: dict[str, Rolled]) -> list[str]:
-    found = [*model.vehicle.warnings, *log.quality().reservations]
+    found = [*model.vehicle.warnings, *log.quality().reservations, *assumed(log)]
     if not model.vehicle.has_damping and model.damping is None:
         found.append("the model has no damping at all: train its subnetworks, or state damping in its file")
     gone = {h: int(r.diverged.sum()) for h, r in rolled.items() if r.diverged.any()}

@@ -52,12 +52,14 @@ def locate(log: Log, parts: list[OneStep]) -> dict[str, dict[str, Any]]:
     """Return by regime the bins' edges, the residual's root mean square (6, bins) and the samples in each bin."""
     values = [regimes(run) for run in log.runs]
     wrench = np.concatenate([p.wrench for p in parts])
+    # Degrees of freedom without a sensor have no residual.
+    told = np.isfinite(wrench[:, np.isfinite(wrench).any(0)]).all(1)
     found: dict[str, dict[str, Any]] = {}
     for name in UNITS:
         if not all(name in v for v in values):
             continue
         x = np.concatenate([v[name] for v in values])
-        good = np.isfinite(x) & np.isfinite(wrench).all(1)
+        good = np.isfinite(x) & told
         if good.sum() < 10 * BINS or np.ptp(x[good]) < 1e-9:
             continue
         if name in ("heading", "time", "depth"):
@@ -114,7 +116,9 @@ def failures(
     """
     wrench = np.concatenate([p.wrench for p in parts])
     unit = np.where(floor > 0, floor, 1e-9)
-    energy = np.nanmean((wrench / unit) ** 2, axis=0) - 1.0
+    known = np.isfinite(wrench).any(0)
+    energy = np.full(6, np.nan)
+    energy[known] = np.nanmean((wrench / unit)[:, known] ** 2, axis=0) - 1.0
     energy = np.where(energy > BARELY, energy, 0.0)
     whole = float(energy.sum())
     if not np.isfinite(whole) or whole <= 0:

@@ -24,6 +24,7 @@ from auvnn.estimation.normal_equations import TRUST, motion
 from auvnn.estimation.prediction_error import SINGULAR
 from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
+from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
 from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
@@ -112,6 +113,7 @@ def searched(
     say = progress or (lambda words: None)
     if max_effects < 1:
         raise ConfigError(f"max_effects={max_effects} must be at least 1")
+    log = completed(model, log)
     usable, needs = candidates_for(model, log, effects)
     log.quality().refuse_contradictions(force)
     allowed = Tolerance.of(tolerance)
@@ -136,7 +138,7 @@ def searched(
         advice=advice,
         whiteness=whiteness,
         absorbed=absorbed,
-        notes=(*notes, *doubts(model, log)),
+        notes=(*assumed(log), *notes, *doubts(model, log)),
         say=say,
     )
     try:

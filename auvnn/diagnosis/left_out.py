@@ -25,7 +25,7 @@ from auvnn.diagnosis.left_out_folds import MOST_FOLDS, Fold, folds_of
 from auvnn.errors import InputError
 from auvnn.estimation.prediction_error import SINGULAR, FitError
 from auvnn.logs import Log
-from auvnn.metrics.rollouts import NAMES, Rolled, Scale, roll, scale_of
+from auvnn.metrics.rollouts import Rolled, Scale, roll, scale_of
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 
@@ -89,7 +89,7 @@ class LeftOut:
     @property
     def by_dof(self) -> dict[str, float]:
         """Velocity to its error; NaN where it is not excited."""
-        return {n: float(v) for n, v in zip(NAMES, self.nrmse(), strict=True)}
+        return {n: float(v) for n, v in zip(self.scale.names, self.nrmse(), strict=True)}
 
     @property
     def by_run(self) -> dict[int, float]:
@@ -183,7 +183,7 @@ def gain(before: LeftOut, after: LeftOut) -> Gain:
         with np.errstate(invalid="ignore"):
             std = np.fmax(std, np.sqrt((n - 1) / n * ((values - values.mean(0)) ** 2).sum(0)))
     by_dof = {
-        n: (float(whole[k + 1]), float(std[k + 1])) for k, n in enumerate(NAMES) if np.isfinite(whole[k + 1])
+        n: (float(whole[k + 1]), float(std[k + 1])) for k, n in enumerate(before.scale.names) if np.isfinite(whole[k + 1])
     }
     return Gain(float(whole[0]), float(std[0]), by_dof, before.total, after.total, after.by_dof)
 

@@ -170,17 +170,28 @@ class Log:
     def _quality(self) -> Quality:
         from auvnn.logs.quality.quality import assess
 
-        return assess(self)
+        return assess(self.measured)
 
     def quality(self) -> Quality:
         """Return what was read, repaired, implausible and excited; computed once."""
         return self._quality
 
     @property
+    def measured(self) -> Log:
+        """The log with what was estimated read as missing; itself where nothing was."""
+        return self._part([run.measured for run in self.runs]) if self.estimated else self
+
+    @property
+    def estimated(self) -> tuple[str, ...]:
+        """Channels whose values were estimated and not measured."""
+        return tuple(dict.fromkeys(n for run in self.runs for n in run.estimated))
+
+    @cached_property
     def unmeasured(self) -> list[str]:
         """What a model needs of every sample and no run has measured: of attitude, u, v, w, p, q, r."""
-        absent = [n for i, n in enumerate(VELOCITY) if all(np.isnan(run.nu[:, i]).all() for run in self.runs)]
-        attitude = all(np.isnan(run.quaternion).any(axis=1).all() for run in self.runs)
+        runs = [run.measured for run in self.runs]
+        absent = [n for i, n in enumerate(VELOCITY) if all(np.isnan(run.nu[:, i]).all() for run in runs)]
+        attitude = all(np.isnan(run.quaternion).any(axis=1).all() for run in runs)
         return (["attitude"] if attitude else []) + absent
 
     def refuse_unmeasured(self) -> None:

@@ -49,6 +49,8 @@ class Run:
         voltage: battery, V, (N,).
         reset: counter of the estimator's resets or number of its core, (N,): where it changes, the pose starts afresh.
         extra: columns outside the contract, kept as they were, (N,) each.
+        estimated: channels whose values were not measured but estimated, where a vehicle has no sensor for them: free
+            running starts from them, and nothing is scored or fitted by them.
 
     Raises:
         InputError: shapes disagree, time does not increase, or there are fewer than three samples.
@@ -67,6 +69,7 @@ class Run:
     voltage: Array | None = None
     reset: Array | None = None
     extra: dict[str, Array] = field(default_factory=dict)
+    estimated: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Make every array a read-only float64 view and check the shapes."""
@@ -169,8 +172,22 @@ class Run:
 
     @cached_property
     def channels(self) -> dict[str, Array]:
-        """The columns with at least one sample, by name; `"z" in run.channels` asks for the depth."""
-        return {name: column for name, column in self.columns() if not np.isnan(column).all()}
+        """The measured columns with at least one sample, by name; `"z" in run.channels` asks for the depth."""
+        return {
+            name: column
+            for name, column in self.columns()
+            if name not in self.estimated and not np.isnan(column).all()
+        }
+
+    @cached_property
+    def measured(self) -> Run:
+        """The run with what was estimated read as missing; itself where nothing was."""
+        if not self.estimated:
+            return self
+        nu = self.nu.copy()
+        nu[:, [name in self.estimated for name in VELOCITY]] = np.nan
+        quaternion = np.full_like(self.quaternion, np.nan) if "phi" in self.estimated else self.quaternion
+        return replace(self, nu=nu, quaternion=quaternion, estimated=())
 
     @cached_property
     def outliers(self) -> dict[str, NDArray[np.bool_]]:

@@ -13,6 +13,8 @@ from auvnn.metrics.windows import Windows, cut_windows
 from auvnn.models import GreyBox
 
 HORIZON, WARMUP = 5.0, 3.0
+# Where velocities have no sensor, windows must be long beside the time in which the drag forgets how they began.
+UNSEEN = 10.0
 
 
 def candidates_for(
@@ -41,7 +43,7 @@ def _has(log: Log, channel: str) -> bool:
 
 
 def windows_for(model: GreyBox, log: Log, window: float | None = None) -> Windows:
-    """Cut a log for fitting: windows of 5 s, or shorter where that leaves fewer than twelve.
+    """Cut a log for fitting: windows of 5 s (10 s where velocities have no sensor), or shorter where that leaves fewer than twelve.
 
     Args:
         model: says which commands drive it.
@@ -61,7 +63,8 @@ def windows_for(model: GreyBox, log: Log, window: float | None = None) -> Window
                 f"window={window:g} s is longer than every run of {log.name} (the longest has {longest:.4g} s): "
                 "choose a shorter window, or record longer runs"
             )
-    horizon = float(np.clip(log.duration / 12, 1.0, HORIZON)) if window is None else float(window)
+    most = UNSEEN if any(n in log.estimated for n in "uvw") else HORIZON
+    horizon = float(np.clip(log.duration / 12, 1.0, most)) if window is None else float(window)
     return cut_windows(log, horizon, warmup=WARMUP, kind=model.actuation, partial=True)
 
 
