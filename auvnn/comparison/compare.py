@@ -212,7 +212,7 @@ def write_predictions(series: list[dict[str, Any]], path: Path) -> Path:
 
 
 def _warnings(model: GreyBox, log: Log, rolled: dict[str, Rolled]) -> list[str]:
-    found = [*model.vehicle.warnings, *log.quality().reservations, *assumed(log)]
+    found = [*model.vehicle.warnings, *log.quality().reservations, *assumed(log, model)]
     if not model.vehicle.has_damping and model.damping is None:
         found.append("the model has no damping at all: train its subnetworks, or state damping in its file")
     gone = {h: int(r.diverged.sum()) for h, r in rolled.items() if r.diverged.any()}

@@ -138,7 +138,7 @@ def searched(
         advice=advice,
         whiteness=whiteness,
         absorbed=absorbed,
-        notes=(*assumed(log), *notes, *doubts(model, log)),
+        notes=(*assumed(log, model), *notes, *doubts(model, log)),
         say=say,
     )
     try:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from auvnn.errors import ConfigError, InputError
-from auvnn.logs.channels import VELOCITY
+from auvnn.logs.channels import SCALARS, VELOCITY
 from auvnn.logs.reading.repair import Repair
 from auvnn.logs.run import MIN_SAMPLES, Run
 
@@ -178,7 +178,7 @@ class Log:
 
     @property
     def measured(self) -> Log:
-        """The log with what was estimated read as missing; itself where nothing was."""
+        """The log as it was recorded; itself where nothing was estimated."""
         return self._part([run.measured for run in self.runs]) if self.estimated else self
 
     @property
@@ -269,7 +269,7 @@ class Log:
 def blocks_of(run: Run) -> frozenset[str]:
     """Return the names of the blocks a run has, thrusters and fins with their number."""
     names = {
-        b for b in ("nu_dot", "position", "wrench", "altitude", "voltage") if getattr(run, b) is not None
+        b for b in ("nu_dot", "position", "wrench", *SCALARS) if getattr(run, b) is not None
     }
     for block in ("thrusters", "fins"):
         value = getattr(run, block)

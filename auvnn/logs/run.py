@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import InputError
-from auvnn.logs.channels import ACCELERATION, POSITION, QUATERNION, RESET, VELOCITY, WRENCH
+from auvnn.logs.channels import ACCELERATION, POSITION, QUATERNION, RESET, SCALARS, VELOCITY, WRENCH
 from auvnn.logs.signals.rotation import to_euler
 from auvnn.logs.signals.segments import stretches
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 _WIDTHS = {
     **{"quaternion": 4, "nu": 6, "nu_dot": 6, "position": 3, "wrench": 6},
-    **{"altitude": 0, "voltage": 0, "reset": 0},
+    **dict.fromkeys((*SCALARS, RESET), 0),
 }
 _BLOCKS = {
     "quaternion": QUATERNION,
@@ -47,10 +47,15 @@ class Run:
         fins: fin angles, rad, (N, m).
         altitude: height above the bottom, m, (N,).
         voltage: battery, V, (N,).
+        ballast: volume that changes at constant mass, m3, (N,); larger is lighter.
+        density: of the water, kg/m3, (N,).
+        moving_mass: shift of a moving mass along its axis, m, (N,).
         reset: counter of the estimator's resets or number of its core, (N,): where it changes, the pose starts afresh.
         extra: columns outside the contract, kept as they were, (N,) each.
         estimated: channels whose values were not measured but estimated, where a vehicle has no sensor for them: free
             running starts from them, and nothing is scored or fitted by them.
+        given: measured channels that drive the model rather than check it: nothing is scored by them.
+        recorded: the run as it was recorded, where estimates stand in this one.
 
     Raises:
         InputError: shapes disagree, time does not increase, or there are fewer than three samples.
@@ -70,6 +75,11 @@ class Run:
     reset: Array | None = None
     extra: dict[str, Array] = field(default_factory=dict)
     estimated: tuple[str, ...] = ()
+    given: tuple[str, ...] = ()
+    ballast: Array | None = None
+    density: Array | None = None
+    moving_mass: Array | None = None
+    recorded: Run | None = None
 
     def __post_init__(self) -> None:
         """Make every array a read-only float64 view and check the shapes."""
@@ -181,13 +191,8 @@ class Run:
 
     @cached_property
     def measured(self) -> Run:
-        """The run with what was estimated read as missing; itself where nothing was."""
-        if not self.estimated:
-            return self
-        nu = self.nu.copy()
-        nu[:, [name in self.estimated for name in VELOCITY]] = np.nan
-        quaternion = np.full_like(self.quaternion, np.nan) if "phi" in self.estimated else self.quaternion
-        return replace(self, nu=nu, quaternion=quaternion, estimated=())
+        """The run as it was recorded; itself where nothing was estimated."""
+        return self if self.recorded is None else self.recorded
 
     @cached_property
     def outliers(self) -> dict[str, NDArray[np.bool_]]:
@@ -252,10 +257,12 @@ class Run:
                 changes["extra"] = {k: v[part] for k, v in value.items()}
             elif isinstance(value, np.ndarray):
                 changes[item.name] = value[part]
+        if self.recorded is not None:
+            changes["recorded"] = self.recorded.cut(part, number)
         return replace(self, **changes)
 
 
-_SCALAR = ("altitude", "voltage")
+_SCALAR = SCALARS
 
 
 def _frozen(value: Any, name: str, number: int) -> Array:

@@ -43,7 +43,7 @@ class Coordinates:
 def names_of(log: Log) -> tuple[str, ...]:
     """Return what each of the six velocities is judged by: itself, or a measured coordinate where it has no sensor."""
     absent = [n for n in VELOCITY if n in log.estimated]
-    told = {*POSITION, *EULER} - set(log.estimated)
+    told = {*POSITION, *EULER} - set(log.estimated) - {n for run in log.runs for n in run.given}
     there = {n for n in told if n in EULER or any(n in run.channels for run in log.runs)}
     return tuple(_STANDS_FOR[n] if n in absent and _STANDS_FOR[n] in there else n for n in VELOCITY)
 

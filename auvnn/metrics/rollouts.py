@@ -56,7 +56,8 @@ def scale_of(log: Log) -> Scale:
         names = names_of(log)
         moves, rough = spread(log, names)
         std, noise = np.where(np.isfinite(moves), moves, std), np.where(np.isfinite(moves), rough, noise)
-        counts = np.array([n not in log.estimated for n in names])
+        given = {n for run in log.runs for n in run.given}
+        counts = np.array([n not in log.estimated and n not in given for n in names])
         return Scale(std, counts & (std > EXCITED * np.nan_to_num(noise)) & (std > 1e-9), names)
     return Scale(std, (std > EXCITED * np.nan_to_num(noise)) & (std > 1e-9))
 

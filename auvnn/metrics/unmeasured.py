@@ -23,6 +23,7 @@ from auvnn.logs import Log, Run
 from auvnn.logs.channels import EULER, VELOCITY
 from auvnn.logs.signals.derivatives import LocalPolynomial
 from auvnn.logs.signals.rotation import body_rates, conjugate, continuous, from_euler, rotate
+from auvnn.metrics.gliding import driven, in_plane
 from auvnn.metrics.one_step import OneStepReplay
 from auvnn.models import GreyBox
 
@@ -48,11 +49,15 @@ def completed(model: GreyBox, log: Log) -> Log:
     Raises:
         InputError: neither attitude nor position was measured.
     """
-    if not log.unmeasured or log.estimated:
+    if log.estimated:
+        return log
+    vehicle = model.vehicle
+    if not (log.unmeasured or vehicle.reduced or vehicle.ballast or vehicle.moving_mass):
         return log
     absent = tuple(n for n in log.unmeasured if n in VELOCITY)
     attitude = "attitude" in log.unmeasured
     runs = [_turned(run, attitude) for run in log.runs]
+    runs = [driven(in_plane(run, model), model) for run in runs]
     marks = (*absent, *(EULER if attitude else ()))
     if any(n in absent for n in VELOCITY[:3]):
         positioned = [r.position is not None and np.isfinite(r.position).any(0).all() for r in runs]
@@ -60,19 +65,39 @@ def completed(model: GreyBox, log: Log) -> Log:
         rest = [k for k, p in enumerate(positioned) if not p]
         for k, run in zip(rest, _observed(model, [runs[k] for k in rest], absent), strict=True):
             runs[k] = run
-    return replace(log, runs=tuple(replace(run, estimated=marks) for run in runs))
+    return replace(
+        log,
+        runs=tuple(
+            replace(run, estimated=tuple(dict.fromkeys((*marks, *run.estimated))), recorded=recorded)
+            for run, recorded in zip(runs, log.runs, strict=True)
+        ),
+    )
 
 
-def assumed(log: Log) -> list[str]:
-    """Return in one line what is assumed of a log for what it has no sensor for; nothing where nothing is missing."""
-    absent = list(log.unmeasured)
-    if not absent:
-        return []
-    held = ", ".join(absent)
-    return [
-        f"{held} not measured: where each window starts is estimated with the fit, and only what was measured counts in "
-        "tests, scores and intervals"
-    ]
+def assumed(log: Log, model: GreyBox | None = None) -> list[str]:
+    """Return in a line each what is assumed for what has no sensor, and what a reduced model leaves out.
+
+    Args:
+        log: as recorded, or completed.
+        model: that it is compared with.
+    """
+    found = []
+    if log.unmeasured:
+        found.append(
+            f"{', '.join(log.unmeasured)} not measured: where each window starts is estimated with the fit, and only what "
+            "was measured counts in tests, scores and intervals"
+        )
+    if model is None:
+        return found
+    vehicle = model.vehicle
+    if vehicle.reduced.plane != "full":
+        left = "surge, heave and pitch" if vehicle.reduced.plane == "vertical" else "surge, sway and yaw"
+        found.append(f"{vehicle.name} moves in the {vehicle.reduced.plane} plane: {left} alone count")
+    if vehicle.reduced.attitude == "measured":
+        found.append(f"{vehicle.name} is turned by the measured attitude: nothing is said of moments")
+    if vehicle.ballast is not None and all("density" not in run.channels for run in log.runs):
+        found.append(f"no density measured: {vehicle.water_density:g} kg/m3 throughout")
+    return found
 
 
 def _slope(run: Run, values: Array) -> tuple[Array, Array]:

@@ -139,6 +139,10 @@ class GreyBox(nn.Module):
             fin_frame(_tensor([f.position for f in fins]), _tensor([f.axis for f in fins])) if fins else None,
         )
 
+        reduced = vehicle.reduced
+        keep("kept", np.eye(6)[:, list(reduced.moved)] if reduced else None)
+        keep("turned", np.isin(np.arange(6), reduced.turned).astype(float) if reduced.turned else None)
+
     def _known(self, name: str) -> Any:
         return getattr(self, f"known_{name}")
 
@@ -256,7 +260,14 @@ class GreyBox(nn.Module):
             body = effect.body(body, moment)
         rigid = rigid_body_inertia(body.mass, body.inertia, body.cg)
         total = rigid + body.added_mass
-        return Prepared(body, rigid, body.added_mass, total, torch.linalg.inv(total))
+        return Prepared(body, rigid, body.added_mass, total, self._inverse(total))
+
+    def _inverse(self, total: Tensor) -> Tensor:
+        """Return the inverse of the inertia; of a reduced model, that of the part that forces and moments move."""
+        kept = self._known("kept")
+        if kept is None:
+            return torch.linalg.inv(total)
+        return kept @ torch.linalg.inv(kept.mT @ total @ kept) @ kept.mT
 
     def forward(
         self,
@@ -323,7 +334,12 @@ class GreyBox(nn.Module):
         first, *others = terms.values()
         for term in others:
             first = first + term
-        return matvec(prepared.inverse, first)
+        turned = self._known("turned")
+        if turned is None:
+            return matvec(prepared.inverse, first)
+        # The last three of the command are then the accelerations of the measured attitude, not moments.
+        turning = turned * inputs.command
+        return matvec(prepared.inverse, first - matvec(prepared.total, turning)) + turning
 
     def wrenches(
         self, position: Tensor, rotation: Tensor, nu: Tensor, thrust: Tensor, inputs: Inputs, time: Tensor

@@ -11,6 +11,7 @@ import numpy as np
 
 from auvnn.vehicle.parts import DEFAULT_UNCERTAINTY, Array, DampingElement, Fin, Thruster, freeze
 from auvnn.vehicle.reading import vehicle_from_dict
+from auvnn.vehicle.reduced import Ballast, MovingMass, Reduced
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +42,9 @@ class Vehicle:
         effects: effects that are part of the model, name to parameters.
         source: where the numbers come from.
         warnings: what is doubtful about the file, in words.
+        reduced: which degrees of freedom the model has.
+        ballast: a volume that changes, or None.
+        moving_mass: a mass that is shifted, or None.
     """
 
     name: str
@@ -63,6 +67,9 @@ class Vehicle:
     effects: dict[str, dict[str, Any]] = field(default_factory=dict)
     source: str = ""
     warnings: tuple[str, ...] = ()
+    reduced: Reduced = Reduced()
+    ballast: Ballast | None = None
+    moving_mass: MovingMass | None = None
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
@@ -111,6 +118,11 @@ class Vehicle:
                 data[name] = [part.to_dict() for part in parts]
         if self.reference_voltage is not None:
             data["reference_voltage"] = self.reference_voltage
+        if self.reduced:
+            data["reduced"] = self.reduced.to_dict()
+        for name in ("ballast", "moving_mass"):
+            if getattr(self, name) is not None:
+                data[name] = getattr(self, name).to_dict()
         data["uncertainty"] = dict(self.uncertainty)
         if self.effects:
             data["effects"] = copy.deepcopy(self.effects)

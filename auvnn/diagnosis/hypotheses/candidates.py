@@ -14,7 +14,7 @@ from auvnn.models import GreyBox
 
 HORIZON, WARMUP = 5.0, 3.0
 # Where velocities have no sensor, windows must be long beside the time in which the drag forgets how they began.
-UNSEEN = 10.0
+UNSEEN, MANY = 10.0, 60
 
 
 def candidates_for(
@@ -43,7 +43,7 @@ def _has(log: Log, channel: str) -> bool:
 
 
 def windows_for(model: GreyBox, log: Log, window: float | None = None) -> Windows:
-    """Cut a log for fitting: windows of 5 s (10 s where velocities have no sensor), or shorter where that leaves fewer than twelve.
+    """Cut a log for fitting: windows of 5 s (10 s where velocities have no sensor, sixty samples at least), or shorter where that leaves fewer than twelve.
 
     Args:
         model: says which commands drive it.
@@ -63,7 +63,9 @@ def windows_for(model: GreyBox, log: Log, window: float | None = None) -> Window
                 f"window={window:g} s is longer than every run of {log.name} (the longest has {longest:.4g} s): "
                 "choose a shorter window, or record longer runs"
             )
-    most = UNSEEN if any(n in log.estimated for n in "uvw") else HORIZON
+    most = HORIZON
+    if any(n in log.estimated for n in "uvw"):
+        most = max(UNSEEN, MANY * float(np.median([run.dt for run in log.runs])))
     horizon = float(np.clip(log.duration / 12, 1.0, most)) if window is None else float(window)
     return cut_windows(log, horizon, warmup=WARMUP, kind=model.actuation, partial=True)
 
