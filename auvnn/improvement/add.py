@@ -114,7 +114,13 @@ def _assembled(
         {"step": "noise floor", "error": noise_floor(fits.final, rolled[last][key], test, judged.scale)}
     )
     said = [w for w in (fits.final.effect(n).words() for n in names) if w]
-    warnings = [*log.quality().reservations, *assumed(log, model), *said, *notes, *words(layout, best, judged)]
+    warnings = [
+        *log.quality().reservations,
+        *assumed(log, model),
+        *said,
+        *notes,
+        *words(layout, best, judged),
+    ]
     if key != "5":
         warnings.append(f"no held-out stretch is 5 s long: gain and waterfall are for horizon {key}")
     one_step = objective == "one_step"

@@ -13,7 +13,7 @@ import numpy as np
 
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs.channels import SCALARS, VELOCITY
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.run import MIN_SAMPLES, Run
 
 if TYPE_CHECKING:
@@ -268,9 +268,7 @@ class Log:
 
 def blocks_of(run: Run) -> frozenset[str]:
     """Return the names of the blocks a run has, thrusters and fins with their number."""
-    names = {
-        b for b in ("nu_dot", "position", "wrench", *SCALARS) if getattr(run, b) is not None
-    }
+    names = {b for b in ("nu_dot", "position", "wrench", *SCALARS) if getattr(run, b) is not None}
     for block in ("thrusters", "fins"):
         value = getattr(run, block)
         if value is not None:

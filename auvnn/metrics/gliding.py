@@ -60,7 +60,9 @@ def driven(run: Run, model: GreyBox) -> Run:
         return run
     for name in ("ballast", "moving_mass"):
         if getattr(vehicle, name) is not None and getattr(run, name) is None:
-            raise InputError(f"run {run.number} has no column {name}, by which {vehicle.name} is driven: map it")
+            raise InputError(
+                f"run {run.number} has no column {name}, by which {vehicle.name} is driven: map it"
+            )
     own = np.zeros((run.samples, 6)) if run.wrench is None else run.wrench.copy()
     own = own + _held(_of_drives(run, vehicle))
     if turned:
@@ -98,10 +100,10 @@ def _held(values: Array) -> Array:
 
 
 def _rates(run: Run) -> Array:
-    """Return body rates (N, 3) at the samples whose straight lines between them turn the run's attitude as it was measured.
+    """Return body rates (N, 3) at the samples; straight lines between them turn the run as its attitude was measured.
 
-    omega_k is the mean of what the attitude says of the steps on both sides, and what makes up for a share of the angle by
-    which the attitude that these rates add up to has come off the measured one: no error grows along a run.
+    omega_k is the mean of what the attitude says of the steps on both sides, and what makes up for a share of the angle
+    by which the attitude that these rates add up to has come off the measured one: no error grows along a run.
     """
     middle, mean = of_attitudes(run.t, run.quaternion)
     if len(middle) < 1:

@@ -13,12 +13,18 @@ from auvnn.models import GreyBox
 from auvnn.physics.attitude import quat_conjugate, quat_multiply, quat_to_rotvec
 
 # What is not measured starts where it was estimated, give or take this: rad, m/s, rad/s.
-WIDE = {**dict.fromkeys(("phi", "theta", "psi"), 0.3), **dict.fromkeys("uvw", 0.5), **dict.fromkeys("pqr", 0.5)}
+WIDE = {
+    **dict.fromkeys(("phi", "theta", "psi"), 0.3),
+    **dict.fromkeys("uvw", 0.5),
+    **dict.fromkeys("pqr", 0.5),
+}
 # Steps of the initial states by which free runs are differentiated, and rounds of Gauss and Newton.
 NUDGE, ROUNDS = 1e-4, 3
 
 
-def likely_states(model: GreyBox, windows: Windows, max_step: float | None = None, engine: str = "firm") -> Tensor:
+def likely_states(
+    model: GreyBox, windows: Windows, max_step: float | None = None, engine: str = "firm"
+) -> Tensor:
     """Return the states (B, 13) from which free running follows windows best, what was measured at its measured value.
 
     Of the channels that were estimated and not measured alone, the initial values are those that minimise the squared
@@ -61,15 +67,14 @@ def likely_states(model: GreyBox, windows: Windows, max_step: float | None = Non
             sound = torch.isfinite(square).all((1, 2)) & torch.isfinite(gradient).all(1)
             eye = torch.eye(size, dtype=initial.dtype)
             step = -torch.linalg.solve(
-                torch.where(sound[:, None, None], square, eye), torch.where(sound[:, None], gradient, 0.0 * away)
+                torch.where(sound[:, None, None], square, eye),
+                torch.where(sound[:, None], gradient, 0.0 * away),
             )
             away = best + torch.where(better[:, None], step, 0.25 * (away - best))
     return moved(initial, change(best))
 
 
-def _error(
-    model: GreyBox, windows: Windows, initial: Tensor, max_step: float | None, engine: str
-) -> Tensor:
+def _error(model: GreyBox, windows: Windows, initial: Tensor, max_step: float | None, engine: str) -> Tensor:
     """Return predicted minus measured position, attitude and velocity, (B, L, 12); zero where not measured."""
     eta, nu = predict(model, windows, initial, max_step, engine)
     seen = model.sense(Sensed(eta[..., :3], eta[..., 3:], nu))

@@ -186,7 +186,13 @@ def one_step(model: GreyBox, log: Log, derivative: Derivative) -> list[OneStep]:
             _of_measured(
                 run,
                 OneStep(
-                    run.number, run.t, measured, predicted, gap @ to_wrench, _rms(floor), _rms(floor @ to_wrench)
+                    run.number,
+                    run.t,
+                    measured,
+                    predicted,
+                    gap @ to_wrench,
+                    _rms(floor),
+                    _rms(floor @ to_wrench),
                 ),
                 to_wrench,
             )

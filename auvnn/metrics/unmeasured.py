@@ -84,8 +84,8 @@ def assumed(log: Log, model: GreyBox | None = None) -> list[str]:
     found = []
     if log.unmeasured:
         found.append(
-            f"{', '.join(log.unmeasured)} not measured: where each window starts is estimated with the fit, and only what "
-            "was measured counts in tests, scores and intervals"
+            f"{', '.join(log.unmeasured)} not measured: where each window starts is estimated with the fit, and only "
+            "what was measured counts in tests, scores and intervals"
         )
     if model is None:
         return found
@@ -171,7 +171,9 @@ def _observed(model: GreyBox, runs: list[Run], absent: tuple[str, ...]) -> list[
     position, thrust = gather([r.state.position for r in replays]), gather([r.mean for r in replays])
     times = gather([r.times for r in replays])
     inputs = _joined(replays, pieces, index)
-    sink = gather([np.full(r.samples, np.nan) if v is None else v for r, v in zip(known, vertical, strict=True)])
+    sink = gather(
+        [np.full(r.samples, np.nan) if v is None else v for r, v in zip(known, vertical, strict=True)]
+    )
     normal, free = rotation[..., 2, :], torch.as_tensor(gone, dtype=torch.float64)
     along = (normal * normal * free).sum(-1)
     velocity = torch.nan_to_num(rates[:, 0, :3])
@@ -191,7 +193,9 @@ def _observed(model: GreyBox, runs: list[Run], absent: tuple[str, ...]) -> list[
             count = max(1, int(np.ceil(float(whole.max()) / STEP)))
             for _ in range(count):
                 nu = torch.cat([velocity, rates[:, k, 3:]], dim=-1)
-                rate = model.nu_dot(position[:, k], rotation[:, k], nu, thrust[:, k], row, times[:, k], prepared)
+                rate = model.nu_dot(
+                    position[:, k], rotation[:, k], nu, thrust[:, k], row, times[:, k], prepared
+                )
                 velocity = torch.nan_to_num(velocity + (whole / count)[:, None] * rate[:, :3])
                 velocity = velocity.clamp(-FASTEST, FASTEST)
     told = torch.stack(found, dim=1).numpy()

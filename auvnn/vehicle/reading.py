@@ -12,8 +12,8 @@ from auvnn.vehicle import checks
 from auvnn.vehicle.doubts import doubts
 from auvnn.vehicle.fields import Fields, number, shown
 from auvnn.vehicle.parts import DEFAULT_UNCERTAINTY, Array, DampingElement
-from auvnn.vehicle.reduced import Ballast, MovingMass, Reduced, check_drives
 from auvnn.vehicle.reading_parts import read_element, read_fin, read_thruster, turned
+from auvnn.vehicle.reduced import Ballast, MovingMass, Reduced, check_drives
 
 if TYPE_CHECKING:
     from auvnn.vehicle.vehicle import Vehicle

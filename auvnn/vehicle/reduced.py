@@ -123,5 +123,5 @@ def check_drives(vehicle: Any, where: str) -> None:
     if vehicle.thrusters and (glides or vehicle.reduced.attitude == "measured"):
         what = "reduced: {attitude: measured}" if not glides else "ballast and moving_mass"
         raise ModelError(
-            f"{where}: {what} cannot stand beside thrusters: leave the thrusters out, and log their force as tau_X ... tau_N"
+            f"{where}: {what} cannot stand beside thrusters: leave them out, and log their force as tau_X ... tau_N"
         )

@@ -67,7 +67,7 @@ class Vehicle:
     effects: dict[str, dict[str, Any]] = field(default_factory=dict)
     source: str = ""
     warnings: tuple[str, ...] = ()
-    reduced: Reduced = Reduced()
+    reduced: Reduced = field(default_factory=Reduced)
     ballast: Ballast | None = None
     moving_mass: MovingMass | None = None
 

@@ -1,6 +1,6 @@
 """A real glider without rates and velocities: mass and drag from half of its dives, the depth rate of the other half.
 
-    python experiments/glider/run.py DATA [OUT]
+python experiments/glider/run.py DATA [OUT]
 """
 
 from __future__ import annotations

@@ -43,7 +43,9 @@ def _has(log: Log, channel: str) -> bool:
 
 
 def windows_for(model: GreyBox, log: Log, window: float | None = None) -> Windows:
-    """Cut a log for fitting: windows of 5 s (10 s where velocities have no sensor, sixty samples at least), or shorter where that leaves fewer than twelve.
+    """Cut a log for fitting: windows of 5 s, or shorter where that leaves fewer than twelve.
+
+    Where velocities have no sensor, 10 s, and sixty samples at least.
 
     Args:
         model: says which commands drive it.

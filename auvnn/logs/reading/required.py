@@ -5,8 +5,8 @@ from __future__ import annotations
 from auvnn.errors import InputError
 from auvnn.logs.channels import ACCELERATION, DRIVES, EULER, POSITION, QUATERNION, VELOCITY, WRENCH, numbered
 from auvnn.logs.readers.base import Table
-from auvnn.logs.reading.repair import Repair
-from auvnn.logs.reading.suggest import actuator_columns, hint
+from auvnn.logs.reading.mapping_file.suggest import actuator_columns, hint
+from auvnn.logs.reading.repairs.repair import Repair
 
 
 def check_required(table: Table, where: str) -> None:
@@ -86,7 +86,9 @@ def _words(missing: list[str], commanded: bool, commands: list[str], names: list
         parts.append(f"{columns} {', '.join(missing)} missing")
     wanted = list(missing)
     if not commanded:
-        parts.append("no command: neither thruster_1 ... thruster_n nor tau_X ... tau_N (of a glider, ballast)")
+        parts.append(
+            "no command: neither thruster_1 ... thruster_n nor tau_X ... tau_N (of a glider, ballast)"
+        )
         wanted += list(WRENCH)
     words = f"{where}: {'; '.join(parts)}. {hint(wanted, names)}"
     if not commanded and commands:

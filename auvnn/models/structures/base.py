@@ -39,7 +39,9 @@ class Structure(GreyBox):
     ) -> None:
         """Set up the known part; the member then fills `learned`."""
         if vehicle.reduced:
-            raise ConfigError(f"{vehicle.name} is a reduced model: these structures have all six degrees of freedom")
+            raise ConfigError(
+                f"{vehicle.name} is a reduced model: these structures have all six degrees of freedom"
+            )
         super().__init__(vehicle, effects, None, actuation)
         self.learned = nn.ModuleDict()
 
