@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.answers import Answer, plain
+from auvnn.checks.blind import blind
 from auvnn.checks.doubts import doubts
 from auvnn.comparison.beside import beside
 from auvnn.comparison.locate import AXES, failures, locate
@@ -212,7 +213,7 @@ def write_predictions(series: list[dict[str, Any]], path: Path) -> Path:
 
 
 def _warnings(model: GreyBox, log: Log, rolled: dict[str, Rolled]) -> list[str]:
-    found = [*model.vehicle.warnings, *log.quality().reservations, *assumed(log, model)]
+    found = [*model.vehicle.warnings, *log.quality().reservations, *assumed(log, model), *blind(log)]
     if not model.vehicle.has_damping and model.damping is None:
         found.append("the model has no damping at all: train its subnetworks, or state damping in its file")
     gone = {h: int(r.diverged.sum()) for h, r in rolled.items() if r.diverged.any()}

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from auvnn.checks.blind import blind
 from auvnn.checks.doubts import doubts
 from auvnn.comparison.beside import stands
 from auvnn.diagnosis.answers.answer import Diagnosis
@@ -138,7 +139,7 @@ def searched(
         advice=advice,
         whiteness=whiteness,
         absorbed=absorbed,
-        notes=(*assumed(log, model), *notes, *doubts(model, log)),
+        notes=(*assumed(log, model), *blind(log), *notes, *doubts(model, log)),
         say=say,
     )
     try:

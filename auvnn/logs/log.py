@@ -202,8 +202,8 @@ class Log:
         """
         if self.unmeasured:
             raise InputError(
-                f"log '{self.name}': {', '.join(self.unmeasured)} not measured; comparing and fitting need attitude "
-                "and u, v, w, p, q, r in some samples. `auvnn check` reads such a log; a mapping can make velocities of "
+                f"log '{self.name}': {', '.join(self.unmeasured)} not measured, which this needs in some samples: check, "
+                "compare, diagnose, add and train (objective=rollout) do without; a mapping can make velocities of "
                 "positions (difference: true)"
             )
 

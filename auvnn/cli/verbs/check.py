@@ -53,12 +53,18 @@ def _run(job: Job) -> Answering:
     quality = log.quality()
     if looked:
         quality = replace(quality, files=looked)
-    if job["model"] is not None:
-        log.refuse_unmeasured()
-        from auvnn.checks import check_actuators
+    from auvnn.checks.blind import blind
+    from auvnn.metrics.unmeasured import assumed
 
-        checked = check_actuators(job.model(log), log)
-        quality = quality.with_actuators(checked)
+    quality = quality.with_notes("not measured", [*assumed(log), *blind(log)])
+    if job["model"] is not None:
+        model = job.model(log)
+        if log.unmeasured:
+            job.say("actuators not checked: that needs attitude and u, v, w, p, q, r", style="yellow")
+        else:
+            from auvnn.checks import check_actuators
+
+            quality = quality.with_actuators(check_actuators(model, log))
     quality.write(job.folder)
     findings = quality.to_dict()["findings"]
     for finding in findings:
