@@ -171,7 +171,7 @@ def rollout_table(
         rolled = roll(model, log, horizon, scale)
         if rolled is None:
             out[horizon] = {
-                **{n: {"rmse": None, "nrmse": None} for n in scale.names},
+                **{n: {"rmse": None, "nrmse": None} for n in (*NAMES, *scale.names)},
                 "total": None,
                 "persistence": None,
                 "diverged": 0,
@@ -182,6 +182,8 @@ def rollout_table(
             rmse = np.sqrt(rolled.squared.sum(0) / rolled.count.sum(0))
         nrmse = rolled.nrmse(scale)
         out[horizon] = {
+            # Of a velocity without a sensor nothing is known; what stands in its place has a name of its own.
+            **{n: {"rmse": float("nan"), "nrmse": float("nan")} for n in NAMES if n not in scale.names},
             **{n: {"rmse": float(rmse[k]), "nrmse": float(nrmse[k])} for k, n in enumerate(scale.names)},
             "total": rolled.total(scale),
             "persistence": rolled.total(scale, held=True),

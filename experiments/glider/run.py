@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,7 @@ FILE = "gliderflight_data.npy"
 COLUMNS = ("unix_s", "pressure_bar", "pitch_rad", "drive_cm3", "density", "speed_adcp")
 # Depths, m, between which the record can be used: near the surface it cannot, and the bottom is near below.
 ABOVE, BELOW = 10.0, 35.0
+KEPT = ("rate", "speed")
 
 
 def raw_table(data: Path, path: Path) -> Path:
@@ -108,22 +110,25 @@ def scores(found: list[tuple[Run, np.ndarray, np.ndarray]]) -> dict[str, float]:
         gap, whole = a[good] - b[good], a[good] - a[good].mean()
         out[f"{name}_r2"] = float(1.0 - (gap @ gap) / (whole @ whole))
         out[f"{name}_rmse_m_s"] = float(np.sqrt(np.mean(gap**2)))
-    # Dives and climbs go opposite ways: what is left of the spread within each of them is the harder question.
     return out
 
 
-def study(data: Path, out: Path, say: object = print) -> dict:
+def study(data: Path, out: Path, say: Callable[[str], None] = print) -> dict:
     """Fit on the first half, foretell the second, ask what is missing; return the figures."""
     out.mkdir(parents=True, exist_ok=True)
     first, second = halves(data, out)
     model = load(HERE / "glider.yaml")
     result: dict = {"dives": [len(first.runs), len(second.runs)], "samples": [first.samples, second.samples]}
     result["as_given"] = scores(predicted_rate(model, second))
-    for name, effects in (("fitted", ()), ("with_compressibility", ("compressibility",))):
-        made, values = fitted(model, first, effects)
-        result[name] = {**scores(predicted_rate(made, second)), "parameters": values}
-        print(name, json.dumps(result[name], indent=1))
-    found = diagnose(model, first, whiteness=False, advice=False, costs=False, progress=print)
+    made, values = fitted(model, first)
+    foretold = predicted_rate(made, second)
+    result["fitted"] = {**scores(foretold), "parameters": values}
+    np.savez(
+        out / "foretold.npz",
+        **{f"{k}_{run.number}": x for run, *two in foretold for k, x in zip(KEPT, two, strict=True)},
+    )
+    _write(result, out)
+    found = diagnose(model, first, whiteness=False, advice=False, costs=False, progress=say)
     result["diagnosis"] = {
         "verdict": found.verdict,
         "missing": list(found.missing),
@@ -134,7 +139,14 @@ def study(data: Path, out: Path, say: object = print) -> dict:
             for c in found.candidates[:5]
         ],
     }
+    _write(result, out)
+    made, values = fitted(model, first, ("compressibility",))
+    result["with_compressibility"] = {**scores(predicted_rate(made, second)), "parameters": values}
     return result
+
+
+def _write(result: dict, out: Path) -> None:
+    (out / "result.json").write_text(json.dumps(result, indent=1, default=float))
 
 
 if __name__ == "__main__":
@@ -142,5 +154,5 @@ if __name__ == "__main__":
         sys.exit(f"give the folder that holds {FILE}")
     folder = Path(sys.argv[2] if len(sys.argv) > 2 else "outputs/glider")
     answer = study(Path(sys.argv[1]), folder)
-    (folder / "result.json").write_text(json.dumps(answer, indent=1, default=float))
+    _write(answer, folder)
     print(json.dumps(answer, indent=1, default=float))

@@ -105,7 +105,9 @@ def test_a_plane_model_moves_in_its_plane_as_the_whole_one_does():
     eta = torch.tensor([0.0, 0.0, 5.0, 0.0, 0.3, 0.7], dtype=torch.float64)
     command = torch.tensor([5.0, 0.0, -3.0, 0.0, 1.0, 0.0], dtype=torch.float64)
     nu = torch.tensor([0.5, 0.0, 0.1, 0.0, 0.2, 0.0], dtype=torch.float64)
-    flat = whole.rebuilt([], vehicle=plain_vehicle(**DRAG, center_of_gravity=[0.02, 0.0, 0.05], reduced={"plane": "vertical"}))
+    flat = whole.rebuilt(
+        [], vehicle=plain_vehicle(**DRAG, center_of_gravity=[0.02, 0.0, 0.05], reduced={"plane": "vertical"})
+    )
     torch.testing.assert_close(flat(eta, nu, command), whole(eta, nu, command))
     level = torch.tensor([0.0, 0.0, 5.0, 0.0, 0.0, 0.7], dtype=torch.float64)
     turning = torch.tensor([0.5, 0.1, 0.0, 0.0, 0.0, 0.3], dtype=torch.float64)
