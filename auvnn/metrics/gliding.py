@@ -56,7 +56,7 @@ def driven(run: Run, model: GreyBox) -> Run:
     """
     vehicle = model.vehicle
     turned = vehicle.reduced.attitude == "measured"
-    if not turned and vehicle.ballast is None and vehicle.moving_mass is None:
+    if not vehicle.glides:
         return run
     for name in ("ballast", "moving_mass"):
         if getattr(vehicle, name) is not None and getattr(run, name) is None:

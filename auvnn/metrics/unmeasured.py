@@ -52,7 +52,7 @@ def completed(model: GreyBox, log: Log) -> Log:
     if log.estimated:
         return log
     vehicle = model.vehicle
-    if not (log.unmeasured or vehicle.reduced or vehicle.ballast or vehicle.moving_mass):
+    if not (log.unmeasured or vehicle.reduced or vehicle.glides):
         return log
     absent = tuple(n for n in log.unmeasured if n in VELOCITY)
     attitude = "attitude" in log.unmeasured

@@ -152,6 +152,12 @@ class Vehicle:
         )
 
     @property
+    def glides(self) -> bool:
+        """Whether a log's ballast, moving mass or attitude moves it, and not forces alone."""
+        driven = self.ballast is not None or self.moving_mass is not None
+        return driven or self.reduced.attitude == "measured"
+
+    @property
     def n_thrusters(self) -> int:
         """Number of thrusters."""
         return len(self.thrusters)

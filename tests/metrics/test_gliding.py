@@ -148,6 +148,9 @@ def test_what_a_model_file_says_comes_back():
     assert "reduced" not in plain_vehicle().to_dict()
 
 
+THRUSTER = {"position": [0, 0, 0], "direction": [1, 0, 0], "max_forward": 1, "max_reverse": 1}
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -156,7 +159,7 @@ def test_what_a_model_file_says_comes_back():
         ({"reduced": {"planes": "vertical"}}, "Did you mean"),
         ({"moving_mass": {"axis": [1, 0, 0]}}, "mass is missing"),
         (
-            {"ballast": {}, "thrusters": [{"position": [0, 0, 0], "direction": [1, 0, 0], "max_forward": 1, "max_reverse": 1}]},
+            {"ballast": {}, "thrusters": [THRUSTER]},
             "beside thrusters",
         ),
     ],
