@@ -41,7 +41,7 @@ def final(model: GreyBox, log: Log) -> tuple[np.ndarray, np.ndarray]:
     windows = cut_windows(completed(model, log), np.inf, kind="wrench")
     start = initial_states(model, windows)
     start[:, 7:10] = 0.0
-    eta, nu = predict(model, windows, start)
+    eta, nu = predict(model, windows, start, 1.0)
     pitch = to_euler(eta[0, :, 3:].detach().numpy())[:, 1]
     u, w = nu[0, :, 0].detach().numpy(), nu[0, :, 2].detach().numpy()
     return -np.sin(pitch) * u + np.cos(pitch) * w, pitch
