@@ -134,7 +134,7 @@ def test_a_tracked_vehicle_has_a_course_and_rates(model, whole):
 def test_rates_follow_from_attitudes(model, whole):
     log = completed(model, without(whole, ("p", "q", "r")))
     off = log.runs[0].nu[5:-5, 3:] - whole.runs[0].nu[5:-5, 3:]
-    assert np.sqrt(np.mean(off**2)) < 0.05 * whole.runs[0].nu[:, 3:].std()
+    assert np.sqrt(np.mean(off**2)) < 0.1 * whole.runs[0].nu[:, 3:].std()
 
 
 def test_neither_attitude_nor_position_is_refused(model, whole):
