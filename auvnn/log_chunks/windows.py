@@ -59,7 +59,9 @@ def concatenate_windows(found: Sequence[Plan]) -> Plan:
     notes = tuple(n for plan in found for n in plan.notes)
     if not parts:
         raise InputError(
-            notes[0] if notes else "no stretch of the log is long enough for a window without a gap; a log that lacks a velocity or the "
+            notes[0]
+            if notes
+            else "no stretch of the log is long enough for a window without a gap; a log that lacks a velocity or the "
             "attitude is read whole: stream=false"
         )
     return Plan(
