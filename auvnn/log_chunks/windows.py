@@ -58,12 +58,8 @@ def concatenate_windows(found: Sequence[Plan]) -> Plan:
         taken |= set(new.values())
     notes = tuple(n for plan in found for n in plan.notes)
     if not parts:
-        raise InputError(
-            notes[0]
-            if notes
-            else "no stretch of the log is long enough for a window without a gap; a log that lacks a velocity or the "
-            "attitude is read whole: stream=false"
-        )
+        none = "no stretch of the log is long enough for a window without a gap"
+        raise InputError(notes[0] if notes else f"{none}; one that lacks a velocity is read whole: stream=false")
     return Plan(
         tuple(parts),
         sum(p.samples for p in found),
