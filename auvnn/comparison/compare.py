@@ -134,8 +134,7 @@ def compare(
 
 def _mean(x: Array) -> float:
     """Return the mean of what is known; NaN where nothing is."""
-    known = x[~np.isnan(x)]
-    return float(np.mean(known)) if len(known) else float("nan")
+    return float(np.nanmean(x)) if not np.isnan(x).all() else float("nan")
 
 
 def _horizon(value: str | float) -> str:

@@ -25,7 +25,7 @@ from auvnn.logs.signals.derivatives import LocalPolynomial
 from auvnn.logs.signals.rotation import body_rates, conjugate, continuous, from_euler, rotate
 from auvnn.metrics.gliding import driven, in_plane
 from auvnn.metrics.one_step import OneStepReplay
-from auvnn.models import GreyBox
+from auvnn.models import GreyBox, Inputs
 
 Array = NDArray[np.float64]
 # Seconds on either side over which positions and attitudes are differentiated, and least number of samples.
@@ -164,7 +164,7 @@ def _observed(model: GreyBox, runs: list[Run], absent: tuple[str, ...]) -> list[
     longest = max(p.end - p.first for p in pieces)
     index = [np.minimum(np.arange(p.first, p.first + longest), p.end - 1) for p in pieces]
 
-    def gather(each: list, stack: type = torch.Tensor) -> torch.Tensor:
+    def gather(each: list) -> torch.Tensor:
         return torch.stack([torch.as_tensor(each[p.run])[i] for p, i in zip(pieces, index, strict=True)])
 
     rotation, rates = gather([r.rotation for r in replays]), gather([r.state.nu for r in replays])
@@ -189,7 +189,7 @@ def _observed(model: GreyBox, runs: list[Run], absent: tuple[str, ...]) -> list[
             if k == longest - 1:
                 break
             row = inputs[k]
-            whole = (times[:, k + 1] - times[:, k]).clamp(min=0.0, max=1.0)
+            whole = (times[:, k + 1] - times[:, k]).clamp(min=0.0, max=5.0)
             count = max(1, int(np.ceil(float(whole.max()) / STEP)))
             for _ in range(count):
                 nu = torch.cat([velocity, rates[:, k, 3:]], dim=-1)
@@ -241,7 +241,6 @@ def _pieces(number: int, run: Run) -> list[_Piece]:
 
 def _joined(replays: list[OneStepReplay], pieces: list[_Piece], index: list[Array]) -> list:
     """Return the inputs of all pieces row by row."""
-    from auvnn.models.inputs import Inputs
 
     def stacked(name: str) -> torch.Tensor | None:
         values = [getattr(r.inputs, name) for r in replays]

@@ -26,10 +26,14 @@ def candidates_for(
     names = EFFECTS.names() if wanted is None else list(dict.fromkeys(wanted))
     needs: dict[str, list[str]] = {}
     usable = []
+    # A glider's wrench is worked out from its ballast, the water and its attitude: no actuator stands behind it.
+    of_actuators = {"command", "delay", "respond", "thrust"}
     for name in names:
         kind = EFFECTS.get(name)
         absent = [c for c in kind.channels if not _has(log, c)]
         absent += kind.lacks(model.vehicle, model.actuation)
+        if model.vehicle.glides and of_actuators & {*kind.hooks()}:
+            absent += ["thrusters"]
         needs[name] = absent
         if not absent and (name not in model.effect_names):
             usable.append(name)
