@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from auvnn.models import GreyBox
 HORIZON, WARMUP = 5.0, 3.0
 # Where velocities have no sensor, windows must be long beside the time in which the drag forgets how they began.
 UNSEEN, MANY = 10.0, 60
+# Share of a step between samples that the integrator then takes at most at once.
+STEPS = 0.25
 
 
 def candidates_for(
@@ -73,7 +76,12 @@ def windows_for(model: GreyBox, log: Log, window: float | None = None) -> Window
     if any(n in log.estimated for n in "uvw"):
         most = max(UNSEEN, MANY * float(np.median([run.dt for run in log.runs])))
     horizon = float(np.clip(log.duration / 12, 1.0, most)) if window is None else float(window)
-    return cut_windows(log, horizon, warmup=WARMUP, kind=model.actuation, partial=True)
+    windows = cut_windows(log, horizon, warmup=WARMUP, kind=model.actuation, partial=True)
+    if log.estimated:
+        # A slow log is of a slow vehicle; where these steps turn out too long, the search takes shorter ones.
+        longest = STEPS * float(np.median([run.dt for run in log.runs]))
+        windows = replace(windows, max_step=max(windows.max_step, longest))
+    return windows
 
 
 def check_window_length(window: float | None) -> None:
