@@ -5,6 +5,7 @@ from __future__ import annotations
 from auvnn.effects import EFFECTS
 from auvnn.logs import Log
 from auvnn.logs.channels import EULER, POSITION, VELOCITY
+from auvnn.metrics.unmeasured import assumed
 
 _WORDS = dict(zip(VELOCITY, ("surge", "sway", "heave", "roll", "pitch", "yaw"), strict=True))
 _MOVES = dict(zip(VELOCITY, (*POSITION, *EULER), strict=True))
@@ -46,6 +47,19 @@ def blind(log: Log) -> list[str]:
     return found
 
 
+def words(log: Log, actuators: bool = False) -> list[str]:
+    """Return what a check tells of what has no sensor: what is assumed, and what cannot be told.
+
+    Args:
+        log: as recorded.
+        actuators: whether a check of the actuators was asked for.
+    """
+    found = [*assumed(log), *blind(log)]
+    if actuators and log.unmeasured:
+        found.append("the actuators are not checked: that takes attitude and u, v, w, p, q, r")
+    return found
+
+
 def _reported(name: str) -> tuple[str, ...]:
     """Return the channels of which alone a sensor's fault shows."""
     if name.startswith("velocity_"):
@@ -55,4 +69,4 @@ def _reported(name: str) -> tuple[str, ...]:
     return ()
 
 
-__all__ = ["blind"]
+__all__ = ["blind", "words"]

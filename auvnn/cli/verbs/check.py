@@ -53,18 +53,11 @@ def _run(job: Job) -> Answering:
     quality = log.quality()
     if looked:
         quality = replace(quality, files=looked)
-    from auvnn.checks.blind import blind
-    from auvnn.metrics.unmeasured import assumed
+    from auvnn.checks import blind, check_actuators
 
-    quality = quality.with_notes("not measured", [*assumed(log), *blind(log)])
-    if job["model"] is not None:
-        model = job.model(log)
-        if log.unmeasured:
-            job.say("actuators not checked: that needs attitude and u, v, w, p, q, r", style="yellow")
-        else:
-            from auvnn.checks import check_actuators
-
-            quality = quality.with_actuators(check_actuators(model, log))
+    quality = quality.with_notes("not measured", blind.words(log, job["model"] is not None))
+    if job["model"] is not None and not log.unmeasured:
+        quality = quality.with_actuators(check_actuators(job.model(log), log))
     quality.write(job.folder)
     findings = quality.to_dict()["findings"]
     for finding in findings:
