@@ -22,6 +22,7 @@ __all__ = [
     "Vehicle",
     "adapt",
     "add",
+    "advice",
     "check",
     "compare",
     "diagnose",
@@ -31,7 +32,9 @@ __all__ = [
     "import_model",
     "improve",
     "load",
+    "register_effect",
     "remove",
+    "resid",
     "simulate",
     "train",
     "train_files",
@@ -39,11 +42,14 @@ __all__ = [
 
 if TYPE_CHECKING:
     from auvnn.comparison import compare
+    from auvnn.comparison import compare as resid
     from auvnn.diagnosis import diagnose, diagnose_files
+    from auvnn.effects.registering import register_effect
     from auvnn.exports import export
     from auvnn.imports import import_model
     from auvnn.improvement import add, fleet, improve
     from auvnn.logs import Log, check
+    from auvnn.logs import check as advice
     from auvnn.models import GreyBox, load, remove
     from auvnn.online import adapt
     from auvnn.simulation import simulate
@@ -57,6 +63,7 @@ _WHERE = {
     "Vehicle": "auvnn.vehicle",
     "adapt": "auvnn.online",
     "add": "auvnn.improvement",
+    "advice": "auvnn.logs:check",
     "check": "auvnn.logs",
     "compare": "auvnn.comparison",
     "diagnose": "auvnn.diagnosis",
@@ -66,7 +73,10 @@ _WHERE = {
     "import_model": "auvnn.imports",
     "improve": "auvnn.improvement",
     "load": "auvnn.models",
+    "register_effect": "auvnn.effects.registering",
     "remove": "auvnn.models",
+    # By what users of MATLAB's System Identification Toolbox look for.
+    "resid": "auvnn.comparison:compare",
     "simulate": "auvnn.simulation",
     "train": "auvnn.training",
     "train_files": "auvnn.training",
@@ -76,7 +86,8 @@ _WHERE = {
 def __getattr__(name: str) -> Any:
     if name not in _WHERE:
         raise AttributeError(f"module 'auvnn' has no attribute '{name}'")
-    value = getattr(importlib.import_module(_WHERE[name]), name)
+    module, _, attribute = _WHERE[name].partition(":")
+    value = getattr(importlib.import_module(module), attribute or name)
     globals()[name] = value
     return value
 

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from auvnn.cards import Card, Shown
 from auvnn.catalogue import Catalogue
 from auvnn.errors import InputError, one_line
 
@@ -19,6 +20,9 @@ from auvnn.errors import InputError, one_line
 DRAWERS = Catalogue(
     "report page",
     {
+        "log": "auvnn.report.pages.inputs.log:PAGE",
+        "model": "auvnn.report.pages.inputs.model:PAGE",
+        "comparisons": "auvnn.report.pages.comparisons:PAGE",
         "quality": "auvnn.report.pages.quality:PAGE",
         "comparison": "auvnn.report.pages.comparison:PAGE",
         "diagnosis": "auvnn.report.pages.diagnosis:PAGE",
@@ -36,11 +40,19 @@ DRAWERS = Catalogue(
 )
 
 
+_BARE = {float, type(None)}
+# What a card says last.
+PLOTTED = ".plot() draws it, .report('report.html') writes the page, .to_dict() is the JSON answer"
+
+
 def plain(value: Any) -> Any:
     """Turn numpy and tensors into plain JSON data; NaN and infinity become null."""
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
+        if len(value) > 32 and not set(map(type, value)) - _BARE:
+            # Traces of thousands of numbers: one look at each is enough.
+            return [v if v is None or math.isfinite(v) else None for v in value]
         return [plain(v) for v in value]
     if isinstance(value, (bool, str)) or value is None:
         return value
@@ -104,10 +116,16 @@ def write_text(path: Path, text: str) -> Path:
     return path
 
 
-class Answer:
+class Answer(Shown):
     """Base of everything a verb answers: `to_dict` is the JSON of the public contract."""
 
     kind: ClassVar[str]
+
+    def card(self) -> Card:
+        """Return what the answer says of itself in one line, and what a notebook shows of it."""
+        said = {n: getattr(self, n, None) for n in ("model", "name", "log")}
+        words = " with ".join(v for v in said.values() if isinstance(v, str) and v)
+        return Card(self.kind.capitalize(), words, foot=PLOTTED)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer as plain data, its `schema` first."""

@@ -21,6 +21,11 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     return f"no {kind} called '{name}'.{hint} There are: {', '.join(names)}"
 
 
+def _origin(member: Any) -> tuple[str, str]:
+    """Return where a class was written, by which the same one is known again after its cell has run again."""
+    return str(getattr(member, "__module__", "")), str(getattr(member, "__qualname__", ""))
+
+
 class Catalogue:
     """A table from names to classes, widened by entry points of other packages.
 
@@ -36,6 +41,20 @@ class Catalogue:
         self._table = dict(table)
         self._group = group
         self._outside: dict[str, Any] | None = None
+        self._added: dict[str, Any] = {}
+
+    def register(self, name: str, member: Any) -> None:
+        """Add a member at run time; one of the same origin is replaced, as when a notebook's cell runs again.
+
+        Raises:
+            ConfigError: another member has the name.
+        """
+        if name in self._added and _origin(self._added[name]) != _origin(member):
+            raise ConfigError(f"there is another {self.kind} called '{name}': choose another name")
+        if name not in self._added and name in self and self.get(name) is not member:
+            raise ConfigError(f"{self.kind} '{name}' is in the catalogue already: choose another name")
+        if name in self._added or name not in self:
+            self._added[name] = member
 
     def _others(self) -> dict[str, Any]:
         if self._outside is None:
@@ -46,11 +65,11 @@ class Catalogue:
 
     def names(self) -> list[str]:
         """Return the members' names, ours first, in the order of the table."""
-        return [*self._table, *sorted(self._others())]
+        return [*self._table, *sorted(self._others()), *self._added]
 
     def __contains__(self, name: object) -> bool:
         """Say whether a member has this name."""
-        return name in self._table or name in self._others()
+        return name in self._table or name in self._others() or name in self._added
 
     def get(self, name: str) -> Any:
         """Return the class called `name`.
@@ -63,6 +82,8 @@ class Catalogue:
             return getattr(importlib.import_module(module), attribute)
         if name in self._others():
             return self._others()[name].load()
+        if name in self._added:
+            return self._added[name]
         raise ConfigError(unknown_name(self.kind, name, self.names()))
 
     def build(self, description: str | Mapping[str, Any] | T, base: type[T], key: str, default: str) -> T:

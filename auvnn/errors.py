@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+# Characters of a message: what a file holds may be quoted in it, whatever its length.
+MOST = 2900
+
 
 def one_line(text: object, limit: int = 600) -> str:
     """Return a text, or what an error says, as one line for a person."""
@@ -11,6 +14,11 @@ def one_line(text: object, limit: int = 600) -> str:
 
 class AuvnnError(ValueError):
     """Something in what the user gave cannot be used; the message is one line for a person."""
+
+    def __str__(self) -> str:
+        """Return the message, cut short where something very long was given."""
+        said = super().__str__()
+        return said if len(said) <= MOST else one_line(said, MOST)
 
 
 class InputError(AuvnnError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from auvnn.logs.reading.mapping_file.suggest import likely
 from auvnn.logs.signals.segments import default_gap
 
 SPARK = 60
+_GAPS: weakref.WeakKeyDictionary[Run, float] = weakref.WeakKeyDictionary()
 HEAD = 400
 # What a model needs or can use, in the order of the contract.
 WANTED = (
@@ -135,7 +137,11 @@ def traces(
     """Return the traces of one group of a run between two times, thinned."""
     run = run_of(log, number)
     piece = part(run.t, low, high)
-    return thin(run.t[piece], {name: values[piece] for name, values in series_of(run, group)}, points)
+    series = {name: values[piece] for name, values in series_of(run, group)}
+    # The same for every part of the run, and a sort of all its steps.
+    if run not in _GAPS:
+        _GAPS[run] = default_gap(run.t)
+    return thin(run.t[piece], series, points, _GAPS[run])
 
 
 def findings(quality: Quality) -> list[dict[str, Any]]:

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-KINDS = ("compare", "diagnose", "add", "example")
-ANSWERS = {"compare": "comparison", "diagnose": "diagnosis", "add": "improvement"}
+KINDS = ("compare", "diagnose", "add", "improve", "example")
+ANSWERS = {"compare": "comparison", "diagnose": "diagnosis", "add": "improvement", "improve": "improve"}
+# Answers that hold a model to go on with.
+MODELS = ("improvement", "improve")
 
 
 @dataclass
@@ -21,6 +23,7 @@ class Step:
         effects: what was added to the one before it.
         answer: folder of the improvement that made it.
         error: held-out error, and that of the refitted model without the effects.
+        kind: of the answer: "improvement" for effects that were fitted, "improve" for the whole loop.
     """
 
     source: str
@@ -28,6 +31,7 @@ class Step:
     effects: tuple[str, ...] = ()
     answer: Path | None = None
     error: dict[str, float | None] = field(default_factory=dict)
+    kind: str = "improvement"
 
 
 @dataclass
@@ -60,5 +64,26 @@ def words_of(kind: str, effects: list[str]) -> str:
         "compare": "Comparing model and log",
         "diagnose": "Looking for what is missing",
         "add": f"Fitting {', '.join(effects)}",
+        "improve": "Walking the whole loop",
         "example": "Making the example",
     }[kind]
+
+
+def step_of(kind: str, folder: Path, answer: dict[str, Any]) -> Step:
+    """Return the model that an answer holds as a step of the history.
+
+    Args:
+        kind: "improvement" or "improve".
+        folder: of the answer.
+        answer: its JSON.
+    """
+    falls = [w for w in answer["waterfall"] if w["step"] != "noise floor"]
+    floor = next((w["error"] for w in answer["waterfall"] if w["step"] == "noise floor"), None)
+    error = {"before": falls[0]["error"], "after": falls[-1]["error"], "floor": floor}
+    if kind == "improve":
+        names = tuple(str(s["step"]) for s in answer["steps"])
+        words = f"improved by {', '.join(names)}" if names else "improved by nothing: it stays as given"
+    else:
+        names = tuple(answer["effects"])
+        words = f"with {', '.join(names)}"
+    return Step(str(folder / "model"), words, names, folder, error, kind)

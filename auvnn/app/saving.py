@@ -14,7 +14,7 @@ from auvnn.app.session import Session
 from auvnn.errors import ConfigError, InputError
 
 PATIENCE = 120.0  # s
-ANSWERS = ("comparison", "diagnosis", "improvement")
+ANSWERS = ("comparison", "diagnosis", "improvement", "improve")
 
 
 def save(session: Session, folder: Path) -> list[str]:
@@ -37,9 +37,11 @@ def save(session: Session, folder: Path) -> list[str]:
         session.refuse_busy()
         source, history, answers = session.source, list(session.history), dict(session.answers)
     assert source is not None and source.fit is not None
-    kept = history[-1].answer
+    last = history[-1]
     # The report of the model that is saved, not of a later try that was not kept.
-    wanted = {k: kept if k == "improvement" and kept is not None else answers.get(k) for k in ANSWERS}
+    wanted = {
+        k: last.answer if k == last.kind and last.answer is not None else answers.get(k) for k in ANSWERS
+    }
     places = {kind: place for kind, place in wanted.items() if place is not None}
     _drawn(session, list(places.values()))
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -58,7 +60,9 @@ def save(session: Session, folder: Path) -> list[str]:
         for kind, place in places.items():
             shutil.copy(place / f"{kind}.json", stage / f"{kind}.json")
             if (place / "report.html").is_file():
-                name = "report.html" if kind == "improvement" else f"{kind}.html"
+                # `report.html` is that of the saved model; where none was kept, that of the last fit.
+                main = last.kind if last.answer is not None else "improvement"
+                name = "report.html" if kind == main else f"{kind}.html"
                 shutil.copy(place / "report.html", stage / name)
         write_text(stage / "loop.py", python(told))
         write_text(stage / "commands.sh", commands(told, folder))

@@ -14,7 +14,7 @@ class Told:
     Attributes:
         model: name or path of the model at the beginning.
         kind: "thrusters" or "wrench", by which it is driven.
-        steps: effects that were added and kept, in order.
+        steps: effects that were added and kept, in order; an empty step is a walk of the whole loop.
         diagnosed: whether a diagnosis was made.
         separate: whether a log was held out.
     """
@@ -42,6 +42,11 @@ def commands(told: Told, folder: Path) -> str:
         lines.append(f"auvnn diagnose model={quote(model)} log=log.parquet out=again/diagnose")
     test = " test=test.parquet" if told.separate else ""
     for number, effects in enumerate(told.steps, 1):
+        if not effects:
+            out = f"again/improve_{number}"
+            lines.append(f"auvnn improve model={quote(model)} log=log.parquet{test} out={out}")
+            model = f"{out}/model"
+            continue
         out = f"again/add_{number}"
         effect = effects[0] if len(effects) == 1 else quote(f"[{','.join(effects)}]")
         lines.append(f"auvnn add model={quote(model)} log=log.parquet{test} effect={effect} out={out}")
@@ -76,7 +81,9 @@ def python(told: Told) -> str:
     for effects in told.steps:
         lines += [
             "",
-            f"better = auvnn.add(model, log, {list(effects)!r}{test})",
+            f"better = auvnn.add(model, log, {list(effects)!r}{test})"
+            if effects
+            else f"better = auvnn.improve(model, log{test})",
             "print(better.waterfall)",
             "model = better.model",
         ]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from auvnn.app.jobs.child import Child
-from auvnn.app.records import ANSWERS, KINDS, Job, Step, words_of
+from auvnn.app.records import ANSWERS, KINDS, MODELS, Job, Step, step_of, words_of
 from auvnn.app.script import Told
 from auvnn.app.source import Source
 from auvnn.errors import AuvnnError, ConfigError, one_line
@@ -202,25 +202,23 @@ class Session:
         self.views.pop(kind, None)
         self.stale.discard(kind)
 
-    def keep(self) -> None:
-        """Go on with the model of the last fit.
+    def keep(self, kind: str = "improvement") -> None:
+        """Go on with the model of the last fit, or of the whole loop, by the `kind` of the answer that holds it.
 
         Raises:
             ConfigError: there is none, or it is in the model already.
         """
         with self.lock:
             self.refuse_busy()
-            folder = self.answers.get("improvement")
-            if folder is None or folder in [s.answer for s in self.history]:
-                raise ConfigError("there is no new fit to keep: press Fit first")
-            answer = self.answer("improvement")
-            falls = {step["step"]: step["error"] for step in answer["waterfall"]}
-            error = {"before": answer["waterfall"][0]["error"], "after": answer["waterfall"][-2]["error"],
-                     "floor": falls.get("noise floor")}  # fmt: skip
-            names = tuple(answer["effects"])
-            self.history.append(Step(str(folder / "model"), f"with {', '.join(names)}", names, folder, error))
+            if kind not in MODELS or not self._new(kind):
+                raise ConfigError("there is no new fit to keep: press Fit or Improve first")
+            self.history.append(step_of(kind, self.answers[kind], self.answer(kind)))
             self.taken_back = []
             self._model_changed()
+
+    def _new(self, kind: str) -> bool:
+        """Whether an answer holds a model that has not been kept."""
+        return kind in self.answers and self.answers[kind] not in [s.answer for s in self.history]
 
     def take_back(self) -> None:
         """Go back to the model before the last fit that was kept.
@@ -260,7 +258,7 @@ class Session:
         with self.lock:
             if self.source is None or self.source.log is None or not self.history:
                 raise ConfigError("there is no log and no model yet")
-            steps = tuple(step.effects for step in self.history[1:])
+            steps = tuple(() if step.kind == "improve" else step.effects for step in self.history[1:])
             return Told(self.history[0].source, self.source.log.kind, steps, "diagnosis" in self.answers,
                         self.source.held is not None)  # fmt: skip
 
@@ -285,8 +283,8 @@ class Session:
                      "error": s.error} for s in self.history
                 ],
                 "taken_back": [s.words for s in self.taken_back],
-                "can_keep": "improvement" in self.answers
-                and self.answers["improvement"] not in [s.answer for s in self.history],
+                "can_keep": self._new("improvement"),
+                "can_keep_improved": self._new("improve"),
                 "answers": {k: {"summary": self.summaries[k], "stale": k in self.stale,
                                 "report": (p / "report.html").is_file()} for k, p in self.answers.items()},
                 "job": None if self.job is None else self.job.told(),

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from auvnn.app.logview import columns, findings, guesses, overview, raw_columns
+from auvnn.app.logview import columns, findings, guesses, overview, raw_columns, traces
+from auvnn.app.traces import POINTS
 from auvnn.errors import AuvnnError, one_line
 from auvnn.logs import Log
 from auvnn.logs.reading.mapping_file.mapping import Mapping
@@ -30,6 +31,8 @@ class Source:
         findings: of the quality report, None until they are there.
         sizes: how many of them, by level.
         columns: the canonical columns, as the screen shows them.
+        overview: runs and groups of channels.
+        guesses: which columns of a file probably hold canonical ones.
     """
 
     files: list[Path]
@@ -45,10 +48,13 @@ class Source:
     findings: list[dict[str, Any]] | None = None
     sizes: dict[str, Any] = field(default_factory=dict)
     columns: list[dict[str, Any]] = field(default_factory=list)
+    overview: dict[str, Any] | None = None
+    guesses: dict[str, str] = field(default_factory=dict)
 
     def read(self) -> Source:
         """Read the files; what goes wrong is kept in words."""
         self.raw = raw_columns(self.files[0])
+        self.guesses = guesses(self.raw)
         try:
             Mapping.read(self.mapping or None)
             self.log = Log.read(self.files if len(self.files) > 1 else self.files[0], self.mapping or None,
@@ -60,6 +66,9 @@ class Source:
                 self.fit, self.held, self.words = split(self.log)
             # Worked out once: the first look at a long log should not wait for it.
             self.columns = columns(self.log, self.mapping)
+            self.overview = overview(self.log)
+            for group in ("velocity", "rates", "commands"):
+                traces(self.log, None, group, None, None, POINTS)
         except AuvnnError as error:
             self.error = one_line(error, 2000)
         return self
@@ -90,10 +99,10 @@ class Source:
             "files": [str(p) for p in self.files],
             "mapping": self.mapping,
             "raw": self.raw,
-            "guesses": guesses(self.raw),
+            "guesses": self.guesses,
             "columns": self.columns,
             "unknown": [] if self.log is None else list(self.log.unknown),
-            "overview": None if self.log is None else overview(self.log),
+            "overview": self.overview,
             "fit_runs": [] if self.fit is None else _runs(self.fit),
             "held": None if self.held is None else {"name": self.held.name, "runs": _runs(self.held)},
             "held_words": self.words,

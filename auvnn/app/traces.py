@@ -15,7 +15,9 @@ POINTS = 1600
 DIGITS = 6
 
 
-def thin(t: Array, series: Mapping[str, Array], points: int = POINTS) -> dict[str, Any]:
+def thin(
+    t: Array, series: Mapping[str, Array], points: int = POINTS, gap: float | None = None
+) -> dict[str, Any]:
     """Return records of one run, thinned to about `points` samples on a common time base.
 
     Neighbouring samples share a bucket, of which each series gives its smallest and largest value in the order in
@@ -25,6 +27,7 @@ def thin(t: Array, series: Mapping[str, Array], points: int = POINTS) -> dict[st
         t: time, s, (N,), increasing.
         series: name to values, (N,), NaN where missing.
         points: about how many samples to return.
+        gap: s, a longer step is a gap; worked out from the record where None.
 
     Returns:
         `t` and `series` as lists, null where there is no value; `thinned`, whether anything was left out.
@@ -43,12 +46,13 @@ def thin(t: Array, series: Mapping[str, Array], points: int = POINTS) -> dict[st
         pairs = {name: _extremes(values, edges)[keep] for name, values in series.items()}
         times = times[keep]
     # Judged in the full record: neighbouring points of a thinned one lie a bucket apart.
-    gaps = np.flatnonzero(np.diff(t) > default_gap(t)) if len(t) > 1 else np.zeros(0, dtype=np.intp)
+    longest = default_gap(t) if gap is None and len(t) > 1 else gap
+    gaps = np.flatnonzero(np.diff(t) > longest) if len(t) > 1 else np.zeros(0, dtype=np.intp)
     at = np.unique(np.searchsorted(times, t[gaps], side="right"))
     at = at[(at > 0) & (at < len(times))]
     middle = 0.5 * (times[at - 1] + times[at])
     return {
-        "t": [round(x, 6) for x in np.insert(times, at, middle).tolist()],
+        "t": np.round(np.insert(times, at, middle), 6).tolist(),
         "series": {name: _numbers(np.insert(values, at, np.nan)) for name, values in pairs.items()},
         "thinned": stride > 2,
     }

@@ -53,6 +53,7 @@ class Trial:
         high: float | None = None,
         points: int = POINTS,
         whole: bool = True,
+        judge: bool = True,
     ) -> dict[str, Any]:
         """Run the model free with these effects and no others.
 
@@ -64,6 +65,7 @@ class Trial:
             high: s, end of the traces.
             points: about how many samples to return.
             whole: also return what was measured and what the model as it stands gives, which no slider moves.
+            judge: also work out the error; without it, while a slider moves, there are traces alone.
 
         Returns:
             `traces` of the run: `NAMES` with a trailing 1 as tried, with a trailing 0 as the model stands, and as
@@ -81,8 +83,10 @@ class Trial:
                 raise InputError(
                     f"no stretch of {self.log.name} is {horizon} s long without a gap: choose a shorter one"
                 )
-            judged = shown if horizon == JUDGED else self._rolled(model, JUDGED)
-            before = self._as_given(JUDGED)
+            judged = before = None
+            if judge:
+                judged = shown if horizon == JUDGED else self._rolled(model, JUDGED)
+                before = self._as_given(JUDGED)
         run = run_of(self.log, number)
         piece = part(run.t, low, high)
         kinds = {"1": stitch(shown, run.number, run.nu)}
@@ -91,8 +95,11 @@ class Trial:
         series = {
             f"{name}{kind}": trace[piece, k] for kind, trace in kinds.items() for k, name in enumerate(NAMES)
         }
+        traces = thin(run.t[piece], series, points)
+        if not judge:
+            return {"traces": traces}
         return {
-            "traces": thin(run.t[piece], series, points),
+            "traces": traces,
             "error": self._errors(judged or shown),
             "given": self._errors(before or given),
             "horizon": JUDGED if judged is not None else horizon,

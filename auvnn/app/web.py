@@ -61,7 +61,8 @@ class Pages:
         posts: dict[str, Callable[[Asked], Any]] = {
             "open": self.open, "mapping": self.mapping, "model": self.model, "held": self.held,
             "start": self.start, "stop": lambda asked: self.session.stop(), "try": self.attempt,
-            "keep": lambda asked: self.session.keep(), "take-back": lambda asked: self.session.take_back(),
+            "keep": lambda asked: self.session.keep(str(asked.get("kind", "improvement"))),
+            "take-back": lambda asked: self.session.take_back(),
             "save": self.save,
         }  # fmt: skip
         routes = [Route("/", _page), Route("/api/upload", self.upload, methods=["PUT"])]
@@ -222,7 +223,8 @@ class Pages:
         horizon = str(asked.get("horizon", "full"))
         if horizon not in HORIZONS:
             raise ConfigError(f"horizon {horizon}: choose {', '.join(HORIZONS)}")
-        return self.trial().run(effects, horizon, number, low, high, points, asked.get("whole") is not False)
+        flags = (asked.get("whole") is not False, asked.get("judge") is not False)
+        return self.trial().run(effects, horizon, number, low, high, points, *flags)
 
     def script(self, asked: Asked) -> Any:
         """The commands and the script, and where they would be saved."""

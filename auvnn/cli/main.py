@@ -35,11 +35,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _dispatch(verb: str, rest: list[str]) -> int:
-    if verb in ("--help", "-h", "help", "--version"):
+    if verb in ("help", "--help", "-h") and rest and rest[0] in VERBS:
+        # `auvnn help compare` means `auvnn compare --help`.
+        verb, rest = rest[0], ["--help"]
+    if verb in ("--help", "-h", "help", "--version", "-V", "version"):
         from auvnn import __version__
         from auvnn.cli.overview import overview
 
-        print(f"auvnn {__version__}" if verb == "--version" else overview())
+        print(f"auvnn {__version__}" if verb in ("--version", "-V", "version") else overview())
         return OK
     if verb in PAGES:
         print(PAGES[verb](rest))

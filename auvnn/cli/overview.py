@@ -26,6 +26,7 @@ vehicles    for model=, beside your own YAML file or model folder
 {_wrapped(vehicles)}
 
 pages       auvnn effects [NAME], an effect's equation and parameters; auvnn docs [PAGE], the documentation
+shell       auvnn completion bash|zsh|fish, a script that completes verbs, keys and names; auvnn version
 
 Start with: auvnn demo"""
 

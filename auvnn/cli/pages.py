@@ -36,4 +36,15 @@ def docs(names: Sequence[str]) -> str:
     return "\n".join([*listed, "", "auvnn docs PAGE shows one of them."])
 
 
-PAGES: dict[str, Callable[[Sequence[str]], str]] = {"effects": effects, "docs": docs}
+def complete(words: Sequence[str]) -> str:
+    """Return the completion script of a shell."""
+    from auvnn.cli.completion import completion
+
+    return completion(words)
+
+
+PAGES: dict[str, Callable[[Sequence[str]], str]] = {
+    "effects": effects,
+    "docs": docs,
+    "completion": complete,
+}

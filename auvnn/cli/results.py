@@ -21,4 +21,6 @@ def _number(value: float | None) -> str:
 def _result(result: dict[str, Any]) -> str:
     count = result.get("diverged") or 0
     lost = f", {count} windows diverged" if count else ""
-    return f"error {_number(result['total'])}, persistence {_number(result['persistence'])}{lost}"
+    floor = result.get("noise_floor")
+    noise = "" if floor is None else f", noise alone {_number(floor)}"
+    return f"error {_number(result['total'])}, persistence {_number(result['persistence'])}{noise}{lost}"

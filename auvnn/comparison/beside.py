@@ -63,6 +63,40 @@ def stands(model: GreyBox, log: Log, how: Derivative) -> dict[str, Any]:
     return beside(rolled, model.actuation, scale, log, how)
 
 
+def standing(rollout: Mapping[str, Any], line: Mapping[str, Any]) -> list[str]:
+    """Return how good the model is in free running, best known first: worse than none, than a regression, or near noise.
+
+    Args:
+        rollout: of the comparison, by horizon.
+        line: what `beside` returned.
+    """
+    key = next((h for h in HORIZONS if (rollout.get(h) or {}).get("total") is not None), None)
+    if key is None:
+        return ["no stretch was long enough, or moved enough, to let the model run free"]
+    found = rollout[key]
+    error, held, floor = found["total"], found.get("persistence"), found.get("noise_floor")
+    out = [f"over {key} s of free running the error is {error:.3g} of the spread of the motion"]
+    if held is not None and np.isfinite(held):
+        out.append(f"{_beside(error, held)} holding the initial velocity ({held:.3g})")
+    total = line.get("total") if line.get("horizon") == key else None
+    if total is not None and np.isfinite(total):
+        out.append(f"{_beside(error, total)} a plain regression ({total:.3g})")
+    if floor is not None and np.isfinite(floor):
+        ratio = error / floor if floor > 0 else np.inf
+        near = (
+            "about what noise alone leaves" if ratio < 1.25 else f"{ratio:.2g} times what noise alone leaves"
+        )
+        out.append(f"{near} ({floor:.3g})")
+    return out
+
+
+def _beside(error: float, other: float) -> str:
+    """Return in a word where an error stands beside another; within 5 % they are as good as each other."""
+    if error < 0.95 * other:
+        return "better than"
+    return "no better than" if error <= 1.05 * other else "WORSE than"
+
+
 def words(line: Mapping[str, Any]) -> list[str]:
     """Return in one or two sentences where the model stands beside them; nothing where that is not known."""
     if not line:

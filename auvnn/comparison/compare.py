@@ -10,25 +10,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.answers import Answer, plain
+from auvnn.answers import PLOTTED, Answer, plain
+from auvnn.cards import Card, figure
 from auvnn.checks.blind import blind
 from auvnn.checks.doubts import doubts
-from auvnn.comparison.beside import beside
+from auvnn.comparison.beside import beside, standing
 from auvnn.comparison.locate import AXES, failures, locate
 from auvnn.errors import ConfigError
 from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
+from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.one_step import OneStep, one_step, scores
-from auvnn.metrics.rollouts import HORIZONS, NAMES, Rolled, rollout_table, scale_of
+from auvnn.metrics.rollouts import HORIZONS, NAMES, Rolled, Scale, rollout_table, scale_of
 from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
 from auvnn.models.free_running.excursions import region_of, words_of
+from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
 from auvnn.threads import on_one_thread
 
 Array = NDArray[np.float64]
+# Noise hardly adds to the error of longer free runs, and two more of them would take as long as the comparison.
+FLOOR_SAMPLES = 4000
 
 
-@dataclass
+@dataclass(repr=False)
 class Comparison(Answer):
     """How well a model explains a log; `to_dict` is `comparison.json` of the public contract."""
 
@@ -48,6 +53,25 @@ class Comparison(Answer):
     noise_floor: Array = field(default_factory=lambda: np.zeros(6))
     quality: Any = None
     baseline: dict[str, Any] = field(default_factory=dict)
+
+    def card(self) -> Card:
+        """Return the error of free running, and what it stands beside."""
+        rows = [
+            [
+                "whole run" if h == "full" else f"{h} s",
+                *(figure(r.get(k)) for k in ("total", "persistence", "noise_floor")),
+            ]
+            for h, r in self.rollout.items()
+        ]
+        where = [f"{f['channel']}: {f['where']} ({100 * f['share']:.0f} %)" for f in self.failures[:3]]
+        return Card(
+            f"Comparison of {self.model} with {self.log}",
+            "; ".join(standing(self.rollout, self.baseline)),
+            ["The error sits in " + "; ".join(where) + "."] if where else (),
+            ("free running", "error", "velocity held", "noise floor"),
+            rows,
+            PLOTTED,
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""
@@ -75,8 +99,8 @@ class Comparison(Answer):
 
 @on_one_thread
 def compare(
-    model: GreyBox,
-    log: Log,
+    model: GivenModel,
+    log: GivenLog,
     *,
     horizons: Sequence[str | float] = HORIZONS,
     derivative: Mapping[str, Any] | None = None,
@@ -93,12 +117,15 @@ def compare(
         InputError: the log lacks the commands that drive the model.
         ConfigError: a horizon that is no positive number.
     """
-    wanted = tuple(_horizon(h) for h in horizons)
-    log = completed(model, log)
+    log = as_log(log)
+    model = as_model(model, log)
+    wanted, log = tuple(_horizon(h) for h in horizons), completed(model, log)
     how = choose_derivative(log, derivative)
     parts = one_step(model, log, how)
     scale = scale_of(log)
     rolled_table, rolled = rollout_table(model, log, scale, wanted)
+    for horizon, free in rolled.items():
+        rolled_table[horizon]["noise_floor"] = floor_of(model, free, log, scale)
     wrench = np.concatenate([p.wrench for p in parts])
     noise = _wrench_noise(parts)
     located = locate(log, parts)
@@ -133,13 +160,19 @@ def compare(
 
 
 def _mean(x: Array) -> float:
-    """Return the mean of what is known; NaN where nothing is."""
     return float(np.nanmean(x)) if not np.isnan(x).all() else float("nan")
+
+
+def floor_of(model: GreyBox, rolled: Rolled, log: Log, scale: Scale) -> float:
+    """Return the error that a perfect model would show over the same windows; NaN for very long ones."""
+    if rolled.windows.times.shape[1] > FLOOR_SAMPLES:
+        return float("nan")
+    return noise_floor(model, rolled, log, scale, engine="auto")
 
 
 def _horizon(value: str | float) -> str:
     if value == "full":
-        return "full"
+        return value
     try:
         number = float(value)
     except ValueError:
@@ -184,24 +217,31 @@ def stitch(rolled: Rolled, number: int, nu: Array) -> Array:
     return trace
 
 
-def write_predictions(series: list[dict[str, Any]], path: Path) -> Path:
-    """Write measured and predicted velocities and accelerations and the residual wrench as one Parquet table."""
+def write_predictions(series: list[dict[str, Any]] | Mapping[str, list[dict[str, Any]]], path: Path) -> Path:
+    """Write measured and predicted velocities and accelerations and the residual wrench as one Parquet table.
+
+    Args:
+        series: of one model, or of several by their labels, which become a first column `model`.
+        path: of the table.
+    """
     import os
 
     import polars as pl
 
     frames = []
-    for s in series:
-        columns: dict[str, Any] = {"run": np.full(len(s["t"]), s["run"]), "t": s["t"]}
-        for key, names, suffix in (
-            ("measured", NAMES, ""),
-            ("model", NAMES, "_model"),
-            ("measured_acc", [f"d{n}" for n in NAMES], ""),
-            ("model_acc", [f"d{n}" for n in NAMES], "_model"),
-            ("residual", AXES, "_residual"),
-        ):
-            columns.update({f"{n}{suffix}": s[key][:, k] for k, n in enumerate(names)})
-        frames.append(pl.DataFrame(columns))
+    for label, runs in series.items() if isinstance(series, Mapping) else ((None, series),):
+        for s in runs:
+            columns: dict[str, Any] = {} if label is None else {"model": [label] * len(s["t"])}
+            columns |= {"run": np.full(len(s["t"]), s["run"]), "t": s["t"]}
+            for key, names, suffix in (
+                ("measured", NAMES, ""),
+                ("model", NAMES, "_model"),
+                ("measured_acc", [f"d{n}" for n in NAMES], ""),
+                ("model_acc", [f"d{n}" for n in NAMES], "_model"),
+                ("residual", AXES, "_residual"),
+            ):
+                columns.update({f"{n}{suffix}": s[key][:, k] for k, n in enumerate(names)})
+            frames.append(pl.DataFrame(columns))
     if not frames:
         return path
     path.parent.mkdir(parents=True, exist_ok=True)

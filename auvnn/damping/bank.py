@@ -12,6 +12,7 @@ from torch import Tensor, nn
 from auvnn.catalogue import unknown_name
 from auvnn.damping import DAMPING
 from auvnn.damping.base import AXES, DampingForm
+from auvnn.damping.passive import passive
 from auvnn.damping.region import Region
 from auvnn.errors import ConfigError
 
@@ -58,6 +59,10 @@ class DampingBank(nn.Module):
         self._order = None if order == list(range(6)) else [order.index(axis) for axis in range(6)]
         # What the forms were trained on, where they were: plain numbers that travel with the model, not weights.
         self.region: Region | None = None
+        # Whether the drag as a whole, with what the vehicle's file states, is kept from giving energy; a model sets
+        # `stated` to that drag. Both travel with the model and are not weights.
+        self.passive = False
+        self.stated: nn.Module | None = None
         ones = torch.ones(6, dtype=torch.float64)
         self.register_buffer("input_scale", ones.clone() if input_scale is None else input_scale.clone())
         self.register_buffer("output_scale", ones.clone() if output_scale is None else output_scale.clone())
@@ -66,15 +71,26 @@ class DampingBank(nn.Module):
         """Return the joined forms, each of which answers for its own `axes`."""
         return [form for form in self.forms if isinstance(form, DampingForm)]
 
-    def forward(self, nu: Tensor) -> Tensor:
-        """Return the damping force and moment.
+    def forward(self, nu: Tensor, known: Tensor | None = None) -> Tensor:
+        """Return the damping force and moment; with `passive` so that all drag together never gives energy.
 
         Args:
             nu: velocity relative to the water (..., 6), m/s and rad/s.
+            known: the other drag at `nu` (..., 6), positive against the motion; by default what the vehicle's file
+                states. Without `passive` it does not matter.
 
         Returns:
             d(nu) (..., 6), N and N m, positive where it brakes a positive velocity.
         """
+        own = self.free(nu)
+        if not self.passive:
+            return own
+        if known is None:
+            known = torch.zeros_like(own) if self.stated is None else self.stated(nu)
+        return passive(own, known, nu, self.output_scale / self.input_scale)
+
+    def free(self, nu: Tensor) -> Tensor:
+        """Return what the forms alone say at velocities (..., 6): d(nu) before `passive` limits it, (..., 6)."""
         scaled = nu / self.input_scale
         parts = [form(scaled) for form in self.forms]
         whole = parts[0] if len(parts) == 1 else torch.cat(parts, dim=-1)

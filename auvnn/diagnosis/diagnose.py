@@ -27,6 +27,7 @@ from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
+from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
 from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
 
@@ -38,15 +39,15 @@ LEARNED = (
 
 @on_one_thread
 def diagnose(
-    model: GreyBox,
-    log: Log,
+    model: GivenModel,
+    log: GivenLog,
     effects: str | Sequence[str] | None = None,
     *,
     max_effects: int = 4,
     window: float | None = None,
     advice: bool = True,
     whiteness: bool = True,
-    stochastic: bool = False,
+    stochastic: bool = True,
     force: bool = False,
     tolerance: Any = None,
     costs: bool = True,
@@ -66,8 +67,8 @@ def diagnose(
         window: length of the windows of free running that are fitted, s; by default 5.
         advice: for an ambiguous answer, also work out which manoeuvre would tell the candidates apart.
         whiteness: also test what is left for correlations, before and after; no verdict depends on these tests.
-        stochastic: where a force is left, also ask how commands go between samples, and for effects beside a stochastic
-            force whose law is estimated; takes as long again or longer.
+        stochastic: where a force is left without a name, also ask how commands go between samples, and compare the
+            effects again beside a stochastic force whose law is estimated; takes as long again.
         force: go on with a log that contradicts itself: signs, units, axes.
         tolerance: what does not matter: a number for the cost in free running, with a fifth of it for the force as a
             share of the actuators', or a mapping with `cost` and `force`; by default 0.1 and 0.02. At 0 everything
@@ -79,6 +80,8 @@ def diagnose(
         ConfigError: an unknown effect.
         InputError: the log has too little that can be used, or contradicts itself.
     """
+    log = as_log(log)
+    model = as_model(model, log)
     return searched(
         model,
         log,
@@ -104,7 +107,7 @@ def searched(
     window: float | None = None,
     advice: bool = True,
     whiteness: bool = True,
-    stochastic: bool = False,
+    stochastic: bool = True,
     force: bool = False,
     tolerance: Any = None,
     costs: bool = True,

@@ -21,7 +21,7 @@ DISAGREES = {"double": 1e-9, "float": 1e-3}
 """Difference from the model beyond which what was written is not handed over."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Export(Answer):
     """What an export wrote.
 

@@ -24,7 +24,7 @@ SOURCES = Catalogue(
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Imported(Answer):
     """A vehicle that was read from another simulator's file.
 

@@ -13,6 +13,7 @@ from auvnn.diagnosis.answers.table import values
 from auvnn.diagnosis.fitters import OBJECTIVES
 from auvnn.diagnosis.one_step.fit import left_out_gain
 from auvnn.effects import effect_class
+from auvnn.effects.registering import names_of
 from auvnn.errors import ConfigError
 from auvnn.improvement.added import Improvement
 from auvnn.improvement.fits import GIVEN, REFITTED, Fits, fit_steps, unseen
@@ -24,16 +25,17 @@ from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.rollouts import HORIZONS
 from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
+from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
 from auvnn.threads import on_one_thread
 
 
 @on_one_thread
 def add(
-    model: GreyBox,
-    log: Log,
+    model: GivenModel,
+    log: GivenLog,
     effects: str | Sequence[str],
     *,
-    test: Log | None = None,
+    test: GivenLog | None = None,
     derivative: dict[str, Any] | None = None,
     window: float | None = None,
     force: bool = False,
@@ -60,8 +62,11 @@ def add(
         ConfigError: an unknown effect or objective, an effect that is there already, or one named twice.
         InputError: the same data on both sides, `log` says nothing about an effect, or contradicts itself.
     """
+    log = as_log(log)
+    model = as_model(model, log)
+    test = None if test is None else as_log(test, "test")
     say = progress or (lambda words: None)
-    names, notes = _wanted(effects)
+    names, notes = _wanted(names_of(effects))
     _check_request(model, names)
     held_out = f"{test.name} is held out" if test is not None else ""
     log, test = completed(model, log), None if test is None else completed(model, test)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from auvnn.answers import Answer, plain
+from auvnn.answers import PLOTTED, Answer, plain
+from auvnn.cards import PARAMETER_HEAD, Card, figure, parameter_rows
 from auvnn.models import GreyBox
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, repr=False)
 class Improvement(Answer):
     """What adding effects did; `to_dict` is `improvement.json` of the public contract.
 
@@ -51,6 +52,20 @@ class Improvement(Answer):
     steps: list[dict[str, Any]] = field(default_factory=list)
     by_effect: dict[str, dict[str, Any]] = field(default_factory=dict)
     baseline: dict[str, Any] = field(default_factory=dict)
+
+    def card(self) -> Card:
+        """Return the fall of the held-out error, and the fitted values."""
+        steps = [f"{w['step']} {figure(w['error'])}" for w in self.waterfall]
+        verdict = "accepted" if self.accepted else "not accepted"
+        fall = f"the held-out error falls by {figure(self.gain['value'])} ± {figure(self.gain['std'], 2)}"
+        return Card(
+            f"Improvement of {self.name} by {', '.join(self.effects)}",
+            f"{verdict}: {fall}",
+            [f"Error of free running on {self.test}: {', '.join(steps)}.", *self.warnings[:2]],
+            PARAMETER_HEAD,
+            parameter_rows(self.parameters),
+            f".model is the model with it; {PLOTTED}",
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""

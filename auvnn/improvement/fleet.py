@@ -16,6 +16,7 @@ from auvnn.diagnosis.hypotheses.candidates import (
     check_window_length,
 )
 from auvnn.effects import effect_class
+from auvnn.effects.registering import names_of
 from auvnn.errors import ConfigError, InputError
 from auvnn.executors import Lost, executor_for
 from auvnn.improvement.one_dive import _DAY, Question, dive
@@ -28,7 +29,7 @@ from auvnn.models import GreyBox
 LEVEL = 0.05
 
 
-@dataclass
+@dataclass(repr=False)
 class Fleet(Answer):
     """Values of effects over dives; `to_dict` is `fleet.json`.
 
@@ -98,7 +99,7 @@ def fleet(
         workers: processes.
         executor: who computes: `serial`, `processes`, `ray` or `dask`.
         address: of a Ray or Dask cluster that is running.
-        force: fit dives that contradict themselves, too.
+        force: fit dives that contradict themselves, or in which nothing moves or is driven, too.
         progress: told in words what is being done.
 
     Raises:
@@ -109,6 +110,7 @@ def fleet(
 
     say = progress or (lambda words: None)
     check_window_length(window)
+    effects = names_of(effects)
     names = [effects] if isinstance(effects, str) else list(effects)
     if not names:
         raise ConfigError("effects=[]: name at least one effect to follow over the dives")

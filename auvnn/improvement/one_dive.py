@@ -48,7 +48,7 @@ class Question:
         mapping: of the columns.
         window: length of the windows, s; None: 5, or less where the dive is short.
         windows: at most so many of a dive, evenly spread.
-        force: go on with a log that contradicts itself.
+        force: go on with a log that contradicts itself, or in which nothing moves or is driven.
     """
 
     model: GreyBox
@@ -72,7 +72,7 @@ def dive(question: Question, path: Path) -> dict[str, Any] | str:
 def _fitted(question: Question, path: Path) -> dict[str, Any]:
     model, names = question.model, question.effects
     log = _log(question, path)
-    log.quality().refuse_contradictions(question.force)
+    log.quality().refuse_errors(question.force)
     _, needs = candidates_for(model, log, names)
     for name in names:
         if needs[name]:

@@ -15,14 +15,17 @@ from auvnn.errors import ConfigError, InputError
 from auvnn.logs.channels import SCALARS, VELOCITY
 from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.run import MIN_SAMPLES, Run
+from auvnn.logs.shown import ShownLog
 
 if TYPE_CHECKING:
     from auvnn.logs.quality.quality import Quality
 
 
-@dataclass(frozen=True, eq=False)
-class Log:
+@dataclass(frozen=True, eq=False, repr=False)
+class Log(ShownLog):
     """Runs of one vehicle, and what was done to them on reading.
+
+    `len(log)` is the number of runs, `log[0]` the first of them, `log[1:]` a log of the others, `log["u"]` a column.
 
     Args:
         runs: the runs, with the same columns and different numbers.

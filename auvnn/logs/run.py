@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.cards import Card, Shown
+from auvnn.catalogue import unknown_name
 from auvnn.errors import InputError
-from auvnn.logs.channels import ACCELERATION, POSITION, QUATERNION, RESET, SCALARS, VELOCITY, WRENCH
+from auvnn.logs.channels import ACCELERATION, EULER, POSITION, QUATERNION, RESET, SCALARS, VELOCITY, WRENCH
 from auvnn.logs.signals.rotation import to_euler
 from auvnn.logs.signals.segments import stretches
 
@@ -31,8 +33,8 @@ _BLOCKS = {
 MIN_SAMPLES = 3
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
+@dataclass(frozen=True, eq=False, repr=False)
+class Run(Shown):
     """One run of a log; NaN marks a missing sample, rows of different runs are never joined.
 
     Args:
@@ -90,17 +92,8 @@ class Run:
             raise InputError(f"run {self.number}: t must be finite and strictly increasing")
         object.__setattr__(self, "number", int(self.number))
         object.__setattr__(self, "t", t)
-        for name in (
-            "quaternion",
-            "nu",
-            "nu_dot",
-            "position",
-            "wrench",
-            "thrusters",
-            "fins",
-            *_SCALAR,
-            RESET,
-        ):
+        blocks = ("quaternion", "nu", "nu_dot", "position", "wrench", "thrusters", "fins")
+        for name in (*blocks, *_SCALAR, RESET):
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, self._checked(name, value))
@@ -117,6 +110,32 @@ class Run:
             wanted = f"({len(self.t)},)" if width == 0 else f"({len(self.t)}, {width or 'n'})"
             raise InputError(f"run {self.number}: '{name}' has shape {array.shape}, expected {wanted}")
         return array
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.t)
+
+    def __getitem__(self, name: str) -> Array:
+        """Return a column (N,) by its name, `phi`, `theta` and `psi` among them.
+
+        Raises:
+            InputError: the run has no such column; the message offers the nearest name.
+        """
+        if name in EULER:
+            return self.euler[:, EULER.index(name)]
+        columns = dict(self.columns())
+        if name not in columns:
+            raise InputError(unknown_name(f"column of run {self.number}", str(name), [*columns, *EULER]))
+        return columns[name]
+
+    def __contains__(self, name: object) -> bool:
+        """Say whether the run has a column of this name."""
+        return name in EULER or name in dict(self.columns())
+
+    def card(self) -> Card:
+        """Return the run's length, rate and columns."""
+        line = f"{self.samples} samples over {self.duration:.4g} s at {1.0 / self.dt:.3g} Hz, driven by {self.kind}"
+        return Card(f"Run {self.number}", line, [f"Columns: {', '.join(self.channels)}."])
 
     @property
     def samples(self) -> int:

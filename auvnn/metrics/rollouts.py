@@ -174,6 +174,7 @@ def rollout_table(
                 **{n: {"rmse": None, "nrmse": None} for n in (*NAMES, *scale.names)},
                 "total": None,
                 "persistence": None,
+                "noise_floor": None,
                 "diverged": 0,
                 "windows": 0,
             }

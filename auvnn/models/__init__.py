@@ -13,6 +13,7 @@ from auvnn.models.grey_box import GreyBox
 from auvnn.models.inputs import Inputs
 from auvnn.models.loading import from_vehicle, load, remove
 from auvnn.models.saving import save
+from auvnn.models.taking import as_log, as_model
 
 __all__ = [
     "Divergence",
@@ -20,6 +21,8 @@ __all__ = [
     "Inputs",
     "Prepared",
     "Trajectory",
+    "as_log",
+    "as_model",
     "from_vehicle",
     "load",
     "remove",

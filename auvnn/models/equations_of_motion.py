@@ -10,6 +10,7 @@ from torch import Tensor, nn
 
 from auvnn.effects import Body, Effect, Moment, Sensed
 from auvnn.errors import ConfigError
+from auvnn.models.accepting import as_tensor, own
 from auvnn.models.actuation.actuators import Actuators
 from auvnn.models.inputs import Inputs
 from auvnn.physics.attitude import quat_to_matrix
@@ -64,6 +65,11 @@ class EquationsOfMotion(nn.Module):
     def _known(self, name: str) -> Any:
         return getattr(self, f"known_{name}")
 
+    @property
+    def passive(self) -> bool:
+        """Whether the subnetworks are kept from making the drag as a whole give energy."""
+        return bool(getattr(self.damping, "passive", False))
+
     def using(self, hook: str) -> list[Effect]:
         """Return the effects that override a hook, in order of action."""
         return self._by_hook[hook]
@@ -96,8 +102,7 @@ class EquationsOfMotion(nn.Module):
 
     def _inverse(self, total: Tensor) -> Tensor:
         """Return the inverse of the inertia; of a reduced model, that of the part that forces and moments move."""
-        kept = self._known("kept")
-        if kept is None:
+        if (kept := self._known("kept")) is None:
             return torch.linalg.inv(total)
         return kept @ torch.linalg.inv(kept.mT @ total @ kept) @ kept.mT
 
@@ -114,6 +119,8 @@ class EquationsOfMotion(nn.Module):
     ) -> Tensor:
         """Return the acceleration, with the actuators settled at their commands.
 
+        Numpy arrays and lists are taken too, and tensors that are less precise than the model.
+
         Args:
             eta: position and attitude (..., 7) with a quaternion (w, x, y, z), or (..., 6) with Euler angles.
             nu: velocity (..., 6), m/s and rad/s, over ground, of the body origin.
@@ -129,6 +136,10 @@ class EquationsOfMotion(nn.Module):
         Raises:
             ConfigError: the last size of a tensor is not what the model takes.
         """
+        like = own(self)
+        eta, nu = as_tensor(eta, like, "eta"), as_tensor(nu, like, "nu")
+        command, fins = as_tensor(command, like, "command"), as_tensor(fins, like, "fins")
+        voltage, altitude = as_tensor(voltage, like, "voltage"), as_tensor(altitude, like, "altitude")
         sizes = (eta.shape[-1:], nu.shape[-1:], command.shape[-1:])
         if sizes[0] not in ((6,), (7,)) or sizes[1:] != ((6,), (self.actuators.size,)):
             raise ConfigError(
@@ -166,11 +177,10 @@ class EquationsOfMotion(nn.Module):
         first, *others = terms.values()
         for term in others:
             first = first + term
-        turned = self._known("turned")
-        if turned is None:
+        if self._known("turned") is None:
             return matvec(prepared.inverse, first)
         # The last three of the command are then the accelerations of the measured attitude, not moments.
-        turning = turned * inputs.command
+        turning = self._known("turned") * inputs.command
         return matvec(prepared.inverse, first - matvec(prepared.total, turning)) + turning
 
     def wrenches(
@@ -234,7 +244,12 @@ class EquationsOfMotion(nn.Module):
             law = body.element_linear.flatten(-2) + body.element_quadratic.flatten(-2) * own.abs()
             terms["damping elements"] = -matvec(to_parts.mT, law * own)
         if self.damping is not None:
-            terms["damping subnetworks"] = -self.damping(nu_r)
+            if self.passive:
+                stated = [terms[name] for name in DRAG_TERMS if name in terms]
+                learned = self.damping(nu_r, -sum(stated, torch.zeros_like(nu_r)))
+            else:
+                learned = self.damping(nu_r)
+            terms["damping subnetworks"] = -learned
         terms["restoring"] = -restoring_force(rotation, body.weight, body.buoyancy, body.hangs, body.cb)
         if self._known("fin_area") is not None:
             # Fins whose angles are not known are still there: they are taken as held at zero.

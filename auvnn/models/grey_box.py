@@ -13,11 +13,14 @@ import torch
 from torch import Tensor, nn
 
 from auvnn.effects import HOOKS, Effect, effect_class
+from auvnn.effects.registering import values_of
 from auvnn.errors import ConfigError
 from auvnn.models.actuation.actuators import Actuators
 from auvnn.models.equations_of_motion import EquationsOfMotion
 from auvnn.models.inputs import Inputs
-from auvnn.models.saving import REGION, SUBNETWORKS, save
+from auvnn.models.saving import PASSIVE, REGION, SUBNETWORKS, save
+from auvnn.models.shown import ShownModel
+from auvnn.models.stated_drag import StatedDrag
 from auvnn.physics.drag import element_transform
 from auvnn.physics.fins import fin_frame
 from auvnn.vehicle import Vehicle
@@ -39,7 +42,7 @@ def _tensor(value: Any) -> Tensor:
 _WITHOUT: weakref.WeakKeyDictionary[nn.Module, GreyBox] = weakref.WeakKeyDictionary()
 
 
-class GreyBox(EquationsOfMotion):
+class GreyBox(ShownModel, EquationsOfMotion):
     """Fossen's equations of one vehicle, with damping subnetworks and effects.
 
     M_RB nu_dot + C_RB(nu) nu + M_A nu_r_dot + C_A(nu_r) nu_r + D(nu_r) nu_r + d(nu_r) + g(eta) = tau
@@ -71,6 +74,8 @@ class GreyBox(EquationsOfMotion):
         self.actuation = actuation or ("thrusters" if vehicle.thrusters else "wrench")
         self.actuators = Actuators(vehicle, self.actuation)
         self.damping = damping
+        if damping is not None and self.passive:
+            damping.stated = StatedDrag(vehicle).to(damping.output_scale)
         members = list(effects)
         names = [e.name for e in members]
         for effect in members:
@@ -149,11 +154,11 @@ class GreyBox(EquationsOfMotion):
         )
 
     def with_effects(self, wanted: Sequence[str] | Mapping[str, Mapping[str, float] | None]) -> GreyBox:
-        """Return the model with further effects, at the given values or at their nulls.
+        """Return the model with further effects (names, classes, instances), at the given values or at their nulls.
 
         The new model has parameters of its own; damping subnetworks and present effects are copied.
         """
-        values = wanted if isinstance(wanted, Mapping) else dict.fromkeys(wanted)
+        values = values_of(wanted)
         new = [effect_class(n).build(self.vehicle, self.actuation, v) for n, v in values.items()]
         return self.rebuilt([*self.copied_effects(), *new])
 
@@ -235,6 +240,8 @@ class GreyBox(EquationsOfMotion):
         described: dict[str, Any] = {SUBNETWORKS: self.damping.describe()}
         if self.damping.region is not None:
             described[REGION] = self.damping.region.to_dict()
+        if self.passive:
+            described[PASSIVE] = True
         return described, self.damping.state_dict()
 
     def save(self, folder: str | Path, *, overwrite: bool = False) -> Path:

@@ -10,9 +10,19 @@ from auvnn.config import parse_yaml
 from auvnn.damping.bank import DampingBank
 from auvnn.damping.region import Region
 from auvnn.effects import Effect, effect_class
+from auvnn.effects.registering import names_of
 from auvnn.errors import ConfigError, ModelError
 from auvnn.models.grey_box import GreyBox
-from auvnn.models.saving import MODEL, REGION, STRUCTURE, SUBNETWORKS, UNCERTAINTY, WEIGHTS, reads_again
+from auvnn.models.saving import (
+    MODEL,
+    PASSIVE,
+    REGION,
+    STRUCTURE,
+    SUBNETWORKS,
+    UNCERTAINTY,
+    WEIGHTS,
+    reads_again,
+)
 from auvnn.models.structures import build_structure
 from auvnn.models.structures.base import Structure
 from auvnn.storage import folder_exists, read_folder, tensors_from_bytes
@@ -60,9 +70,16 @@ def load(source: str | Path, actuation: str | None = None) -> GreyBox:
 def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None = None) -> GreyBox:
     """Return the model that the files of a folder describe; see `contents`."""
     # Parsed from the bytes whose hash was checked, not from the file, which may have changed since.
-    data: dict[str, Any] = parse_yaml(files[MODEL].decode("utf-8"), str(path / MODEL))
+    try:
+        text = files[MODEL].decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise ModelError(
+            f"{path / MODEL}: is not UTF-8 text (byte {error.start}): save the model again"
+        ) from None
+    data: dict[str, Any] = parse_yaml(text, str(path / MODEL))
     networks = data.pop(SUBNETWORKS, None)
     region = data.pop(REGION, None)
+    passive = data.pop(PASSIVE, False)
     structure = data.pop(STRUCTURE, None)
     saved_actuation = data.pop("actuation", None)
     vehicle = Vehicle.from_dict(data, where=str(path / MODEL))
@@ -81,6 +98,9 @@ def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None 
             raise ModelError(
                 f"{path / WEIGHTS}: {name} must be positive in each direction: train the model again"
             )
+    if not isinstance(passive, bool):
+        raise ModelError(f"{path / MODEL}: {PASSIVE} is {passive!r}: save the model again")
+    bank.passive = passive
     bank.region = None if region is None else Region.read(region, str(path / MODEL))
     return GreyBox(model.vehicle, model.copied_effects(), bank, model.actuation)
 
@@ -115,6 +135,7 @@ def remove(model: GreyBox, effects: str | list[str]) -> GreyBox:
     Raises:
         ConfigError: the model has no such effect.
     """
+    effects = names_of(effects)
     names = [effects] if isinstance(effects, str) else list(effects)
     for name in names:
         model.effect(name)

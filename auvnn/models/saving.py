@@ -17,6 +17,7 @@ SUBNETWORKS = "damping_subnetworks"
 STRUCTURE = "structure"
 UNCERTAINTY = "uncertainty"
 REGION = "trained_region"
+PASSIVE = "passive_drag"
 
 _readers: list[Callable[[Mapping[str, bytes], Path], object]] = []
 

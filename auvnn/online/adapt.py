@@ -14,8 +14,9 @@ from torch import Tensor
 from auvnn.answers import Answer, plain
 from auvnn.damping.bank import Description
 from auvnn.errors import ConfigError, InputError
-from auvnn.logs import Log, Run
+from auvnn.logs import Run
 from auvnn.models import GreyBox
+from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
 from auvnn.online.adapter import Adapter
 from auvnn.online.frozen import frozen_errors
 from auvnn.online.guards import REASONS, Guards
@@ -33,7 +34,7 @@ HORIZON, EVERY = 5.0, 1.0
 ROWS = 400
 
 
-@dataclass
+@dataclass(repr=False)
 class Adaptation(Answer):
     """How an adaptation went; `to_dict` is `adaptation.json` of the public contract."""
 
@@ -65,8 +66,8 @@ class Adaptation(Answer):
 
 
 def adapt(
-    model: GreyBox,
-    log: Log,
+    model: GivenModel,
+    log: GivenLog,
     scheme: str | Mapping[str, Any] = "rls",
     *,
     guards: Guards | str | Mapping[str, Any] | None = "full",
@@ -89,6 +90,8 @@ def adapt(
         ConfigError: an unknown scheme, guard or option.
         InputError: the log is driven otherwise than the model.
     """
+    log = as_log(log)
+    model = as_model(model, log)
     log.refuse_unmeasured()
     if model.vehicle.reduced or model.vehicle.glides:
         raise InputError(

@@ -11,7 +11,7 @@ from torch import Tensor
 from auvnn.online import state
 from auvnn.online.adapter_parts import AdapterParts
 from auvnn.online.guards import REASONS
-from auvnn.online.intake import refusal, sample_of
+from auvnn.online.intake import refusal, sample_of, turned
 from auvnn.online.residual import Residual, Sample
 from auvnn.online.schemes.base import Lesson
 from auvnn.online.update import Update
@@ -91,6 +91,9 @@ class Adapter(AdapterParts):
         if sample is None:
             # The next sample is compared across the hole, unless it is longer than `max_gap`.
             return self._no(float("nan"), "not_finite")
+        sample = turned(sample)
+        if sample is None:
+            return self._no(float("nan"), "no_rotation")
         last = self._predictor.last
         why = refusal(sample, last, self.guards, now)
         if why is not None:
@@ -102,7 +105,9 @@ class Adapter(AdapterParts):
         if not fault and self._passed_over(sample):
             self._predictor.skip(sample)
             return self._no(sample.t, "at_rest")
-        if fault:
+        if self.guards.enabled and self._lost(last, sample):
+            self._off_until, self._off_cause = sample.t + self.guards.hold, "positions_disagree"
+        elif fault:
             self._off_until, self._off_cause = sample.t + self.guards.hold, "fault_flagged"
         elif self.guards.enabled and self._consistency.faulty(last, sample):
             self._off_until, self._off_cause = sample.t + self.guards.hold, "inconsistent"
@@ -113,6 +118,22 @@ class Adapter(AdapterParts):
         if found is None:
             return self._no(sample.t, "first")
         return self._learn(found, sample, dt)
+
+    def _lost(self, last: Sample | None, sample: Sample) -> bool:
+        """Whether positions contradict the velocity; what was learned while that began to show is taken back."""
+        before = self._positions.wrong
+        now = self._positions.disagree(last, sample)
+        if now and not before:
+            weights, scheme = self._trusted.back()
+            if not torch.equal(weights, self.weights.read()):
+                self.counts.reverted += 1
+            self.weights.write(weights)
+            self.scheme.load(scheme)
+            self._shadow.close(weights, scheme)
+            self._trial.begin(self.weights)
+        elif not now and sample.t >= self._off_until and self._trusted.due(sample.t):
+            self._trusted.keep(sample.t, self.weights.read(), self.scheme.state())
+        return now
 
     def _passed_over(self, sample: Sample) -> bool:
         """Whether this is one of the many samples at rest that are not looked at, ever rarer as rest goes on."""
@@ -132,9 +153,10 @@ class Adapter(AdapterParts):
         bank, guards = self.weights.bank, self.guards
         value, slope = self.weights.jacobian(found.nu)
         error = found.error / bank.output_scale
-        target = value + error
+        target = self.weights.limited(found.nu) + error
+        error = target - value
         inertia = self._predictor.inertia(found.sample)
-        original = target - self._original.value(found.nu)
+        original = target - self._original.limited(found.nu)
         told: dict[str, Any] = {
             "residual": found.error,
             "prediction_error": found.acceleration,

@@ -19,11 +19,13 @@ from auvnn.online.consistency import Consistency
 from auvnn.online.counts import Counts
 from auvnn.online.guards import Guards, build_guards
 from auvnn.online.noise import Gate, NoiseLevel
+from auvnn.online.positions import Positions
 from auvnn.online.residual import Predictor, Sample
 from auvnn.online.schemes.base import OnlineScheme, anchors, build_online_scheme
 from auvnn.online.updates.bounds import Bounds, known_drag
 from auvnn.online.updates.shadow import Shadow
 from auvnn.online.updates.trial import Trial
+from auvnn.online.updates.trusted import Trusted
 from auvnn.online.updates.weights import Weights
 
 # Scales of subnetworks that an adapter adds itself: of velocity, and of acceleration for the force.
@@ -62,6 +64,10 @@ class AdapterParts:
         assert bank is not None
         self.weights = Weights(bank, self.scheme.layers)
         self._original = Weights(copy.deepcopy(bank), self.scheme.layers)
+        if self.guards.enabled and self.guards.dissipative:
+            bank.passive = True
+            own = self._model
+            self._model = GreyBox(own.vehicle, own.copied_effects(), bank, own.actuation)
         self.scheme.start(self.weights, known_drag(self._model, anchors(self.weights)) / bank.output_scale)
         self._predictor = Predictor(self._model)
         self._noise = NoiseLevel(self.guards.noise_floor)
@@ -71,6 +77,8 @@ class AdapterParts:
         self._trial = Trial(self.weights, self.guards.proof if self.guards.enabled else 0.0)
         self._bounds = Bounds(self.weights, self.guards)
         self._consistency = Consistency()
+        self._positions = Positions()
+        self._trusted = Trusted(self.weights.read(), self.scheme.state())
         self._monitor = Monitor(self._unadapted(), bank.output_scale) if watch else None
         self._held: list[tuple[Sample, Tensor, Tensor]] = []
         self._off_until = -float("inf")
@@ -130,6 +138,8 @@ class AdapterParts:
         """Begin another run, whose time may start again: nothing is compared across the gap; weights stay."""
         self._predictor.forget_all()
         self._consistency.forget()
+        self._positions.forget()
+        self._trusted.restart()
         self._gate.clear()
         self._held, self._resting, self._off_until = [], 0, -float("inf")
         if self._shadow.since is not None:

@@ -73,7 +73,8 @@ class Consistency:
         found = np.full(12, np.nan)
         found[:3] = (turn - middle[3:]).numpy()
         moved = sample.eta[:3] - last.eta[:3]
-        if bool((sample.eta[:3] != 0).any()) and bool((last.eta[:3] != 0).any()):
+        # Positions that come more rarely than velocities stand still between two of them: `Positions` judges those.
+        if bool((sample.eta[:3] != 0).any()) and bool((last.eta[:3] != 0).any()) and bool((moved != 0).any()):
             way = quat_to_matrix(last.eta[3:]).mT @ moved / dt
             # The body turns while it goes: half a turn's worth of the way, to first order.
             way = way - 0.5 * torch.linalg.cross(turn * dt, way)

@@ -12,11 +12,13 @@ from auvnn.errors import ConfigError
 # Why a sample was not learned from; the keys are counted, the words are for people.
 REASONS = {
     "not_finite": "a number is missing or not finite: the model is held",
+    "no_rotation": "the attitude's quaternion is zero or far from length one: no rotation",
     "repeated": "the sample repeats the last one: a frozen sensor or a message sent twice",
     "out_of_order": "the sample is older than the last one",
     "stale": "the sample is too old when it arrives",
     "fault_flagged": "a sensor fault is flagged: adaptation is off",
     "inconsistent": "sensors contradict one another: adaptation is off",
+    "positions_disagree": "the velocity does not lead from position to position: adaptation is off until it does",
     "over_budget": "the last update took longer than its time: this sample is skipped, not queued",
     "first": "nothing to compare with yet",
     "at_rest": "at rest the damping is not excited",
@@ -51,7 +53,8 @@ class Guards:
         bound: no weight leaves its start by more than this many times its row's size.
         output_bound: the damping stays below this many times the force scale.
         rate: change of the damping per second, in the force scale, where the vehicle is.
-        dissipative: no update may make the drag add energy where the vehicle has been.
+        dissipative: the drag as a whole gives no energy, at any velocity through the water (`GreyBox.passive`), and
+            no update may ask for it where the vehicle has been.
         budget: s of wall clock that a step may take, or None; what was overdrawn is paid back by skipping.
         enabled: false leaves only what no adapter can do without: numbers, and time that goes forward.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,9 @@ from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
 from auvnn.online.guards import Guards
 from auvnn.online.residual import Sample
+
+# A quaternion's length may be this far from one: rounding and interpolation, not a fault. It is then normalised.
+UNIT = 0.05
 
 
 def tensor(value: Any, name: str, sizes: tuple[int, ...]) -> Tensor:
@@ -45,7 +49,7 @@ def sample_of(
     voltage: Any = None,
     altitude: Any = None,
 ) -> Sample | None:
-    """Return a sample, or None where a number is missing or not finite.
+    """Return a sample, or None where a number is missing or not finite; see `refusal` for what else is not used.
 
     Raises:
         ConfigError: a vector has the wrong size.
@@ -66,6 +70,16 @@ def sample_of(
     if not all(bool(torch.isfinite(v).all()) for v in given):
         return None
     return Sample.of(float(time), *state, **others)
+
+
+def turned(sample: Sample) -> Sample | None:
+    """Return a sample with its quaternion at length one, or None where its length is too far from that."""
+    length = float(torch.linalg.vector_norm(sample.eta[3:]))
+    if not abs(length - 1.0) <= UNIT:
+        return None
+    if abs(length - 1.0) < 1e-12:
+        return sample
+    return replace(sample, eta=torch.cat([sample.eta[:3], sample.eta[3:] / length]))
 
 
 def refusal(sample: Sample, last: Sample | None, guards: Guards, now: float | None) -> str | None:

@@ -79,6 +79,7 @@ def _restored(kind: type[Adapter], files: Mapping[str, bytes], path: Path) -> Ad
             watch=False,
         )
         adapter._original.bank.load_state_dict(_part(tensors, "original"))
+        adapter._original.bank.passive = plain["passive"]
         adapter.scheme.load(_part(tensors, "scheme"))
         adapter._shadow.load(_part(tensors, "shadow"))
         adapter._trial.load(_part(tensors, "trial"))
@@ -102,6 +103,8 @@ def _restored(kind: type[Adapter], files: Mapping[str, bytes], path: Path) -> Ad
             for k in range(plain["held"])
         ]
         adapter._consistency.load(_part(tensors, "consistency"))
+        adapter._positions.load(_part(tensors, "positions"))
+        adapter._trusted.load(_part(tensors, "trusted"))
         adapter._off_cause = plain["off_cause"]
         predictor._last = _sample(tensors, "last") if plain["last"] else None
     except AuvnnError:
@@ -133,6 +136,7 @@ def _plain(adapter: Adapter) -> dict[str, Any]:
         "gate": adapter._gate.state(),
         "paused": adapter.paused,
         "added": adapter.added,
+        "passive": adapter._original.bank.passive,
         "debt": adapter._debt,
         "resting": adapter._resting,
         "off_until": None if off == -float("inf") else off,
@@ -153,6 +157,8 @@ def _tensors(adapter: Adapter) -> dict[str, Tensor]:
         "noise": adapter._noise.state(),
         "bounds": adapter._bounds.state(),
         "consistency": adapter._consistency.state(),
+        "positions": adapter._positions.state(),
+        "trusted": adapter._trusted.state(),
     }
     found = {f"{part}/{name}": v for part, tensors in parts.items() for name, v in tensors.items()}
     for k, sample in enumerate(adapter._predictor.history):

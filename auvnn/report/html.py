@@ -23,6 +23,7 @@ VECTOR_POINTS = 20_000
 SECURITY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 PIXELS = 170  # per inch, of a figure that goes in as pixels
 LONG = 12  # rows from which a table is folded away
+LEAST = 0.86  # of a figure's own width, below which its letters are too small
 
 _ELEMENTS = {
     *("svg", "g", "defs", "path", "use", "clipPath", "rect", "circle", "ellipse", "line", "polyline"),
@@ -90,6 +91,7 @@ class Part:
     story: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     parts: list[Part] = field(default_factory=list)
+    few: int = 4
 
 
 @functools.cache
@@ -134,7 +136,9 @@ def figure_markup(figure: Figure, prefix: str, alt: str, drawing: str | None = N
     """
     from markupsafe import Markup
 
-    width = f"{figure.get_figwidth() * 1.25:.2f}in"
+    wide = figure.get_figwidth()
+    # On a narrow screen a figure keeps this width, at which its smallest letters can be read, and scrolls sideways.
+    width = f"{wide * 1.25:.2f}in;--least:{wide * LEAST:.2f}in"
     if style.points(figure) > VECTOR_POINTS:
         data = base64.b64encode(style.png(figure, dpi=PIXELS)).decode("ascii")
         image = '<img class="plot" style="max-width:{}" alt="{}" src="data:image/png;base64,{}">'

@@ -7,7 +7,7 @@ import os
 import tempfile
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -63,6 +63,8 @@ class Page:
     """
 
     kind = ""
+    # How many figures and tables stand open: what tells the story; the others are folded away until they are opened.
+    shown, open_tables = 3, 1
 
     def __init__(self, without: tuple[str, ...] = ()) -> None:
         """Make the page; `without` names figures that are shown elsewhere."""
@@ -154,13 +156,36 @@ class Page:
             brief=safely("the verdict", lambda: self.brief(view)[:MOST_SENTENCES], [])
             or ["There is no verdict in this answer."],
             warnings=safely("the warnings", lambda: self.warnings(view), []),
-            pictures=[_picture(plot, drawn, prefix, notes) for plot in plots],
-            tables=[t for t in safely("the tables", lambda: self.tables(view), []) if t.rows],
+            pictures=_folded(
+                [_picture(plot, drawn, prefix, notes) for plot in plots], 1 if prefix else self.shown
+            ),
+            tables=_closed(
+                safely("the tables", lambda: self.tables(view), []), 0 if prefix else self.open_tables
+            ),
             assumed=[(k, v) for k, v in safely("what was assumed", lambda: self.assumed(view), []) if v],
             notes=notes,
             story=safely("the story", lambda: self.story(view), []),
             parts=parts,
         )
+
+
+def _folded(pictures: list[Picture], shown: int) -> list[Picture]:
+    """Return the pictures, all but the first ones folded away."""
+    left, out = shown, []
+    for item in pictures:
+        out.append(item if left > 0 else replace(item, folded=True))
+        left -= not item.folded and not item.missing
+    return out
+
+
+def _closed(tables: list[HtmlTable], shown: int) -> list[HtmlTable]:
+    """Return the tables that have rows, folded away beyond the first ones unless they say otherwise."""
+    left, out = shown, []
+    for item in tables:
+        if item.rows:
+            out.append(replace(item, folded=True) if item.folded is None and left <= 0 else item)
+            left -= not item.closed
+    return out
 
 
 def _missing(reason: str) -> Figure:

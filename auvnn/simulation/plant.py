@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from auvnn.effects import EFFECTS, Parameter
 from auvnn.effects.inertia_factors import InertiaFactors
+from auvnn.effects.registering import values_of
 from auvnn.models import GreyBox
 from auvnn.vehicle import Vehicle
 
@@ -26,6 +27,7 @@ def as_hidden(given: Any) -> dict[str, dict[str, float] | None]:
 
     No parameters at all stand for typical ones (None); of several, those not given stay at their nulls.
     """
+    given = values_of(given)
     if not given:
         return {}
     if isinstance(given, str):

@@ -16,6 +16,7 @@ from auvnn.effects.sizes import radius
 from auvnn.errors import ConfigError
 from auvnn.logs import Log, Run
 from auvnn.models import GreyBox
+from auvnn.models.taking import GivenModel, as_model
 from auvnn.plants import PLANTS, Motion, PlantTask
 from auvnn.plants.base import refuse
 from auvnn.plants.strangers import STRANGERS
@@ -57,14 +58,14 @@ class Simulation:
 
 
 def simulate(
-    model: GreyBox,
+    model: GivenModel,
     excitation: str | Mapping[str, Any] = "multisine",
-    noise: str | Mapping[str, Any] = "none",
+    noise: str | Mapping[str, Any] = "realistic",
     hidden: Mapping[str, Mapping[str, float] | None] | Sequence[str] | str | None = None,
     seed: int = 0,
     *,
     runs: int = 4,
-    duration: float = 60.0,
+    duration: float = 150.0,
     rate: float = 20.0,
     coefficients: str = "exact",
     accelerations: bool | None = None,
@@ -109,6 +110,7 @@ def simulate(
         MissingExtra: the plant's package is not installed.
         AuvnnError: the plant diverges; the message says when and by which term.
     """
+    model = as_model(model)
     _check(seed, runs, duration, rate, coefficients, max_step)
     vehicle = model.vehicle
     if vehicle.glides or (vehicle.reduced and plant != "own"):

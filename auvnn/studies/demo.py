@@ -24,7 +24,7 @@ HIDDEN = {"ocean_current": {"v_north": 0.15, "v_east": -0.10, "v_down": 0.0}}
 RUNS, DURATION = 4, 60.0
 
 
-@dataclass
+@dataclass(repr=False)
 class Demo(Answer):
     """The demo's four answers and its story."""
 

@@ -28,7 +28,7 @@ from auvnn.studies.identifiability import SWALLOWED, _listed, information, swall
 Array = NDArray[np.float64]
 
 
-@dataclass
+@dataclass(repr=False)
 class Uncertainties(Answer):
     """What each manoeuvre can tell of several uncertainties at once."""
 

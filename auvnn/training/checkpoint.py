@@ -101,7 +101,7 @@ class Checkpoints:
             self._check(path, tensors, expected)
             # Fresh allocations: the alignment of memory may decide the last bit of a sum.
             tensors = {name: tensor.clone() for name, tensor in tensors.items()}
-            return int(state["iteration"]), tensors, state["state"], notes
+            return state["iteration"], tensors, state["state"], notes
         if notes:
             raise ModelError(f"{self.folder}: no checkpoint is intact ({'; '.join(notes)}): train again")
         return None
@@ -135,7 +135,14 @@ def _parts(
     files: Mapping[str, bytes], path: Path | str = "checkpoint"
 ) -> tuple[dict[str, Any], dict[str, Tensor]]:
     """Return what a checkpoint's files hold: the plain part, and the tensors."""
-    state = json.loads(files["state.json"])
+    try:
+        state = json.loads(files["state.json"])
+        whole = isinstance(state["identity"], dict) and isinstance(state["state"], dict)
+        state["iteration"] = int(state["iteration"])
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
+        raise ModelError(f"{path}: state.json cannot be read ({type(error).__name__})") from None
+    if not whole:
+        raise ModelError(f"{path}: state.json is not that of a checkpoint")
     where = f"{path}/state.safetensors"
     return state, tensors_from_bytes(files["state.safetensors"], where=where, finite=False)
 

@@ -22,6 +22,7 @@ from auvnn.metrics.one_step import OneStep, one_step, scores
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
+from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
 from auvnn.training.confounding.confounded_effects import confounded_effects
 from auvnn.training.confounding.confounding import Confounding
 from auvnn.training.fit_damping import Fit, fit_damping
@@ -36,7 +37,7 @@ AXES = ("X", "Y", "Z", "K", "M", "N")
 STOPPING = 0.2
 
 
-@dataclass
+@dataclass(repr=False)
 class Training(Answer):
     """How a training went; `to_dict` is `training.json` of the public contract."""
 
@@ -85,13 +86,13 @@ class Training(Answer):
 
 
 def train(
-    model: GreyBox,
-    log: Log,
+    model: GivenModel,
+    log: GivenLog,
     scheme: str | Mapping[str, Any] = "levenberg_marquardt",
     damping: str | Mapping[str, Any] = "mlp",
     *,
     objective: str | Mapping[str, Any] = "one_step",
-    test: Log | None = None,
+    test: GivenLog | None = None,
     seed: int = 0,
     derivative: Mapping[str, Any] | None = None,
     checkpoint: str | Path | None = None,
@@ -123,6 +124,9 @@ def train(
         ConfigError: an unknown scheme, form or option.
         InputError: nothing to fit, the same data on both sides, or a log that contradicts itself.
     """
+    log = as_log(log)
+    model = as_model(model, log)
+    test = None if test is None else as_log(test, "test")
     goal = build_objective(objective)
     log, test = completed(model, log), None if test is None else completed(model, test)
     if log.unmeasured and goal.name == "one_step":

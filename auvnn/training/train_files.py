@@ -15,10 +15,11 @@ answer says of how many.
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import tempfile
+from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as Dict
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -132,7 +133,8 @@ def train_files(
     test_name = name if test is None else named(paths_of(test))
     with (
         executor_for(executor, workers, address) as pool,
-        tempfile.TemporaryDirectory(prefix="auvnn-", dir=_made(scratch)) as folder,
+        _made(scratch) as place,
+        tempfile.TemporaryDirectory(prefix="auvnn-", dir=place) as folder,
     ):
         whole = plan_files(pool, paths, reading, say)
         tested = None if test is None else plan_files(pool, paths_of(test), reading, say)
@@ -199,10 +201,19 @@ def train_files(
     )
 
 
-def _made(scratch: str | Path | None) -> Path | None:
-    if scratch is not None:
-        Path(scratch).mkdir(parents=True, exist_ok=True)
-    return None if scratch is None else Path(scratch)
+@contextlib.contextmanager
+def _made(scratch: str | Path | None) -> Iterator[Path | None]:
+    """Make the scratch folder, and take it away again where nothing is left in it."""
+    if scratch is None:
+        yield None
+        return
+    place = Path(scratch)
+    place.mkdir(parents=True, exist_ok=True)
+    try:
+        yield place
+    finally:
+        with contextlib.suppress(OSError):
+            place.rmdir()
 
 
 def _sample(pieces: Pieces, mapping: Mapping, name: str) -> Log:

@@ -64,6 +64,18 @@ def check_inertia(inertia: Array, where: str) -> None:
         )
 
 
+def rigid_body(mass: float, inertia: Array, r: Array) -> Array:
+    """Return M_RB about the body origin, (6, 6): [m I, -m S(r); m S(r), I_g + m (r^T r I - r r^T)], r = r_g.
+
+    Reference: Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, ch. 3.
+    """
+    x, y, z = r
+    s = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    upper = np.hstack([mass * np.eye(3), -mass * s])
+    lower = np.hstack([mass * s, inertia + mass * (r @ r * np.eye(3) - np.outer(r, r))])
+    return np.vstack([upper, lower])
+
+
 def check_added_mass(added_mass: Array, rigid_body: Array, where: str) -> str | None:
     """Refuse added mass of the wrong sign or with M_RB + M_A indefinite; return a doubt, or None.
 

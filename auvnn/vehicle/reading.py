@@ -85,6 +85,11 @@ def vehicle_from_dict(
     thrusters = _parts(fields, "thrusters", read_thruster, turn)
     fins = _parts(fields, "fins", read_fin, turn)
     groups = _groups(damping, elements)
+    center_of_gravity = turned(turn, fields.array("center_of_gravity", (3,)))
+    inertia, added_mass = turned(turn, inertia) @ turn, turned(turn6, added_mass) @ turn6
+    body = checks.rigid_body(mass, inertia, center_of_gravity)
+    # Here, where the file is known; the vehicle checks itself again and knows only its name.
+    doubt = checks.check_added_mass(added_mass, body, where)
     vehicle = kind(
         name=_name(fields),
         gravity=gravity,
@@ -92,10 +97,10 @@ def vehicle_from_dict(
         mass=mass,
         buoyancy=buoyancy,
         length=length,
-        center_of_gravity=turned(turn, fields.array("center_of_gravity", (3,))),
+        center_of_gravity=center_of_gravity,
         center_of_buoyancy=turned(turn, fields.array("center_of_buoyancy", (3,))),
-        inertia=turned(turn, inertia) @ turn,
-        added_mass=turned(turn6, added_mass) @ turn6,
+        inertia=inertia,
+        added_mass=added_mass,
         linear_damping=damping["linear_damping"],
         quadratic_damping=damping["quadratic_damping"],
         damping_elements=elements,
@@ -116,7 +121,6 @@ def vehicle_from_dict(
         else None,
     )
     check_drives(vehicle, where)
-    doubt = checks.check_added_mass(vehicle.added_mass, vehicle.rigid_body, where)
     if doubt:
         warnings.append(doubt)
     if turn is not _FRD and vehicle.effects:
@@ -125,6 +129,20 @@ def vehicle_from_dict(
     # The vehicle is frozen, but nobody else has seen it yet.
     object.__setattr__(vehicle, "warnings", tuple(warnings))
     return vehicle
+
+
+def check_words(fields: Fields) -> None:
+    """Refuse a name, uncertainties, effects or a source that a model file could not hold.
+
+    Raises:
+        ModelError: with the first of them.
+    """
+    _name(fields)
+    _uncertainty(fields, set(), [])
+    _effects(fields)
+    fields.text("source", "")
+    if fields.has("reference_voltage"):
+        fields.positive("reference_voltage")
 
 
 def _frame(fields: Fields) -> Array:

@@ -7,19 +7,22 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
+from auvnn.cards import Card, Shown, Text
+from auvnn.vehicle.checks import rigid_body
 from auvnn.vehicle.parts import DEFAULT_UNCERTAINTY, Array, DampingElement, Fin, Thruster, freeze
 from auvnn.vehicle.reading import vehicle_from_dict
 from auvnn.vehicle.reduced import Ballast, MovingMass, Reduced
+from auvnn.vehicle.summary import summary
+from auvnn.vehicle.validation import validate
 
 
-@dataclass(frozen=True, eq=False)
-class Vehicle:
+@dataclass(frozen=True, eq=False, repr=False)
+class Vehicle(Shown):
     """What is known of a vehicle, with nothing learned in it.
 
-    Made by `Vehicle.from_dict` or `load_vehicle`, which validate. All arrays are float64 and
-    read-only, all lengths from the body origin, all axes FRD.
+    Validated when it is made, by `Vehicle.from_dict`, `load_vehicle` or in Python: a diagonal may stand for a matrix,
+    and parts may be mappings as in a model file. All arrays are float64 and read-only, all lengths from the body origin,
+    all axes FRD.
 
     Args:
         name: what it is called.
@@ -45,6 +48,9 @@ class Vehicle:
         reduced: which degrees of freedom the model has.
         ballast: a volume that changes, or None.
         moving_mass: a mass that is shifted, or None.
+
+    Raises:
+        ModelError: a value is not physical; one line names the field, the value and the cure.
     """
 
     name: str
@@ -72,9 +78,22 @@ class Vehicle:
     moving_mass: MovingMass | None = None
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only."""
+        """Check that the vehicle is physical, and make the arrays read-only."""
+        validate(self)
         freeze(self, "center_of_gravity", "center_of_buoyancy", "inertia", "added_mass")
         freeze(self, "linear_damping", "quadratic_damping")
+
+    def summary(self) -> Text:
+        """Return the vehicle's numbers as a few lines for a person."""
+        return summary(self)
+
+    def card(self) -> Card:
+        """Return what the vehicle is in one line; its `summary` says more."""
+        drives = f"{self.n_thrusters} thrusters" if self.thrusters else "no thrusters"
+        line = f"{self.mass:.4g} kg, buoyancy less weight {self.buoyancy - self.weight:+.3g} N, {drives}"
+        rows = [line.split("  ", 1) for line in (part.strip() for part in self.summary().splitlines()[1:])]
+        cells = [[name.strip(), *(words.strip() for words in more)] for name, *more in rows if more]
+        return Card(f"Vehicle {self.name}", line, (), ("", ""), cells, ".summary() prints all")
 
     @classmethod
     def from_dict(
@@ -173,12 +192,7 @@ class Vehicle:
 
         Reference: Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, ch. 3.
         """
-        r = self.center_of_gravity
-        x, y, z = r
-        s = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        upper = np.hstack([self.mass * np.eye(3), -self.mass * s])
-        lower = np.hstack([self.mass * s, self.inertia + self.mass * (r @ r * np.eye(3) - np.outer(r, r))])
-        return np.vstack([upper, lower])
+        return rigid_body(self.mass, self.inertia, self.center_of_gravity)
 
     @property
     def inertia_matrix(self) -> Array:

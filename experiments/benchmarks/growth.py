@@ -50,7 +50,7 @@ def make(samples: int, path: Path) -> None:
 
     made = auvnn.simulate(
         auvnn.load("rov90", actuation="wrench"), "multisine", hidden={"ocean_current": {"v_north": 0.2, "v_east": -0.1}},
-        duration=(RUN - 1) / RATE, rate=RATE, runs=min(RUNS, -(-samples // RUN)), max_step=0.05,
+        duration=(RUN - 1) / RATE, rate=RATE, runs=min(RUNS, -(-samples // RUN)), max_step=0.05, noise="none",
     )  # fmt: skip
     base = [{name: np.array(column) for name, column in run.columns()} for run in made.log.runs]
     rng = np.random.default_rng(0)

@@ -63,7 +63,7 @@ def test_diagnosis_has_it_among_its_candidates(installed):
     from auvnn.simulation import simulate
 
     model = load("rov95")
-    log = simulate(model, "paper", runs=1, duration=2.0, rate=10.0, max_step=0.1).log
+    log = simulate(model, "paper", runs=1, duration=2.0, rate=10.0, max_step=0.1, noise="none").log
     assert "parachute" in candidates_for(model, log, None)[0]
 
 

@@ -175,7 +175,7 @@ ELSEWHERE = {
         "tests/logs/readers/test_csv.py::test_overflow_is_refused_with_its_line",
     ],
     21: [
-        "tests/logs/reading/test_mapping.py::test_missing_columns_come_with_a_mapping_to_copy",
+        "tests/logs/reading/mapping_file/test_mapping.py::test_missing_columns_come_with_a_mapping_to_copy",
     ],
     22: [
         "tests/logs/readers/test_parquet.py::test_a_footer_that_promises_too_much_memory_is_refused",
@@ -184,7 +184,7 @@ ELSEWHERE = {
         "tests/logs/test_seal.py::test_a_file_that_is_cut_short_while_it_is_read_is_one_line",
     ],
     24: [
-        "tests/cli/test_runs.py::test_any_file_name_works",
+        "tests/cli/runs/test_runs.py::test_any_file_name_works",
     ],
     25: [
         "tests/logs/readers/test_recordings.py::test_an_index_beside_an_imc_log_is_never_opened",
@@ -193,14 +193,14 @@ ELSEWHERE = {
         "tests/logs/reading/test_odd_files.py::test_a_block_of_rows_written_twice_is_left_out_once",
     ],
     28: [
-        "tests/logs/reading/test_clock.py::test_any_stamps_give_order_or_a_reason",
+        "tests/logs/reading/repairs/test_clock.py::test_any_stamps_give_order_or_a_reason",
         "tests/logs/reading/test_odd_files.py::test_shuffled_rows_are_told_as_such",
     ],
     29: [
-        "tests/logs/reading/test_clock.py::test_a_clock_set_back_is_no_disorder",
+        "tests/logs/reading/repairs/test_clock.py::test_a_clock_set_back_is_no_disorder",
     ],
     30: [
-        "tests/logs/reading/test_clock.py::test_leading_zeros_before_a_clock_that_counts_from_1970",
+        "tests/logs/reading/repairs/test_clock.py::test_leading_zeros_before_a_clock_that_counts_from_1970",
     ],
     33: [
         "tests/logs/quality/test_kinematics.py::test_delay_is_measured",
@@ -209,7 +209,7 @@ ELSEWHERE = {
         "tests/logs/quality/test_quality.py::test_gaps_and_jitter",
     ],
     38: [
-        "tests/logs/reading/test_clock.py::test_times_that_no_log_has",
+        "tests/logs/reading/repairs/test_clock.py::test_times_that_no_log_has",
     ],
     42: [
         "tests/improvement/test_add.py::test_thrusters_at_neutral_say_nothing_about_thrusters",
@@ -246,15 +246,15 @@ ELSEWHERE = {
         "tests/storage/test_manifest.py::test_names_that_lead_elsewhere",
     ],
     72: [
-        "tests/cli/test_folder.py::test_a_run_that_fails_leaves_the_folder_as_it_was",
-        "tests/cli/test_working.py::test_a_working_folder_that_is_a_link_is_refused_and_its_target_untouched",
+        "tests/cli/runs/test_folder.py::test_a_run_that_fails_leaves_the_folder_as_it_was",
+        "tests/cli/runs/test_working.py::test_a_working_folder_that_is_a_link_is_refused_and_its_target_untouched",
     ],
     73: [
-        "tests/cli/test_runs.py::test_what_the_disk_does_is_not_our_fault",
+        "tests/cli/runs/test_runs.py::test_what_the_disk_does_is_not_our_fault",
         "tests/logs/reading/test_odd_files.py::test_a_full_disk_while_a_log_is_written_is_one_line_and_leaves_nothing",
     ],
     74: [
-        "tests/cli/test_folder.py::test_two_runs_cannot_have_one_folder",
+        "tests/cli/runs/test_folder.py::test_two_runs_cannot_have_one_folder",
     ],
     75: [
         "tests/cli/test_ends.py::test_an_interrupted_run_says_so_in_one_line_and_leaves_nothing",
@@ -264,11 +264,11 @@ ELSEWHERE = {
         "tests/exports/test_casadi.py::test_a_missing_package_is_said_in_one_line",
     ],
     77: [
-        "tests/cli/test_runs.py::test_any_file_name_works",
-        "tests/cli/test_runs.py::test_colour_is_for_a_person_at_a_terminal",
+        "tests/cli/runs/test_runs.py::test_any_file_name_works",
+        "tests/cli/runs/test_runs.py::test_colour_is_for_a_person_at_a_terminal",
     ],
     78: [
-        "tests/cli/test_runs.py::test_of_many_jobs_one_may_fail",
+        "tests/cli/runs/test_runs.py::test_of_many_jobs_one_may_fail",
     ],
     79: [
         "tests/vehicle/test_refusals.py::test_refusal_names_file_field_value_and_cure",
@@ -287,7 +287,7 @@ ELSEWHERE = {
         "tests/vehicle/test_refusals.py::test_refusal_names_file_field_value_and_cure",
     ],
     85: [
-        "tests/models/test_rollout.py::test_a_run_with_damping_that_feeds_energy_says_when_and_which_term",
+        "tests/models/free_running/test_rollout.py::test_a_run_with_damping_that_feeds_energy_says_when_and_which_term",
     ],
     88: [
         "tests/improvement/test_add.py::test_parameters_that_cannot_be_told_apart_are_named",
@@ -319,6 +319,7 @@ ELSEWHERE = {
         "tests/training/test_resume.py::test_no_intact_checkpoint_is_an_error_that_names_each",
     ],
     98: [
+        "tests/security/test_fuzz.py::test_a_few_damaged_files",
         "tests/storage/test_folders.py::test_a_foreign_file_in_place_of_a_folder",
     ],
     99: [
@@ -350,6 +351,7 @@ ELSEWHERE = {
         "tests/exports/test_c.py::test_its_own_test_program_passes_and_notices",
     ],
     106: [
+        "tests/online/test_sensors_agree.py::test_attitudes_that_are_no_rotation_are_refused",
         "tests/online/test_faults.py::test_row_106_bad_messages_hold_the_model_and_are_counted",
         "tests/online/test_faults.py::test_row_106_a_gap_is_not_bridged_by_an_increment",
     ],
@@ -358,11 +360,13 @@ ELSEWHERE = {
         "tests/online/test_faults.py::test_row_107_forgetting_does_not_wind_up",
     ],
     108: [
+        "tests/online/test_sensors_agree.py::test_velocity_three_times_too_large_is_refused_and_the_reason_told",
         "tests/online/test_faults.py::test_row_108_a_spike_is_not_learned_and_a_lasting_change_is",
         "tests/online/test_faults.py::test_row_108_a_gyro_that_contradicts_the_attitude_is_not_learned",
         "tests/online/test_faults.py::test_row_108_a_flagged_fault_switches_adaptation_off_for_a_while",
     ],
     109: [
+        "tests/online/test_passive.py::test_reversed_thrusters_teach_no_drag_that_gives_energy",
         "tests/online/test_faults.py::test_row_109_wild_proposals_never_leave_the_set",
         "tests/online/test_faults.py::test_row_109_drag_never_begins_to_add_energy",
     ],

@@ -81,8 +81,13 @@ def test_the_table_names_a_test_for_each_row():
 
 
 def test_the_page_says_for_each_row_what_the_user_gets():
-    rows = re.findall(r"^\| (\d+) \| [^|]+ \| [^|]+ \|$", page("faults"), re.MULTILINE)
-    assert [int(n) for n in rows] == list(range(1, 113))
+    rows = re.findall(r"^\| (\d+) \| [^|]+ \| [^|]+ \| `(tests/[^`|]+)` \|$", page("faults"), re.MULTILINE)
+    assert [int(n) for n, _ in rows] == list(range(1, 113))
+    listed = here()
+    for number, node in rows:
+        file, _, name = node.partition("::")
+        assert node in ELSEWHERE.get(int(number), []) or name in listed.get(int(number), []), node
+        assert name in functions_of(ROOT / file), node
 
 
 def test_each_promise_on_safety_has_its_test():

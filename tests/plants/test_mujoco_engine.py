@@ -25,7 +25,13 @@ def test_without_the_package_there_is_a_hint(monkeypatch):
 def test_what_the_engine_cannot_have_is_refused(name):
     with pytest.raises(ConfigError, match=f"plant mujoco cannot hold the effect {name}.*plant=numpy"):
         simulate(
-            GreyBox(load_vehicle("rov95")), hidden=[name], plant="mujoco", runs=1, duration=1.0, rate=10.0
+            GreyBox(load_vehicle("rov95")),
+            hidden=[name],
+            plant="mujoco",
+            runs=1,
+            duration=1.0,
+            rate=10.0,
+            noise="none",
         )
 
 

@@ -186,7 +186,7 @@ def test_simulated_log_is_the_same_in_closed_loop():
 def test_drawn_coefficients_are_the_same():
     model = GreyBox(load_vehicle("rov95"))
     how = {"coefficients": "drawn", "runs": 1, "duration": 1.0, "rate": 10.0, "accelerations": True}
-    a, b = (simulate(model, "multisine", plant=p, **how).log.runs[0] for p in ("own", "numpy"))
+    a, b = (simulate(model, "multisine", plant=p, **how, noise="none").log.runs[0] for p in ("own", "numpy"))
     assert a.nu_dot == pytest.approx(b.nu_dot, abs=1e-5)
 
 
@@ -194,12 +194,12 @@ def test_what_it_does_not_know_is_refused():
     model = GreyBox(load_vehicle("rov95"))
     short = {"runs": 1, "duration": 1.0, "rate": 10.0}
     with pytest.raises(ConfigError, match=r"no plant called 'nunpy'\. Did you mean 'numpy'"):
-        simulate(model, plant="nunpy", **short)
+        simulate(model, plant="nunpy", **short, noise="none")
     with pytest.raises(ConfigError, match=r"residual_force.*no equations.*plant=own"):
-        simulate(model.with_effects(["residual_force"]), plant="numpy", **short)
+        simulate(model.with_effects(["residual_force"]), plant="numpy", **short, noise="none")
     learned = GreyBox(load_vehicle("rov95"), damping=DampingBank.from_description("zero"))
     with pytest.raises(ConfigError, match=r"damping subnetworks.*plant=own"):
-        simulate(learned, plant="numpy", **short)
+        simulate(learned, plant="numpy", **short, noise="none")
 
 
 def test_divergence_says_when_and_by_what():

@@ -54,19 +54,22 @@ def test_hidden_in_a_log_it_moves_the_vehicle(name):
     model = GreyBox(load_vehicle("rov95"))
     logs = {}
     for strength in (0.0, 1.0):
-        made = simulate(model, "multisine", plant="numpy", hidden={name: {"strength": strength}}, **SHORT)
+        made = simulate(
+            model, "multisine", plant="numpy", hidden={name: {"strength": strength}}, **SHORT, noise="none"
+        )
         assert made.truth["hidden"] == {name: {"strength": strength}} and made.plant.effect_names == []
         logs[strength] = made.log.runs[0].nu
-    nothing = simulate(model, "multisine", plant="numpy", **SHORT).log.runs[0].nu
+    nothing = simulate(model, "multisine", plant="numpy", **SHORT, noise="none").log.runs[0].nu
     assert np.array_equal(logs[0.0], nothing)
     assert np.abs(logs[1.0] - nothing).max() > 1e-4
 
 
 def test_by_name_alone_it_gets_a_strength_and_company_changes_nothing():
     model = GreyBox(load_vehicle("rov95"))
-    one = simulate(model, plant="numpy", hidden="stranger_layers", **SHORT).truth["hidden"]
+    one = simulate(model, plant="numpy", hidden="stranger_layers", **SHORT, noise="none").truth["hidden"]
     assert 0.5 <= abs(one["stranger_layers"]["strength"]) <= 1.0
-    both = simulate(model, plant="numpy", hidden=["net_buoyancy", "stranger_layers"], **SHORT).truth["hidden"]
+    hidden = ["net_buoyancy", "stranger_layers"]
+    both = simulate(model, plant="numpy", hidden=hidden, **SHORT, noise="none").truth["hidden"]
     assert (
         set(both) == {"net_buoyancy", "stranger_layers"} and both["stranger_layers"] == one["stranger_layers"]
     )
@@ -75,8 +78,8 @@ def test_by_name_alone_it_gets_a_strength_and_company_changes_nothing():
 def test_refused_where_it_cannot_act_or_is_no_number():
     model = GreyBox(load_vehicle("rov95"))
     with pytest.raises(ConfigError, match=r"plant own cannot hold the effect stranger_layers.*plant=numpy"):
-        simulate(model, hidden="stranger_layers", **SHORT)
+        simulate(model, hidden="stranger_layers", **SHORT, noise="none")
     for values, words in (({"strenght": 1.0}, "Did you mean 'strength'"), ({"strength": "big"}, "finite number"),
                           ({"strength": float("nan")}, "finite number")):  # fmt: skip
         with pytest.raises(ConfigError, match=words):
-            simulate(model, plant="numpy", hidden={"stranger_layers": values}, **SHORT)
+            simulate(model, plant="numpy", hidden={"stranger_layers": values}, **SHORT, noise="none")

@@ -44,4 +44,4 @@ def test_where_it_is_needed_there_is_one_close_below():
 
 def test_an_effect_that_the_vehicle_cannot_have_is_refused():
     with pytest.raises(ConfigError, match=r"voltage_droop cannot be hidden .* states no reference_voltage"):
-        simulate(load("rov95"), hidden="voltage_droop", **SHORT)
+        simulate(load("rov95"), hidden="voltage_droop", **SHORT, noise="none")

@@ -33,7 +33,7 @@ def regressors(log) -> float:
 
 @pytest.mark.parametrize("name", builtin_vehicles())
 def test_multisine_excites_every_degree_of_freedom_within_limits(name):
-    log = simulate(model_of(name), "multisine", runs=3, duration=60.0, **COARSE).log
+    log = simulate(model_of(name), "multisine", runs=3, duration=60.0, **COARSE, noise="none").log
     cruising = name == "remus100"
     least = LEAST_CRUISING if cruising else LEAST
     for run in log.runs:
@@ -54,7 +54,7 @@ def test_multisine_excites_every_degree_of_freedom_within_limits(name):
 
 def test_multisine_keeps_to_its_band_and_differs_between_axes_and_runs():
     excitation = {"name": "multisine", "low": 0.1, "high": 0.4}
-    log = simulate(model_of("rov95", "wrench"), excitation, runs=2, duration=60.0, **COARSE).log
+    log = simulate(model_of("rov95", "wrench"), excitation, runs=2, duration=60.0, **COARSE, noise="none").log
     tau = np.stack([r.wrench for r in log.runs])
     window = np.hanning(tau.shape[1])[None, :, None]
     power = np.abs(np.fft.rfft((tau - tau.mean(axis=1, keepdims=True)) * window, axis=1)) ** 2
@@ -67,7 +67,7 @@ def test_multisine_keeps_to_its_band_and_differs_between_axes_and_runs():
 
 def test_multisine_of_a_vehicle_without_stated_damping():
     bare = model_of("rov90", linear_damping=None, quadratic_damping=None)
-    run = simulate(bare, "multisine", runs=1, duration=10.0, **COARSE).log.runs[0]
+    run = simulate(bare, "multisine", runs=1, duration=10.0, **COARSE, noise="none").log.runs[0]
     assert (run.nu.std(axis=0) > 0.005).all() and np.abs(run.nu).max() < 5
 
 
@@ -79,15 +79,15 @@ def test_paper_steady_speeds():
     alike = {"added_mass": np.diag([70.0] * 3 + [12.0] * 3), "inertia": 12.0 * np.eye(3)}
     model = model_of("rov90", "wrench", buoyancy=90 * 9.81, center_of_buoyancy=np.zeros(3), **alike)
     options = {"runs": 1, "duration": 15.0, **COARSE}
-    pushed = simulate(model, {"name": "paper", "moment": 0.0}, **options).log.runs[0].nu[-1]
-    turned = simulate(model, {"name": "paper", "force": 0.0}, **options).log.runs[0].nu[-1]
+    pushed = simulate(model, {"name": "paper", "moment": 0.0}, **options, noise="none").log.runs[0].nu[-1]
+    turned = simulate(model, {"name": "paper", "force": 0.0}, **options, noise="none").log.runs[0].nu[-1]
     assert pushed[:3] == pytest.approx([0.29, 0.32, 0.33], abs=0.006)
     assert turned[3:] == pytest.approx([0.23, 0.23, 0.28], abs=0.006)
 
 
 def test_paper_commands_and_their_end():
     model = model_of("rov95", "wrench")
-    run = simulate(model, "paper", runs=1, duration=20.0, rate=20.0, max_step=0.05).log.runs[0]
+    run = simulate(model, "paper", runs=1, duration=20.0, rate=20.0, max_step=0.05, noise="none").log.runs[0]
     assert np.array_equal(run.wrench[0], [100, 100, 100, 10, 10, 10])
     assert run.t[np.abs(run.wrench).max(axis=1) > 0].max() == pytest.approx(14.95)
     assert (run.nu[0] == 0).all() and run.position[0, 2] == 5.0
@@ -97,13 +97,13 @@ def test_paper_commands_and_their_end():
 
 def test_paper_by_thrusters_gives_the_wrench_where_they_reach_it_and_says_where_not():
     options = {"runs": 1, "duration": 1.0, **COARSE}
-    reached = simulate(model_of("rov95"), "paper", **options)
+    reached = simulate(model_of("rov95"), "paper", **options, noise="none")
     allocation = Allocation(load_vehicle("rov95"))
     command = reached.log.runs[0].thrusters[0]
     tau = allocation.matrix @ (120.0 * command * np.abs(command))
     assert tau == pytest.approx([100, 100, 100, 10, 10, 10], abs=0.01)
     assert reached.truth["notes"] == []
-    short = simulate(model_of("rov90"), "paper", **options).truth["notes"]
+    short = simulate(model_of("rov90"), "paper", **options, noise="none").truth["notes"]
     assert len(short) == 1 and "[100 100 100 0 10 10] instead of [100 100 100 10 10 10]" in short[0]
 
 

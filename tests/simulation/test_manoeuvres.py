@@ -46,7 +46,7 @@ def test_the_library_is_in_the_catalogue_and_the_vehicle_can_do_all_of_it(plans,
 
 @pytest.mark.parametrize("name", OPEN)
 def test_it_stays_upright_and_under_water(name, model):
-    log = simulate(model, name, runs=2, duration=40.0, rate=10.0, max_step=0.05).log
+    log = simulate(model, name, runs=2, duration=40.0, rate=10.0, max_step=0.05, noise="none").log
     for run in log.runs:
         assert np.abs(run.euler[:, :2]).max() < 0.75
         assert run.position[:, 2].min() > 0.5
@@ -94,7 +94,7 @@ def test_the_chirp_rises_from_its_lowest_to_its_highest_frequency():
 
 
 def test_reciprocal_headings_are_opposite_and_the_speed_is_the_same(model):
-    log = simulate(model, "reciprocal", runs=1, duration=60.0, rate=10.0, max_step=0.05).log
+    log = simulate(model, "reciprocal", runs=1, duration=60.0, rate=10.0, max_step=0.05, noise="none").log
     run = log.runs[0]
     heading = np.unwrap(run.euler[:, 2])
     late = [slice(120, 148), slice(270, 298), slice(420, 448), slice(570, 598)]
@@ -106,7 +106,7 @@ def test_reciprocal_headings_are_opposite_and_the_speed_is_the_same(model):
 
 
 def test_dives_reach_their_depths(model):
-    run = simulate(model, "dives", runs=1, duration=60.0, rate=10.0, max_step=0.05).log.runs[0]
+    run = simulate(model, "dives", runs=1, duration=60.0, rate=10.0, max_step=0.05, noise="none").log.runs[0]
     assert np.ptp(run.position[:, 2]) == pytest.approx(4.0, abs=1.2)
 
 
@@ -115,7 +115,7 @@ def test_what_must_keep_moving_gets_only_what_it_can_do():
     with pytest.raises(
         ConfigError, match=r"coast_down needs a vehicle that can hover; for remus100 take survey"
     ):
-        simulate(model, "coast_down", runs=1, duration=10.0, rate=10.0)
+        simulate(model, "coast_down", runs=1, duration=10.0, rate=10.0, noise="none")
     names = {p.name for p in manoeuvres(model, 20.0, 10.0, names=("coast_down", "reciprocal"))}
     assert names == {"reciprocal"}
 

@@ -61,7 +61,9 @@ def plain_wrench(command):
 
 def test_log_equals_an_independent_plant():
     current = {"v_north": 0.2, "v_east": -0.1, "v_down": 0.05}
-    made = simulate(model_of("rov90"), "multisine", hidden={"ocean_current": current}, runs=1, duration=6.0)
+    made = simulate(
+        model_of("rov90"), "multisine", hidden={"ocean_current": current}, runs=1, duration=6.0, noise="none"
+    )
     run = made.log.runs[0]
     w, x, y, z = run.quaternion[0]
     rotation = np.array([
@@ -88,8 +90,8 @@ def test_log_equals_an_independent_plant():
 def test_accelerations_are_slopes_inside_the_interval(hidden):
     step = {"name": "paper", "time": 0.5, "force": 80.0}
     options = {"hidden": hidden, "runs": 1, "duration": 1.0}
-    coarse = simulate(model_of("rov95"), step, **options, rate=10.0).log.runs[0]
-    fine = simulate(model_of("rov95"), step, **options, rate=1000.0).log.runs[0]
+    coarse = simulate(model_of("rov95"), step, **options, rate=10.0, noise="none").log.runs[0]
+    fine = simulate(model_of("rov95"), step, **options, rate=1000.0, noise="none").log.runs[0]
     h = 1e-3
     for k in range(10):
         near = fine.nu[100 * k : 100 * k + 4]
@@ -104,7 +106,7 @@ def test_accelerations_are_slopes_inside_the_interval(hidden):
 def test_a_lag_settles_at_the_first_command():
     step = {"name": "paper", "time": 0.5}
     plain, lagged = (
-        simulate(model_of("rov95"), step, hidden=h, runs=1, duration=1.0, rate=10.0).log.runs[0]
+        simulate(model_of("rov95"), step, hidden=h, runs=1, duration=1.0, rate=10.0, noise="none").log.runs[0]
         for h in (None, {"thruster_lag": {"time_constant": 0.2}})
     )
     assert lagged.nu[5] == pytest.approx(plain.nu[5], abs=1e-12)
@@ -113,10 +115,10 @@ def test_a_lag_settles_at_the_first_command():
 
 def test_sensor_effects_change_what_is_logged_not_the_motion():
     options = {"runs": 1, "duration": 3.0, **COARSE}
-    truth = simulate(model_of("rov95"), "multisine", **options).log.runs[0]
+    truth = simulate(model_of("rov95"), "multisine", **options, noise="none").log.runs[0]
     arm = np.array([0.3, 0.1, -0.2])
     hidden = {"velocity_lever_arm": dict(zip("xyz", arm.tolist(), strict=True))}
-    seen = simulate(model_of("rov95"), "multisine", hidden=hidden, **options).log.runs[0]
+    seen = simulate(model_of("rov95"), "multisine", hidden=hidden, **options, noise="none").log.runs[0]
     assert np.array_equal(seen.position, truth.position)
     assert np.array_equal(seen.thrusters, truth.thrusters)
     for name in ("nu", "nu_dot"):
@@ -150,13 +152,15 @@ def test_a_run_stays_what_it_is_when_more_are_asked_for():
 def test_noise_and_hidden_effects_do_not_change_the_manoeuvre():
     model = model_of("rov95")
     options = {"runs": 1, "duration": 4.0, **COARSE}
-    plain = simulate(model, "multisine", **options).log.runs[0]
+    plain = simulate(model, "multisine", **options, noise="none").log.runs[0]
     other = simulate(model, "multisine", "realistic", ["ocean_current"], **options).log.runs[0]
     assert np.array_equal(plain.thrusters, other.thrusters)
 
 
 def test_actuation_by_wrench():
-    made = simulate(model_of("rov95"), "multisine", actuation="wrench", runs=1, duration=3.0, **COARSE)
+    made = simulate(
+        model_of("rov95"), "multisine", actuation="wrench", runs=1, duration=3.0, **COARSE, noise="none"
+    )
     run = made.log.runs[0]
     assert made.plant.actuation == "wrench" and made.log.kind == "wrench"
     assert run.thrusters is None and run.wrench.shape == (31, 6)
@@ -164,15 +168,19 @@ def test_actuation_by_wrench():
 
 
 def test_fins_are_logged_for_a_vehicle_that_has_them():
-    run = simulate(model_of("remus100"), "multisine", runs=1, duration=3.0, **COARSE).log.runs[0]
+    run = simulate(model_of("remus100"), "multisine", runs=1, duration=3.0, **COARSE, noise="none").log.runs[
+        0
+    ]
     assert run.fins.shape == (31, 4) and run.thrusters.shape == (31, 1)
     assert run.fins.std() > 0.01
 
 
 def test_voltage_only_where_it_is_known_and_slowly_falling():
-    assert simulate(model_of("rov95"), runs=1, duration=3.0, **COARSE).log.runs[0].voltage is None
+    assert (
+        simulate(model_of("rov95"), runs=1, duration=3.0, **COARSE, noise="none").log.runs[0].voltage is None
+    )
     options = {"runs": 3, "duration": 60.0, **COARSE}
-    for run in simulate(model_of("bluerov2"), **options).log.runs:
+    for run in simulate(model_of("bluerov2"), **options, noise="none").log.runs:
         assert (np.diff(run.voltage) < 0).all()
         assert 0.9 * 16 < run.voltage.min() <= run.voltage.max() < 1.06 * 16
         assert 0.1 < run.voltage[0] - run.voltage[-1] < 0.3
@@ -183,14 +191,14 @@ def test_divergence_is_an_error_that_says_when_and_which_term():
     plant_model = model_of("rov90", linear_damping=-3e3 * np.eye(6))
     words = r"rov90: run \d diverged after [\d.]+ s; the largest term was (linear|quadratic) damping"
     with pytest.raises(AuvnnError, match=words):
-        simulate(plant_model, "survey", runs=2, duration=10.0, **COARSE)
-    assert simulate(model, "survey", runs=1, duration=2.0, **COARSE).log.samples == 21
+        simulate(plant_model, "survey", runs=2, duration=10.0, **COARSE, noise="none")
+    assert simulate(model, "survey", runs=1, duration=2.0, **COARSE, noise="none").log.samples == 21
 
 
 def test_drag_that_drives_is_held_by_quadratic_drag_where_steps_are_short_enough():
     """v = 3000 / d_q at most, for each axis by itself; a step that is too long would only seem to diverge."""
     plant_model = model_of("rov90", linear_damping=-3e3 * np.eye(6))
-    run = simulate(plant_model, "multisine", runs=1, duration=10.0, **COARSE).log.runs[0]
+    run = simulate(plant_model, "multisine", runs=1, duration=10.0, **COARSE, noise="none").log.runs[0]
     own = np.diag(plant_model.vehicle.quadratic_damping)
     assert 1.0 < np.abs(run.nu[:, :3]).max() < 2 * 3e3 / own[:3].min()
 
@@ -250,5 +258,5 @@ def test_truth_follows_the_contract():
 )
 def test_bad_options_are_refused_in_one_line(options, word):
     with pytest.raises(ConfigError, match=word) as caught:
-        simulate(model_of("rov95"), **options)
+        simulate(model_of("rov95"), **{"noise": "none", **options})
     assert "\n" not in str(caught.value)

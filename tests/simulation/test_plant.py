@@ -37,10 +37,14 @@ def test_typical_values_are_plausible_and_never_the_null(name):
 
 def test_hidden_by_name_gets_typical_values_that_do_not_hang_on_the_order():
     model = GreyBox(load_vehicle("rov95"))
-    one = simulate(model, "paper", hidden=["ocean_current", "net_buoyancy"], **SHORT).truth["hidden"]
+    one = simulate(model, "paper", hidden=["ocean_current", "net_buoyancy"], **SHORT, noise="none").truth[
+        "hidden"
+    ]
     other = {"net_buoyancy": None, "ocean_current": {}}
-    assert simulate(model, "paper", hidden=other, **SHORT).truth["hidden"] == one
-    partly = simulate(model, "paper", hidden={"ocean_current": {"v_east": 0.1}}, **SHORT).truth["hidden"]
+    assert simulate(model, "paper", hidden=other, **SHORT, noise="none").truth["hidden"] == one
+    partly = simulate(model, "paper", hidden={"ocean_current": {"v_east": 0.1}}, **SHORT, noise="none").truth[
+        "hidden"
+    ]
     assert partly == {"ocean_current": {"v_north": 0.0, "v_east": 0.1, "v_down": 0.0}}
 
 
@@ -73,7 +77,7 @@ def test_drawn_coefficients_stay_physical():
 
 def test_drawn_plant_has_exactly_these_coefficients():
     model = GreyBox(load_vehicle("rov90"))
-    made = simulate(model, "paper", coefficients="drawn", **SHORT)
+    made = simulate(model, "paper", coefficients="drawn", **SHORT, noise="none")
     factors = made.truth["coefficients"]
     assert set(factors) == set(GROUPS)
     body, before = made.plant.prepare().body, model.prepare().body
@@ -83,13 +87,15 @@ def test_drawn_plant_has_exactly_these_coefficients():
     ):  # fmt: skip
         got, was = (np.diagonal(getattr(b, name).detach().numpy()) for b in (body, before))
         assert got / was == pytest.approx(list(factors[group].values()), rel=1e-12)
-    exact = simulate(model, "paper", **SHORT)
+    exact = simulate(model, "paper", **SHORT, noise="none")
     assert exact.truth["coefficients"] == {} and exact.plant.effect_names == []
 
 
 def test_a_hidden_group_stays_exact_beside_what_is_hidden():
     hidden = {"added_mass": {"X": 1.7}}
-    made = simulate(GreyBox(load_vehicle("rov95")), "paper", hidden=hidden, coefficients="drawn", **SHORT)
+    made = simulate(
+        GreyBox(load_vehicle("rov95")), "paper", hidden=hidden, coefficients="drawn", **SHORT, noise="none"
+    )
     assert set(made.truth["coefficients"]) == {"linear_damping", "quadratic_damping", "inertia"}
     assert made.plant.effect("added_mass").values()["X"] == 1.7
     assert made.plant.effect("added_mass").values()["Y"] == 1.0
@@ -97,7 +103,7 @@ def test_a_hidden_group_stays_exact_beside_what_is_hidden():
 
 def test_drawing_multiplies_what_the_model_already_states():
     model = GreyBox(load_vehicle("rov95")).with_effects({"added_mass": {"X": 2.0}})
-    made = simulate(model, "paper", coefficients="drawn", **SHORT)
+    made = simulate(model, "paper", coefficients="drawn", **SHORT, noise="none")
     factor = made.truth["coefficients"]["added_mass"]["X"]
     assert made.plant.effect("added_mass").values()["X"] == pytest.approx(2.0 * factor)
     assert made.truth["hidden"] == {}
@@ -105,5 +111,5 @@ def test_drawing_multiplies_what_the_model_already_states():
 
 def test_the_model_itself_is_left_alone():
     model = GreyBox(load_vehicle("rov95"))
-    simulate(model, "paper", hidden=["ocean_current"], coefficients="drawn", **SHORT)
+    simulate(model, "paper", hidden=["ocean_current"], coefficients="drawn", **SHORT, noise="none")
     assert model.effect_names == [] and model.actuation == "thrusters"

@@ -17,13 +17,13 @@ from auvnn.comparison import compare
 from auvnn.comparison.compare import write_predictions
 from auvnn.diagnosis import diagnose
 from auvnn.errors import AuvnnError
-from auvnn.improvement import add
+from auvnn.improvement import add, improve
 from auvnn.logs import Log
-from auvnn.metrics.noise_floor import noise_floor
-from auvnn.metrics.rollouts import HORIZONS, NAMES, roll, scale_of
+from auvnn.metrics.rollouts import HORIZONS, NAMES, scale_of
 from auvnn.models import GreyBox, load
 
 Say = Callable[[str], None]
+SECONDS = 300.0  # after which the whole loop begins nothing new
 
 
 class Tasks:
@@ -48,6 +48,7 @@ class Tasks:
             "compare": self._compare,
             "diagnose": self._diagnose,
             "add": self._add,
+            "improve": self._improve,
             "example": self._example,
         }
         out = Path(order["out"])
@@ -97,14 +98,8 @@ class Tasks:
         model = self._model(order, log)
         say("one step ahead, and free running from 0.5 s to the whole run")
         comparison = compare(model, log)
-        say("the noise floor by horizon")
         scale = scale_of(log)
-        floors: dict[str, float | None] = {}
-        for horizon in HORIZONS:
-            rolled = roll(model, log, horizon, scale, engine="firm")
-            floors[horizon] = (
-                None if rolled is None else noise_floor(model, rolled, log, scale, engine="firm")
-            )
+        floors = {h: comparison.rollout.get(h, {}).get("noise_floor") for h in HORIZONS}
         more = {
             "regimes": comparison.regimes,
             "wrench_floor": comparison.noise_floor,
@@ -142,6 +137,16 @@ class Tasks:
         with (out / "series.npz").open("wb") as stream:
             np.savez(stream, **arrays)
         return {"accepted": better.accepted, "waterfall": better.waterfall, "gain": better.gain}, better
+
+    def _improve(self, order: dict[str, Any], out: Path, say: Say) -> tuple[dict[str, Any], Answer]:
+        log, test = self._logs(order, say)
+        if test is None:
+            raise AuvnnError("the log is too short to hold a part of it out: name a further log to judge by")
+        options = {"test": test, "progress": say, "tell": say, "force": bool(order.get("force"))}
+        found = improve(self._model(order, log), log, seconds=order.get("seconds", SECONDS), **options)
+        more = {"held_out_words": order["log"]["words"], "effects_in_model": found.model.effect_names}
+        _write(found, out, more)
+        return {"verdict": found.verdict, "waterfall": found.waterfall}, found
 
     def _example(self, order: dict[str, Any], out: Path, say: Say) -> tuple[dict[str, Any], Answer | None]:
         from auvnn.studies.demo import VEHICLE, made_logs

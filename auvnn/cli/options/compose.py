@@ -17,7 +17,16 @@ from omegaconf.errors import OmegaConfBaseException
 
 from auvnn.catalogue import unknown_name
 from auvnn.cli.options.foreign import judge_hydra
-from auvnn.cli.options.suggestions import _first, _heads, _leaves, _paths, _wrong_kind, quoted, resolver_in
+from auvnn.cli.options.suggestions import (
+    _first,
+    _heads,
+    _leaves,
+    _paths,
+    _wrong_kind,
+    meant,
+    quoted,
+    resolver_in,
+)
 from auvnn.config import config_dir
 from auvnn.errors import ConfigError, one_line
 
@@ -75,6 +84,8 @@ class Composer:
         Raises:
             ConfigError: something is wrong with one of them; one line says what, and what was meant.
         """
+        if bare := [w for w in words if "=" not in w and not w.startswith("~")]:
+            raise ConfigError(meant(self.verb, words, bare, self.known))
         parsed = [o for o in map(self._parse, words) if not self._says_none(o)]
         for override in parsed:
             key, _, value = str(override.input_line).partition("=")
@@ -145,9 +156,6 @@ class Composer:
         key, _, value = text.partition("=")
         if ".." in key or (key.startswith("+") and ".." in re.split(r"[/'\"]", value)):
             raise ConfigError(f"{word}: leads out of the folder of configs; name one that is in it")
-        if "=" not in text:
-            near = f"log={word}" if "log" in self.known else "key=value"
-            raise ConfigError(f"'{word}' is not of the form key=value; did you mean {near}?")
         if key in _RESERVED:
             raise ConfigError(f"{key} cannot be set; use out=, --multirun and --config-dir")
         try:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import difflib
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override
 from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
+
+from auvnn.config import config_dir
+from auvnn.errors import one_line
 
 _KEYED = re.compile(r"([A-Za-z_][\w./@]*)=(.*)", re.DOTALL)
 
@@ -95,3 +100,60 @@ def _leaves(data: Any, path: tuple[str, ...] = ()) -> Iterable[tuple[tuple[str, 
             yield from _leaves(value, path)
     elif path:
         yield path, data
+
+
+# What the files of each key end in.
+_ENDINGS = {
+    "mapping": ("mapping.yaml", "mapping.yml", "map.yaml", "map.yml"),
+    "model": (".yaml", ".yml"),
+    "log": (".csv", ".parquet", ".mcap", ".bag", ".ulg", ".bin", ".tlog", ".h5", ".nc", ".mat", ".db3"),
+}
+
+
+def meant(verb: str, words: Sequence[str], bare: Sequence[str], known: Iterable[str]) -> str:
+    """Return what somebody meant who left out the keys: the whole command with them, as far as they can be told.
+
+    Args:
+        verb: of the command.
+        words: all of them.
+        bare: those without a key.
+        known: the verb's keys.
+    """
+    taken = {w.partition("=")[0] for w in words if "=" in w}
+    free = [
+        k
+        for k in ("model", "log", "effect", "excitation", "case", "to", "file")
+        if k in known and k not in taken
+    ]
+    guessed: dict[str, str] = {}
+    for word in bare:
+        key = _key_of(word, [k for k in (*free, "mapping") if k in known and k not in guessed.values()])
+        if key is not None:
+            guessed[word] = key
+    said = ", ".join(f"'{one_line(w, 80)}'" for w in bare)
+    wrong = f"{said} {'is' if len(bare) == 1 else 'are'} not of the form key=value"
+    if len(guessed) < len(bare):
+        return f"{wrong}; auvnn {verb} --help lists the keys"
+    full = [w if w not in guessed else f"{guessed[w]}={one_line(w, 80)}" for w in words]
+    return f"{wrong}; did you mean: auvnn {verb} {' '.join(full)}"
+
+
+def _key_of(word: str, free: Sequence[str]) -> str | None:
+    """Return the key whose value a word looks like: a vehicle, an effect, a model's folder, a log."""
+    from auvnn.effects import EFFECTS
+
+    lower = word.lower()
+    vehicles = {path.stem for path in (config_dir() / "vehicle").glob("*.yaml")}
+    if "model" in free and word in vehicles:
+        return "model"
+    if word in EFFECTS:
+        return next((k for k in ("effect",) if k in free), None)
+    for key, endings in _ENDINGS.items():
+        if key in free and lower.endswith(endings):
+            return key
+    if "model" in free and (Path(word) / "model.yaml").is_file():
+        return "model"
+    for key in ("log", "model", "file"):
+        if key in free and (key != "model" or difflib.get_close_matches(word, vehicles)):
+            return key
+    return None

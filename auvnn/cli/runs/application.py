@@ -153,8 +153,10 @@ def _run(verb: Verb, composer: Composer, config: DictConfig, out: Path) -> None:
     say = Speaker(only_json=options["json"], verbose=options["verbose"])
     for key in verb.reads:
         # A model may also be a name, which is not ours to judge.
-        if options[key] is not None and (key != "model" or _is_path(options[key])):
-            files(options, key)
+        named = options[key] if isinstance(options[key], list) else [options[key]]
+        paths = [n for n in named if n is not None and (key != "model" or _is_path(n))]
+        if paths or (named == [] and key != "model"):
+            files({key: paths}, key)
     if options["dry_run"]:
         refuse_taken(out, overwrite=options["overwrite"])
         if verb.foresee is not None:

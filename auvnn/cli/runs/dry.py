@@ -8,7 +8,7 @@ from auvnn.cli.runs.job import Job, files
 from auvnn.errors import ConfigError
 
 
-def foreseen(job: Job) -> None:
+def foreseen(job: Job, several: bool = False) -> None:
     """Refuse what the verb itself would refuse, as far as that costs next to nothing.
 
     Read are the model, the mapping and the first rows of every log; names of effects and their parameters are looked up.
@@ -18,7 +18,7 @@ def foreseen(job: Job) -> None:
     """
     options = job.options
     kinds = _beginnings(job)
-    model = _model(job, kinds)
+    model = _model(job, kinds, several)
     for key in ("effect", "effects", "hidden"):
         if options.get(key) is not None:
             _names(job, key, model)
@@ -45,13 +45,16 @@ def _beginnings(job: Job) -> tuple[str, ...] | None:
     return found
 
 
-def _model(job: Job, kinds: tuple[str, ...] | None) -> Any:
+def _model(job: Job, kinds: tuple[str, ...] | None, several: bool = False) -> Any:
     source = job.options.get("model")
     if source is None:
         return None
     from auvnn.cli.speech import Speaker
 
     quiet = Job(job.options, job.out, job.folder, Speaker(only_json=True))
+    if isinstance(source, list) and several:
+        found = [quiet.model(kinds=kinds or (), source=name) for name in quiet.names("model")]
+        return found[0]
     return quiet.model(kinds=kinds or ())
 
 

@@ -68,7 +68,11 @@ class Job:
         """Return an option."""
         return self.options[key]
 
-    def model(self, log: Log | None = None, kinds: Sequence[str] = ()) -> GreyBox:
+    def models(self, log: Log) -> dict[str, GreyBox]:
+        """Load the model of `model=`, or each of a list, by what it was called on the command line."""
+        return {str(source): self.model(log, source=str(source)) for source in self.names("model")}
+
+    def model(self, log: Log | None = None, kinds: Sequence[str] = (), source: str | None = None) -> GreyBox:
         """Load the model of `model=`, driven by what the log has, thruster commands or a wrench.
 
         A log that has both drives the model by what the model was saved with.
@@ -76,16 +80,23 @@ class Job:
         Args:
             log: the log.
             kinds: what commands it has, where it is not in memory, that which is taken by default first.
+            source: one of several models.
+
+        Raises:
+            ConfigError: there is a list of models where one is needed.
         """
         from auvnn.models import load
 
-        source = os.path.expanduser(str(self["model"]))
+        if source is None and isinstance(self["model"], list):
+            raise ConfigError(f"model={self['model']}: one model is needed; only compare takes a list")
+        called = str(self["model"] if source is None else source)
+        source = os.path.expanduser(called)
         model = load(source)
         if log is not None:
             kinds = (log.kind, *(k for k in ("thrusters", "wrench") if log.drives(k) and k != log.kind))
         if kinds and model.actuation not in kinds:
             model = load(source, actuation=kinds[0])
-        source = str(self["model"])
+        source = called
         effects = ", ".join(model.effect_names) or "none"
         learned = "none" if model.damping is None else "six subnetworks"
         name = source if source == model.vehicle.name else f"{source}: {model.vehicle.name}"

@@ -8,6 +8,7 @@ from auvnn.cli.runs.job import Answering, Job, Verb
 
 def _run(job: Job) -> Answering:
     from auvnn.online import adapt
+    from auvnn.report.pages.sections.adaptation_words import off_words
 
     log = job.log()
     model = job.model(log)
@@ -30,6 +31,8 @@ def _run(job: Job) -> Answering:
         job.say(f"change    run {change['run']}: {change['words']}")
     if not data["changes"]:
         job.say("change    none was seen")
+        for words in off_words(metrics):
+            job.say(f"off       {words}", style="yellow")
     ratio = metrics["frozen_5_s_error_ratio"]
     shown = "unknown" if ratio is None else format(ratio, ".3g")
     job.say(f"result    free running 5 s with weights frozen at each moment: {shown} times the error before")

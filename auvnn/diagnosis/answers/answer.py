@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.answers import Answer
+from auvnn.answers import PLOTTED, Answer
+from auvnn.cards import Card, figure, measured
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.training.confounding.confounding import Confounding
 
@@ -19,7 +20,7 @@ class OneOf(list[str]):
     """Names of which one is missing, and the log cannot tell which; `add` takes the first of them."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, repr=False)
 class Diagnosis(Answer):
     """What is missing in a model; `to_dict` is `diagnosis.json` of the public contract.
 
@@ -71,6 +72,27 @@ class Diagnosis(Answer):
     def surfaces(self) -> list[dict[str, Any]]:
         """The learned damping by degree of freedom, and the range that the log covered; empty without any."""
         return [] if self.absorbed is None else self.absorbed.surfaces
+
+    def card(self) -> Card:
+        """Return the verdict, and the leading candidates with their values."""
+        named = [*self.missing, *(n for n in self.nearest if n not in self.missing)]
+        leading = [c for c in self.candidates if c["effect"] in named]
+        rows = []
+        for c in leading or self.candidates[:5]:
+            fitted = [
+                f"{n} {measured(p['value'], p['std'], p['unit'])[0]}" for n, p in c["parameters"].items()
+            ]
+            rows.append(
+                [c["effect"], figure(c.get("p_value"), 2), figure(c.get("explained"), 2), "; ".join(fitted)]
+            )
+        return Card(
+            f"Diagnosis of {self.model} with {self.log}",
+            ": ".join(v for v in (self.verdict, ", ".join(named)) if v),
+            self.story[:3],
+            ("candidate", "p", "explained share", "value ± one standard deviation"),
+            rows,
+            f".missing goes into auvnn.add; {PLOTTED}",
+        )
 
     @property
     def story(self) -> list[str]:

@@ -86,7 +86,7 @@ def diagnose_files(
         executor: who computes: `serial`, `processes`, `ray` or `dask`.
         address: of a Ray or Dask cluster that is running.
         advice: for an ambiguous answer, also work out which manoeuvre would tell the candidates apart.
-        force: go on with a log that contradicts itself.
+        force: go on with a log that contradicts itself, or in which nothing moves or is driven.
         tolerance: what does not matter, as in `diagnose`.
         costs: also work out what each name costs.
         progress: told in words what is being done.
@@ -111,6 +111,8 @@ def diagnose_files(
     with executor_for(executor, workers, address) as pool:
         plan = _planned(pool, paths, cut, say)
         sample, told = _sample(plan, paths, cut, search)
+        # What `check` calls an error, as far as the sample shows it.
+        sample.quality().refuse_errors(force)
         found, under_way = searched(
             model,
             sample,
@@ -121,6 +123,8 @@ def diagnose_files(
             force=force,
             tolerance=tolerance,
             costs=costs,
+            # The tests on more windows that follow hold the force for noise as the windows show it.
+            stochastic=False,
             progress=say,
         )
         parts = plan.spread(windows)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from auvnn.effects import EFFECTS
+from auvnn.effects.registering import names_of
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log
 from auvnn.metrics.windows import Windows, cut_windows
@@ -24,6 +25,7 @@ def candidates_for(
     model: GreyBox, log: Log, wanted: str | Sequence[str] | None
 ) -> tuple[list[str], dict[str, list[str]]]:
     """Return the effects that can be asked for, and for the others which channels they lack."""
+    wanted = names_of(wanted)
     if isinstance(wanted, str):
         wanted = [wanted]
     names = EFFECTS.names() if wanted is None else list(dict.fromkeys(wanted))

@@ -7,8 +7,10 @@ delay. What moves the vehicle over an interval is the mean of the command, and t
     (1 - share) u_k + share u_(k+1):
 
 a share of nought holds the command, one half is the straight line, anything between nought and one a command that
-changes so much of an interval before its sample. Commands that change later than logged are another matter: that is
-`actuation_delay`. The log is asked by the likelihood of free running with everything that is uncertain following.
+changes so much of an interval before its sample. Where the command bends much within an interval, the straight line
+falls short: `smooth` is the mean of the cubic through four samples, over the interval that the share moves in the same
+way. Commands that change later than logged are another matter: that is `actuation_delay`. The log is asked by the
+likelihood of free running with everything that is uncertain following.
 """
 
 from __future__ import annotations
@@ -18,6 +20,8 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
@@ -26,6 +30,7 @@ from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.estimation.normal_equations import linearise, normal_equations
 from auvnn.metrics.windows import Windows
 
+Array = NDArray[np.float64]
 LINEAR = 0.5
 # Where the straight line does as well as a share of its own up to these odds, it is the plainer answer.
 PLAINER = float(np.log(10.0))
@@ -36,7 +41,7 @@ class Holding:
     """How commands go from sample to sample, by a log.
 
     Attributes:
-        name: "held", "linear" or "ahead".
+        name: "held", "linear", "ahead" or "smooth".
         share: of the next sample's command in an interval's mean.
         odds: logarithm of the odds against holding; nought where it is held.
         gain: fall of the weighted squared error, for the variance that the windows show.
@@ -47,22 +52,51 @@ class Holding:
     odds: float
     gain: float
 
+    def applied(self, windows: Windows) -> Windows:
+        """Return windows of commands that go so."""
+        return between(windows, self.share, smooth=self.name == "smooth")
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
         return {"between_samples": self.name, "share_of_next": self.share, "log_odds": self.odds}
 
 
-def between(windows: Windows, share: float) -> Windows:
-    """Return windows whose commands and fins have so much of the next sample's in every interval."""
-    if share == 0.0:
+def between(windows: Windows, share: float, *, smooth: bool = False) -> Windows:
+    """Return windows whose commands and fins have the means that they take between samples.
+
+    Args:
+        windows: of commands that are held.
+        share: of the next sample's command in an interval's mean.
+        smooth: along the cubic through four samples instead of the straight line through two.
+    """
+    if share == 0.0 and not smooth:
         return windows
     given = windows.inputs
+    weights = cubic_weights(share) if smooth else (0.0, 1.0 - share, share, 0.0)
 
     def mixed(values: Tensor) -> Tensor:
-        return (1.0 - share) * values + share * torch.cat([values[:, 1:], values[:, -1:]], dim=1)
+        whole = torch.cat([values[:, :1], values, values[:, -1:], values[:, -1:]], dim=1)
+        count = values.shape[1]
+        return torch.stack([w * whole[:, j : j + count] for j, w in enumerate(weights)]).sum(0)
 
     fins = None if given.fins is None else mixed(given.fins)
     return replace(windows, inputs=replace(given, command=mixed(given.command), fins=fins))
+
+
+def cubic_weights(share: float) -> tuple[float, ...]:
+    """Return the weights of samples -1, 0, 1, 2 in the mean of the cubic through them, share - 1/2 to share + 1/2.
+
+    A share of one half is the interval itself: -1/24, 13/24, 13/24, -1/24.
+    """
+    at, out = (-1.0, 0.0, 1.0, 2.0), []
+    for j in at:
+        basis = Polynomial([1.0])
+        for m in at:
+            if m != j:
+                basis = basis * Polynomial([-m / (j - m), 1.0 / (j - m)])
+        whole = basis.integ()
+        out.append(float(whole(share + 0.5) - whole(share - 0.5)))
+    return tuple(out)
 
 
 def holding(first: FittedHypothesis, windows: Windows) -> Holding:
@@ -71,7 +105,7 @@ def holding(first: FittedHypothesis, windows: Windows) -> Holding:
     The squared error is taken as a parabola of the share, through nought, one half and one.
 
     Args:
-        first: the fit without any effect, of commands that are held.
+        first: a fit of commands that are held.
         windows: those it was fitted to.
     """
     held = Holding("held", 0.0, 0.0, 0.0)
@@ -80,19 +114,38 @@ def holding(first: FittedHypothesis, windows: Windows) -> Holding:
         return held
     sums = first.fitted.statistics
     factor = variance_inflation(sums.slope, sums.total, sums.run)
-    costs = [_cost(first, between(windows, share)) / factor for share in (0.0, LINEAR, 1.0)]
-    gain = costs[0] - costs[1]
-    bend = 2.0 * (costs[0] - 2.0 * costs[1] + costs[2])
-    found = Holding("linear", LINEAR, 0.5 * gain, gain)
-    if bend > 0.0:
-        share = float(np.clip(LINEAR - (costs[2] - costs[0]) / (2.0 * bend), 0.0, 1.0))
-        # c(s) = c(1/2) + slope (s - 1/2) + bend (s - 1/2)^2, with slope = c(1) - c(0).
-        most = gain - (costs[2] - costs[0]) * (share - LINEAR) - bend * (share - LINEAR) ** 2
-        spread = min(1.0 / np.sqrt(bend), 1.0)
-        odds = 0.5 * most + min(float(np.log(np.sqrt(2.0 * np.pi) * spread)), 0.0)
-        if odds > found.odds + PLAINER:
-            found = Holding("ahead", share, odds, most)
+    plain = _cost(first, windows) / factor
+    half, full = (_cost(first, between(windows, share)) / factor for share in (LINEAR, 1.0))
+    found = Holding("linear", LINEAR, 0.5 * (plain - half), plain - half)
+    ahead = _vertex("ahead", (plain, half, full), plain)
+    if ahead is not None and ahead.odds > found.odds + PLAINER:
+        found = ahead
+    low, half, full = (
+        _cost(first, between(windows, share, smooth=True)) / factor for share in (0.0, LINEAR, 1.0)
+    )
+    smooth = _vertex("smooth", (low, half, full), plain)
+    if smooth is not None and smooth.odds > found.odds + PLAINER:
+        found = smooth
     return found if found.odds > ODDS else held
+
+
+def _vertex(name: str, costs: tuple[float, float, float], plain: float) -> Holding | None:
+    """Return the share at which a parabola through the costs at nought, one half and one is least, None without one."""
+    bend = 2.0 * (costs[0] - 2.0 * costs[1] + costs[2])
+    if not bend > 0.0:
+        return None
+    share = float(np.clip(LINEAR - (costs[2] - costs[0]) / (2.0 * bend), 0.0, 1.0))
+    # c(s) = c(1/2) + slope (s - 1/2) + bend (s - 1/2)^2, with slope = c(1) - c(0).
+    least = costs[1] + (costs[2] - costs[0]) * (share - LINEAR) + bend * (share - LINEAR) ** 2
+    spread = min(1.0 / np.sqrt(bend), 1.0)
+    odds = 0.5 * (plain - least) + min(float(np.log(np.sqrt(2.0 * np.pi) * spread)), 0.0)
+    return Holding(name, share, odds, plain - least)
+
+
+def squared_error(explanation: FittedHypothesis, sigma: Array) -> float:
+    """Return an explanation's squared error by weights that all explanations of a log share, sigma (18,)."""
+    seen = np.isfinite(sigma)
+    return float((explanation.fitted.statistics.channel.sum(0)[seen] / sigma[seen] ** 2).sum())
 
 
 def _cost(first: FittedHypothesis, windows: Windows) -> float:

@@ -36,12 +36,14 @@ class Foretold:
         input: name.
         share: of the force's mean square, that of the stochastic force included.
         least: lower 95 % limit of the share; nought where the gain on runs left out may be chance.
+        gain: fall of the weighted squared error on what is left out.
     """
 
     axis: str
     input: str
     share: float
     least: float
+    gain: float = 0.0
 
 
 def foretold(explanation: FittedHypothesis, windows: Windows) -> Foretold | None:
@@ -83,7 +85,7 @@ def foretold(explanation: FittedHypothesis, windows: Windows) -> Foretold | None
             z = float(gain.sum()) / max(float(np.sqrt(len(gain)) * gain.std(ddof=1)), 1e-300)
             found = _share(whole, columns, explanation, size, features[:, own], float(law.rms[i]))
             least = found[1] if z > SURE else 0.0
-            told = Foretold(AXES[i], name, found[0], least)
+            told = Foretold(AXES[i], name, found[0], least, float(gain.sum()))
             if best is None or (told.least, told.share) > (best.least, best.share):
                 best = told
     return best

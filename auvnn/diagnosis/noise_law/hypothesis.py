@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,14 +11,17 @@ from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.layout import Layout, scales, shapes
-from auvnn.diagnosis.noise_law.law import Estimate, estimate
+from auvnn.diagnosis.noise_law.law import Estimate, Likelihood, estimate
 from auvnn.diagnosis.noise_law.sums import ForceSums
 from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS
 from auvnn.effects import effect_class
+from auvnn.estimation.priors import limits
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
+# How often parameters that would leave their bounds are held there.
+ROUNDS = 3
 
 
 @dataclass(frozen=True)
@@ -30,12 +33,14 @@ class Hypothesis:
         estimate: its own law, and its likelihood there.
         misfit: minus twice the log marginal likelihood, departure of the parameters in it, their volume aside.
         evidence: logarithm of the marginal likelihood, up to what all hypotheses of a log share.
+        weighed: the explanation with its windows' sums under its own law.
     """
 
     explanation: FittedHypothesis
     estimate: Estimate
     misfit: float
     evidence: float
+    weighed: FittedHypothesis
 
     @property
     def name(self) -> str:
@@ -60,7 +65,7 @@ class BesideForce:
     """
 
     steps: list[dict[str, Any]]
-    groups: list[list[str]]
+    groups: list[list[FittedHypothesis]]
     last: FittedHypothesis
     windows: Windows
     estimate: Estimate
@@ -68,11 +73,6 @@ class BesideForce:
     p_value: float
     first: FittedHypothesis
     first_law: ForceLaw | None
-
-    @property
-    def names(self) -> list[str]:
-        """Effects that were named or tied, in order."""
-        return [e for s in self.steps if s["verdict"] in ("named", "ambiguous") for e in s["effects"]]
 
 
 def judged(layout: Layout, explanation: FittedHypothesis, sums: ForceSums, law: ForceLaw) -> Hypothesis:
@@ -85,6 +85,16 @@ def judged(layout: Layout, explanation: FittedHypothesis, sums: ForceSums, law: 
         law: to begin from; a degree of freedom without a force in it has none here.
     """
     found = estimate(sums, law, law.axes)
+    # What the law would move beyond a bound stays at it, and the others are asked again.
+    low, high = limits(explanation.fitted.model, explanation.names, explanation.fitted.priors)
+    for _ in range(ROUNDS):
+        beyond = sums.inside & (
+            (explanation.fitted.theta + found.step < low) | (explanation.fitted.theta + found.step > high)
+        )
+        if not beyond.any():
+            break
+        sums = replace(sums, inside=sums.inside & ~beyond)
+        found = estimate(sums, found.law or law, law.axes)
     size, mean, shape = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=bool)]
     for name in explanation.names:
         stated = name in layout.spreads and name not in explanation.effects
@@ -99,7 +109,9 @@ def judged(layout: Layout, explanation: FittedHypothesis, sums: ForceSums, law: 
     information = found.information * sizes[:, None] * sizes
     volume = float(np.linalg.slogdet(information + np.eye(len(sizes)))[1])
     misfit = data + float(away @ away)
-    return Hypothesis(explanation, found, misfit, -0.5 * (misfit + volume))
+    own = replace(explanation.fitted, statistics=Likelihood(sums).by_window(found.law))
+    weighed = replace(explanation, fitted=own)
+    return Hypothesis(explanation, found, misfit, -0.5 * (misfit + volume), weighed)
 
 
 def p_value_of(layout: Layout, after: Hypothesis, before: Hypothesis) -> float:

@@ -16,7 +16,7 @@ Processes for Machine Learning, chapter 5, for the gradient; Self and Liang (198
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -26,6 +26,7 @@ from scipy.stats import chi2
 
 from auvnn.diagnosis.noise_law.sums import ForceSums
 from auvnn.diagnosis.residuals.input_forces import AXES
+from auvnn.estimation.normal_equations import Statistics
 from auvnn.metrics.force_law import ForceLaw, correlation
 
 Array = NDArray[np.float64]
@@ -129,6 +130,36 @@ class Likelihood:
             [second[k * size : (k + 1) * size, k * size : (k + 1) * size] for k in range(len(axes))]
         )
         return value, step, square, mean.numpy(), blocks
+
+    def by_window(self, law: ForceLaw | None) -> Statistics:
+        """Return the windows' sums towards the parameters, the forces of a law integrated out.
+
+        The cost of a window is minus twice the logarithm of its likelihood, so that sums under different laws compare.
+        """
+        size, statistics = self.sums.cells, self.sums.statistics
+        known = self.sums.known
+        plain = statistics.columns(list(range(known)))
+        axes = [] if law is None else law.axes
+        if law is None or not axes:
+            return plain
+        own = np.concatenate([np.arange(size) + i * size for i in axes])
+        factor = torch.block_diag(*torch.as_tensor(law.factors.copy()))
+        index = torch.as_tensor(own)
+        right = np.concatenate(
+            [statistics.slope[:, known:, None], statistics.hessian[:, known:, :known]], axis=2
+        )
+        right = factor.mT @ torch.as_tensor(right)[:, index]
+        inner = factor.mT @ self.force[:, index][:, :, index] @ factor
+        root = torch.linalg.cholesky(inner + torch.eye(len(own), dtype=inner.dtype))
+        half = torch.linalg.solve_triangular(root, right, upper=False)
+        along = (half.mT @ half).numpy()
+        volume = 2.0 * torch.log(torch.diagonal(root, dim1=-2, dim2=-1)).sum(-1).numpy()
+        return replace(
+            plain,
+            hessian=plain.hessian - along[:, 1:, 1:],
+            slope=plain.slope - along[:, 1:, 0],
+            cost=plain.cost - along[:, 0, 0] + volume,
+        )
 
     def sloped(self, axes: Sequence[int], x: Array) -> tuple[float, Array]:
         """Return minus twice the log posterior of log rms and log time, (2 A,), and its gradient."""

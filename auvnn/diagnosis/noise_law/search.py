@@ -1,17 +1,17 @@
-"""Names beside a stochastic force: the search goes on where a force is left that no name explains.
+"""Names beside a stochastic force: explanations are compared again, each with the law that is most likely with it.
 
 Where no force is left, nothing here is asked and the answer is that of the search without one. Else the law of the
-force is estimated at the fit without any name (`noise_law`), and the effects are asked for again with the windows'
-errors weighed by it. An effect that is absent from the model inflates the variance that then hides it: those that lead
-with the variance at zero are therefore fitted too, and every explanation is judged by its marginal likelihood at the
-law that is most likely with it.
+force is estimated at the fit without any name. An effect that is absent from the model inflates the variance that then
+hides it: those that lead with the variance at zero, which the first search has fitted in full, are therefore compared
+with those that lead under the law. Each explanation is judged by its marginal likelihood at its own law, forces and
+initial states integrated out and its parameters following the law, and by how well it foresees runs left out.
 
 Reference: Kristensen, Madsen and Joergensen (2004), Automatica 40(2) 225-237.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,49 +27,49 @@ from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.selection.model_comparison import ODDS
-from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
-from auvnn.estimation.normal_equations import linearise, normal_equations, residual_std
+from auvnn.diagnosis.selection.predictive_density import cross_validated_log_density
+from auvnn.diagnosis.stages.state import Setting
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
+from auvnn.estimation.sufficient_statistics import fit_initial_states
 from auvnn.metrics.force_law import ForceLaw, cell_for
+from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
-# A name is given where chance would seldom do as well among all effects that were asked for.
-ALPHA_NAME = 0.01
-# Fitted in full: so many of those that lead with the force's variance, and with it at zero; and so many are judged by
-# laws of their own.
-LEADERS, WITHOUT, JUDGED = 4, 2, 3
+# A name is given where chance would seldom do as well among all effects that were asked for; a further one on
+# stronger grounds, because each time chance gets another turn.
+ALPHA_NAME, ALPHA_FURTHER = 0.01, 0.001
+# Standard errors by which runs left out must be foreseen better.
+GAIN, GAIN_FURTHER = 1.0, 2.0
+# Fitted in full beside those that the first search has fitted: so many of those that lead under the law.
+LEADERS = 3
 # Members of a group that the log cannot tell apart, at most.
 GROUP = 3
-STEPS = 4
+HORIZON = "5"
+STEPS = 6
+# Share of the odds that a further name needs, which its test must promise before it is fitted.
+WORTH_A_FIT = 0.3
+# What the first name and a further one must cost in free running, as shares of the tolerance: both fits are to all of the
+# log, and a force that is always there makes errors that no name takes away. And the share of the gain of all names
+# that a further one must bring.
+FIRST_COST, FURTHER_COST, FURTHER_SHARE = 0.5, 1.0, 0.1
 
 
 class ForceSearch:
     """The search beside a stochastic force, of one log.
 
     Args:
-        layout: stated values.
+        asked: what is asked.
         windows: of the log, without a law.
-        usable: effects that can be asked for.
-        base: effects that are free anyway.
-        floor: (18,) below which no channel is trusted.
-        say: told in words what is being done.
     """
 
-    def __init__(
-        self,
-        layout: Layout,
-        windows: Windows,
-        usable: Sequence[str],
-        base: Sequence[str],
-        floor: Array,
-        say: Callable[[str], None],
-    ) -> None:
+    def __init__(self, asked: Setting, windows: Windows) -> None:
         """Begin without a law."""
-        self.layout, self.windows, self.usable, self.base = layout, windows, list(usable), list(base)
-        self.floor, self.say = floor, say
-        self.sigma = np.full(18, np.inf)
+        self.layout, self.windows, self.tolerance = asked.layout, windows, asked.tolerance
+        self.usable, self.base, self.say = list(asked.usable), list(asked.base), asked.say
+        self.log, self.scale = asked.log, scale_of(asked.log)
+        self.sigma = self.weights = np.full(18, np.inf)
         self.cell = CELL
 
     def begin(self, first: FittedHypothesis, sigma: Array) -> Hypothesis | None:
@@ -80,202 +80,188 @@ class ForceSearch:
             sigma: (18,) the sensors' white noise.
         """
         self.say("estimating the law of the force that is left")
+        # Fits without the force weigh errors as the first one did, the force's among them.
+        self.sigma, self.weights = sigma, first.fitted.sigma
         found = estimate(force_sums(first, self.windows, sigma, self.cell))
         if found.law is None:
             return None
-        self.cell = cell_for(found.law.time[found.law.axes])
-        first = self._again(first, found.law, sigma)
-        under = replace(self.windows, law=found.law)
-        sums, _, _ = normal_equations(
-            under,
-            linearise(first.fitted.model, under, first.fitted.initial, first.names),
-            sigma,
-            leverage=True,
-        )
-        self.sigma = np.where(
-            np.isfinite(sigma), residual_std(sums, self.floor, len(first.fitted.theta)), np.inf
-        )
-        found = estimate(force_sums(first, self.windows, self.sigma, self.cell))
-        if found.law is None:
-            return None
-        return self.judged(self._again(first, found.law, self.sigma), found.law)
-
-    def _again(self, found: FittedHypothesis, law: ForceLaw, sigma: Array) -> FittedHypothesis:
-        """Return an explanation fitted under a law."""
-        return fit_hypothesis(
-            self.layout, replace(self.windows, law=replace(law, cell=self.cell)), self.base, found.effects,
-            start=found.fitted, guess=replace(self.layout, model=found.fitted.model), sigma=sigma, iterations=STEPS,
-        )  # fmt: skip
+        cell = cell_for(found.law.time[found.law.axes])
+        if cell < self.cell:
+            self.cell = cell
+            found = estimate(
+                force_sums(first, self.windows, sigma, cell), replace(found.law, cell=cell), found.law.axes
+            )
+        assert found.law is not None
+        return self.judged(first, found.law)
 
     def judged(self, explanation: FittedHypothesis, law: ForceLaw) -> Hypothesis:
         """Return an explanation with the law that is most likely with it, and what they are worth."""
         return judged(
-            self.layout, explanation, force_sums(explanation, self.windows, self.sigma, law.cell), law
+            self.layout, explanation, force_sums(explanation, self.windows, self.sigma, self.cell), law
         )
 
-    def run(self, null: Hypothesis, leading: Sequence[str], most: int) -> BesideForce:
+    def run(self, null: Hypothesis, fitted: Sequence[FittedHypothesis], most: int) -> BesideForce:
         """Search for one effect after the other.
 
         Args:
             null: from `begin`.
-            leading: effects that lead with the variance at zero, the first first.
+            fitted: explanations of one effect that the first search has fitted.
             most: look for at most this many.
         """
         current, chosen = null, []
         steps: list[dict[str, Any]] = []
-        groups: list[list[str]] = []
-        tried: list[FittedHypothesis] = []
+        groups: list[list[FittedHypothesis]] = []
+        tried: list[Hypothesis] = []
         whole = 1.0
-        while True:
+        while len(chosen) < most:
             law = current.estimate.law
             assert law is not None
-            under = replace(self.windows, law=law)
-            grouped = {m for g in groups for m in g}
+            grouped = {e.effects[-1] for g in groups for e in g}
             remaining = [n for n in self.usable if n not in chosen and n not in grouped]
-            if not remaining or len(chosen) >= most:
+            if not remaining:
                 break
             self.say(f"testing {len(remaining)} effects beside the force")
             base = [*self.base, *[c for c in chosen if c not in self.base]]
-            tested = NullTests(self.layout, under, self.say)(current.explanation, remaining, base, chosen)
+            tested = NullTests(self.layout, replace(self.windows, law=law), self.say)(
+                current.explanation, remaining, base, chosen
+            )
             # Beside what was found the variance is no longer inflated by it: the tests say whether to go on.
             if chosen and tested.p_value >= ALPHA:
                 break
-            fitted = self._fitted(tested, under, current, base, chosen, leading if not chosen else ())
-            if not chosen:
-                tried = fitted
-            found = [self.judged(e, law) for e in fitted[:JUDGED]]
+            odds = max(ODDS, FURTHER_SHARE * (current.evidence - null.evidence))
+            leading = self._leading(tested, current, base, chosen, fitted, WORTH_A_FIT * odds)
+            found = [self.judged(e, law) for e in leading]
             found.sort(key=lambda h: -h.evidence)
             sure = {h.name: min(1.0, len(remaining) * p_value_of(self.layout, h, current)) for h in found}
             if not chosen:
+                tried = found
                 whole = min([tested.p_value, *sure.values()], default=1.0)
+            level, least = (ALPHA_FURTHER, GAIN_FURTHER) if chosen else (ALPHA_NAME, GAIN)
+            cost = FURTHER_COST if chosen else FIRST_COST
             good = [
                 h
                 for h in found
-                if h.evidence > current.evidence + ODDS
-                and sure[h.name] < ALPHA_NAME
-                and improves_predictive_density(h.explanation, self._without(h, current, under))
+                if h.evidence > current.evidence + odds
+                and sure[h.name] < level
+                and foresees(h, current, least)
+                and (self.tolerance.strict or self._cost(h, current) > cost * self.tolerance.cost)
             ]
             if not good:
                 break
-            best, group = good[0], tied(self.layout, good)
+            group = tied(self.layout, good)
             if len(group) > GROUP:
                 break
             names = [h.name for h in group]
-            steps.append(
-                {
-                    "verdict": "ambiguous" if len(group) > 1 else "named",
-                    "effects": names,
-                    "p_value": sure[best.name],
-                }
-            )
-            if len(group) > 1:
-                groups.append(names)
+            verdict = "ambiguous" if len(group) > 1 else "named"
+            steps.append({"verdict": verdict, "effects": names, "p_value": sure[group[0].name]})
             current = self._taken(group[0])
+            if len(group) > 1:
+                groups.append([current.weighed, *(h.weighed for h in group[1:])])
             chosen.append(group[0].name)
-        current, steps, groups = self._needed(current, steps, groups)
         law = current.estimate.law
         assert law is not None
         return BesideForce(
             steps,
             groups,
-            current.explanation,
+            current.weighed,
             replace(self.windows, law=law),
             current.estimate,
-            tried,
+            [h.weighed for h in tried],
             whole,
-            null.explanation,
+            null.weighed,
             null.estimate.law,
         )
 
-    def _fitted(
+    def _leading(
         self,
         tested: Tested,
-        under: Windows,
         current: Hypothesis,
         base: list[str],
         chosen: list[str],
-        leading: Sequence[str],
+        fitted: Sequence[FittedHypothesis],
+        odds: float,
     ) -> list[FittedHypothesis]:
-        """Return the leading effects fitted in full beside what was chosen, the smallest misfit first."""
+        """Return the leading effects fitted in full beside what was chosen, one explanation for each."""
         scores = {n: s for n, s in tested.scores.items() if s.degrees}
+        known: dict[str, FittedHypothesis] = {}
+        if not chosen:
+            for e in fitted:
+                name = e.effects[-1]
+                if name in scores and (name not in known or e.fitted.cost < known[name].fitted.cost):
+                    known[name] = e
         order = sorted(scores, key=lambda n: -scores[n].evidence)[:LEADERS]
-        by_gain = sorted(scores, key=lambda n: scores[n].degrees - scores[n].gain)[:2]
-        names = dict.fromkeys([*order, *by_gain, *[n for n in leading if n in scores][:WITHOUT]])
-        tried = [self._one(n, scores[n], tested.at, under, current, base, chosen) for n in names]
-        fitted = [e for e in tried if e is not None]
-        count = {e.effects[-1]: len(self.layout.columns[e.effects[-1]]) for e in fitted}
-        return sorted(fitted, key=lambda e: e.fitted.cost + count[e.effects[-1]])
+        by_gain = sorted(scores, key=lambda n: scores[n].degrees - scores[n].gain)[:1]
+        for name in dict.fromkeys([*order, *by_gain]):
+            # A further name must bring much: what promises a small part of that is not worth a fit.
+            if name not in known and (not chosen or 0.5 * scores[name].gain > odds):
+                found = self._one(name, scores[name], tested.at, current, base, chosen)
+                if found is not None:
+                    known[name] = found
+        return list(known.values())
 
     def _one(
-        self,
-        name: str,
-        score: Score,
-        at: Layout,
-        under: Windows,
-        current: Hypothesis,
-        base: list[str],
-        chosen: list[str],
+        self, name: str, score: Score, at: Layout, current: Hypothesis, base: list[str], chosen: list[str]
     ) -> FittedHypothesis | None:
         """Return an effect fitted from what its test estimates, or from nearer its null; None where every fit fails."""
         self.say(f"fitting {name} beside the force")
         known, start = parameters_of(at.model, [name]), initial_guess(self.layout, name, score.estimate)
-        shape, best = shapes(self.layout, name), None
-        for share in (1.0, 0.3, 0.05):
+        shape = shapes(self.layout, name)
+        for share in (1.0, 0.1):
             guess = at.model.rebuilt(at.model.copied_effects())
             set_parameters(guess, [name], np.where(shape, start, known + share * (start - known)))
             try:
-                found = fit_hypothesis(
-                    self.layout, under, base, [*chosen, name], start=current.explanation.fitted,
-                    guess=replace(at, model=guess), sigma=self.sigma, iterations=STEPS,
+                return fit_hypothesis(
+                    self.layout, self.windows, base, [*chosen, name], start=current.explanation.fitted,
+                    guess=replace(at, model=guess), sigma=self.weights, iterations=STEPS,
                 )  # fmt: skip
             except FitError:
                 continue
-            if best is None or found.fitted.cost < best.fitted.cost:
-                best = found
-            if best.fitted.cost <= current.explanation.fitted.cost:
-                break
-        return best
+        return None
 
-    def _without(self, after: Hypothesis, current: Hypothesis, under: Windows) -> FittedHypothesis:
-        """Return the fit without the effect that came last; a coefficient that is uncertain anyway stays as stated."""
-        if after.name not in self.base:
-            return current.explanation
-        fitted = current.explanation.fitted
-        return fit_hypothesis(
-            self.layout, under, [n for n in self.base if n != after.name], after.explanation.effects[:-1],
-            start=fitted, sigma=self.sigma, iterations=STEPS,
-        )  # fmt: skip
+    def _cost(self, after: Hypothesis, before: Hypothesis) -> float:
+        """Return by what share the error of free running over 5 s is larger before than after."""
+        rolled = [
+            roll(
+                h.explanation.fitted.model.without_absent(h.explanation.effects),
+                self.log,
+                HORIZON,
+                self.scale,
+            )
+            for h in (before, after)
+        ]
+        if rolled[0] is None or rolled[1] is None:
+            return float("inf")
+        errors = [r.total(self.scale) for r in rolled if r is not None]
+        return errors[0] / errors[1] - 1.0 if np.isfinite(errors[1]) and errors[1] > 0.0 else -1.0
 
     def _taken(self, best: Hypothesis) -> Hypothesis:
-        """Return a hypothesis fitted under its own law."""
+        """Return a hypothesis at the parameters that its law has moved it to.
+
+        The windows stay linear about the free running without the force, with the initial states that suit it best: a
+        force takes an unstable vehicle too far from the free running for a linearisation about its own initial states.
+        """
         law = best.estimate.law
         assert law is not None
-        return self.judged(self._again(best.explanation, law, self.sigma), law)
-
-    def _needed(
-        self, current: Hypothesis, steps: list[dict[str, Any]], groups: list[list[str]]
-    ) -> tuple[Hypothesis, list[dict[str, Any]], list[list[str]]]:
-        """Withdraw what is no longer needed beside what came after it."""
-        for name in current.explanation.effects[:-1]:
-            self.say(f"asking whether {name} is still needed")
-            law = current.estimate.law
-            assert law is not None
-            fitted = current.explanation.fitted
-            model = fitted.model.rebuilt(fitted.model.copied_effects())
-            set_parameters(model, [name], self.layout.means[name])
-            left = tuple(e for e in current.explanation.effects if e != name)
-            without = fit_hypothesis(
-                self.layout, replace(self.windows, law=law), self.base, left, start=fitted,
-                guess=replace(self.layout, model=model), sigma=self.sigma, iterations=STEPS,
-            )  # fmt: skip
-            other = self.judged(without, law)
-            if other.evidence < current.evidence:
+        found = best.explanation
+        for share in (1.0, 0.3):
+            theta = found.fitted.theta + share * best.estimate.step
+            model = found.fitted.model.rebuilt(found.fitted.model.copied_effects())
+            set_parameters(model, found.names, theta)
+            try:
+                initial = fit_initial_states(
+                    model.without_absent(found.names), self.windows, self.weights, found.fitted.initial
+                )
+                moved = replace(found.fitted, model=model, theta=theta, initial=initial)
+                again = self.judged(replace(found, fitted=moved), law)
+            except (FitError, np.linalg.LinAlgError, RuntimeError):
                 continue
-            current = other
-            step = next(s for s in steps if name in s["effects"])
-            groups = [g for g in groups if name not in g]
-            steps = [
-                *steps,
-                {"verdict": "withdrawn", "effects": list(step["effects"]), "p_value": step["p_value"]},
-            ]
-        return current, steps, groups
+            # Where the windows are far from linear, a whole step leads away.
+            if again.evidence > best.evidence - ODDS:
+                return again
+        return best
+
+
+def foresees(after: Hypothesis, before: Hypothesis, least: float) -> bool:
+    """Whether runs left out are foreseen better, by so many standard errors of the gain."""
+    gain = cross_validated_log_density(before.weighed) - cross_validated_log_density(after.weighed)
+    return float(gain.sum()) > least * float(np.sqrt(len(gain)) * gain.std(ddof=1))

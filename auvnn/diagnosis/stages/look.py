@@ -52,7 +52,7 @@ def look(asked: Setting, state: State) -> State:
         return state.step(rest(asked, state.current), [], p_value).but(ended=True)
     chooser = asked.chooser(state.windows)
     choice = chooser.choose(tested.scores, tested.at, base, chosen, state.current)
-    state = state.but(failed={**state.failed, **choice.failed})
+    state = state.but(failed={**state.failed, **choice.failed}, tried=(*state.tried, *choice.tried))
     if not chosen:
         for explanation in choice.tried:
             state = state.but(table=fill_candidate(asked.layout, state.table, explanation, first))
@@ -72,7 +72,8 @@ def look(asked: Setting, state: State) -> State:
         state = state.step("withdrawn", gone, p_value).but(withdrawn=(*state.withdrawn, *gone))
     chosen = current.effects
     current, windows = _finer(asked, current, state.windows)
-    return state.but(current=current, windows=windows, chosen=tuple(chosen))
+    tried = (*state.tried, current)
+    return state.but(current=current, windows=windows, chosen=tuple(chosen), tried=tried)
 
 
 def regroup(asked: Setting, state: State) -> State:

@@ -84,6 +84,7 @@ class State:
         withdrawn: effects that had stood in for something else; they are not asked for again.
         steps: what was found one after the other, as the answer has it.
         table: the candidates, by effect.
+        tried: every explanation that was fitted in full, in the order of the search.
         failed: effects whose fit failed, and why.
         p_value: that nothing is missing at all.
         similar: effects, and how much they look like one another at the first look.
@@ -107,6 +108,7 @@ class State:
     withdrawn: tuple[str, ...] = ()
     steps: tuple[dict[str, Any], ...] = ()
     table: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    tried: tuple[FittedHypothesis, ...] = ()
     failed: Mapping[str, str] = field(default_factory=dict)
     p_value: float = 1.0
     similar: tuple[list[str], Array] = field(default_factory=lambda: ([], np.eye(0)))

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from auvnn.answers import Answer, plain
+from auvnn.answers import PLOTTED, Answer, plain
+from auvnn.cards import Card, figure
 from auvnn.models import GreyBox
 
 REFITTED, CAUSE, PREDICTS, LEARNED, LEFT = (
@@ -55,7 +56,7 @@ class Step:
         return {n: getattr(self, n) for n in names}
 
 
-@dataclass
+@dataclass(repr=False)
 class Improved(Answer):
     """The whole loop on a log; `to_dict` is `improve.json` of the public contract.
 
@@ -108,6 +109,18 @@ class Improved(Answer):
     given: GreyBox
     series: list[dict[str, Any]] = field(default_factory=list)
     left_out: dict[str, Any] = field(default_factory=dict)
+
+    def card(self) -> Card:
+        """Return how far the loop led, and its steps."""
+        rows = [[str(w["step"]), str(w.get("kind") or ""), figure(w["error"])] for w in self.waterfall]
+        held = f"Judged on {self.test}, once, at the end."
+        lost = [
+            f"Worse than {what} in {', '.join(names)}." for what, names in (self.loses or {}).items() if names
+        ]
+        head = ("step", "kind", "held-out error")
+        return Card(
+            f"Improved {self.name}", self.verdict, [held, *lost], head, rows, f".model, .history(); {PLOTTED}"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""

@@ -106,6 +106,8 @@ class Causes(Trials):
                     advice=False,
                     whiteness=False,
                     costs=False,
+                    # What a name is worth is decided by free running here, and time is bounded.
+                    stochastic=False,
                     progress=self._until(time.monotonic() + patience),
                 )
             except _TooLong:

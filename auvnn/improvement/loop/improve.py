@@ -26,7 +26,7 @@ from auvnn.improvement.loop.state import (
 from auvnn.improvement.loop.trials import FAILURES
 from auvnn.logs import Log
 from auvnn.logs.leakage import leakage
-from auvnn.models import GreyBox
+from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
 from auvnn.threads import on_one_thread
 
 # Names that are fitted in one round of the search by prediction; how many of them may fail before it ends.
@@ -35,10 +35,10 @@ FITTED = 3
 
 @on_one_thread
 def improve(
-    model: GreyBox,
-    log: Log,
+    model: GivenModel,
+    log: GivenLog,
     *,
-    test: Log | None = None,
+    test: GivenLog | None = None,
     effects: str | Sequence[str] | None = None,
     learn: Sequence[str] = learned.KINDS,
     max_effects: int = 8,
@@ -70,6 +70,9 @@ def improve(
         ConfigError: an unknown effect, or unknown kind of what may be learned.
         InputError: the same data on both sides, a log that contradicts itself, or one that is too short.
     """
+    log = as_log(log)
+    model = as_model(model, log)
+    test = None if test is None else as_log(test, "test")
     strange = [k for k in learn if k not in learned.KINDS]
     if strange:
         raise ConfigError(f"learn={strange[0]}: choose from {', '.join(learned.KINDS)}")

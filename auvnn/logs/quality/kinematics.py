@@ -170,7 +170,9 @@ def _judge(
     chosen = [p for p, m in zip(pairs, moving, strict=True) if m]
     of = f"the derivative of the {source}"
     if not chosen:
-        verdict = f"{name} hardly moves: cannot be compared with {of}"
+        verdict = (
+            f"{name} could not be compared with {of}: one of the two changes too little, or is too short"
+        )
         return Agreement(np.nan, np.nan, verdict, runs=runs)
     x = np.concatenate([p.derived[:, axis] for p in chosen])
     y = np.concatenate([p.measured[:, axis] for p in chosen])

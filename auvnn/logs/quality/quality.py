@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from auvnn.answers import Answer, plain
+from auvnn.answers import PLOTTED, Answer, plain
+from auvnn.cards import Card, figure
 from auvnn.errors import InputError
 from auvnn.logs.quality import channel_quality, excitation, findings, kinematics, vertical
 from auvnn.logs.quality.channel_quality import Channel
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from auvnn.logs.log import Log
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Quality(Answer):
     """What a log is worth.
 
@@ -47,6 +48,24 @@ class Quality(Answer):
     runs: list[dict[str, float]] = field(default_factory=list)
     actuators: dict[str, Any] | None = None
     files: list[dict[str, Any]] | None = None
+
+    def card(self) -> Card:
+        """Return what is wrong with the log, and how much each velocity moves."""
+        counts = [(len(self.of_level(level)), level) for level in LEVELS]
+        told = ", ".join(f"{n} {level}{'' if n == 1 or level == 'info' else 's'}" for n, level in counts if n)
+        worst = [f"{f.level}: {f.where}: {f.what}" for f in self.findings if f.level in ("error", "warning")]
+        rows = [
+            [
+                name,
+                f"{e.low:.3g} to {e.high:.3g}",
+                figure(e.std),
+                figure(e.noise_std),
+                "yes" if e.excited else "hardly",
+            ]
+            for name, e in self.excitation.items()
+        ]
+        head = ("velocity", "range", "standard deviation", "noise", "moves")
+        return Card(f"Quality of {self.log.name}", told or "nothing found", worst[:4], head, rows, PLOTTED)
 
     def with_actuators(self, checked: Any) -> Quality:
         """Return the report with what a check of a model's actuators said, its warnings among the findings."""

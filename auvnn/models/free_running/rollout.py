@@ -11,6 +11,7 @@ from torch import Tensor
 
 from auvnn.effects import Effect
 from auvnn.errors import ConfigError
+from auvnn.models.accepting import as_inputs, as_tensor, own
 from auvnn.models.actuation.actuators import Drive
 from auvnn.models.engine import compiled_run
 from auvnn.models.free_running.excursions import extrapolated
@@ -69,6 +70,8 @@ def rollout(
 ) -> Trajectory:
     """Integrate the model from a state, each command held until the next row's time.
 
+    Numpy arrays and lists are taken too, and tensors that are less precise than the model.
+
     Args:
         model: the model.
         eta0: (..., 7) or (..., 6) with Euler angles.
@@ -92,7 +95,13 @@ def rollout(
         ConfigError: unknown solver, engine or option, a model that cannot be compiled where that is asked for,
             shapes that do not fit, times that decrease or are not finite, or more steps than the budget.
     """
-    inputs = commands if isinstance(commands, Inputs) else Inputs(commands)
+    like = own(model)
+    inputs = as_inputs(commands, like)
+    eta0, nu0, times = (
+        as_tensor(eta0, like, "eta0"),
+        as_tensor(nu0, like, "nu0"),
+        as_tensor(times, like, "times"),
+    )
     batch = _leading_shape(model, eta0, nu0, inputs, times, warmup)
     if eta0.shape[-1] == 6:
         eta0 = eta6_to_eta7(eta0)

@@ -11,6 +11,8 @@ from torch import Tensor
 from torch.autograd import forward_ad
 
 from auvnn.errors import ConfigError
+from auvnn.models.accepting import as_tensor
+from auvnn.models.accepting import own as own_tensor
 from auvnn.models.free_running.rate import SIZE
 from auvnn.models.linear.state_space import NAMES, StateSpace
 from auvnn.physics.attitude import quat_to_euler
@@ -86,6 +88,10 @@ def linearise(
     Raises:
         ConfigError: shapes that do not fit, or a missing input.
     """
+    like = own_tensor(model)
+    state, command = as_tensor(state, like, "state"), as_tensor(command, like, "command")
+    fins, voltage = as_tensor(fins, like, "fins"), as_tensor(voltage, like, "voltage")
+    altitude = as_tensor(altitude, like, "altitude")
     continuous = StateSpace(model)
     u = continuous.join(command, fins, voltage, altitude)
     with torch.no_grad():
@@ -127,6 +133,10 @@ def discrete_step(
     See `linearise` for the arguments. The state that comes back has the actuators' states at its end, also where they
     were not given (then they were settled at the command).
     """
+    like = own_tensor(model)
+    state, command = as_tensor(state, like, "state"), as_tensor(command, like, "command")
+    fins, voltage = as_tensor(fins, like, "fins"), as_tensor(voltage, like, "voltage")
+    altitude = as_tensor(altitude, like, "altitude")
     space = StateSpace(model, dt)
     u = space.join(command, fins, voltage, altitude)
     x, u, t = _given(space, state, u, time)

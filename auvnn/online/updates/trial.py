@@ -71,6 +71,11 @@ class Trial:
             self.evidence = torch.where(proven, 0.0, self.evidence)
         return int(proven.sum())
 
+    def begin(self, weights: Weights) -> None:
+        """Use the weights as they are now, and begin to judge afresh."""
+        self.used, self.evidence = weights.read(), torch.zeros_like(self.evidence)
+        self._bank.write(self.used)
+
     def state(self) -> dict[str, Tensor]:
         """Return what is remembered."""
         return {"used": self.used, "evidence": self.evidence}

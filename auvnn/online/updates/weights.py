@@ -83,7 +83,12 @@ class Weights:
                     start += count
 
     def value(self, nu: Tensor) -> Tensor:
-        """Return the outputs in units of the bank's output scale, (..., 6)."""
+        """Return the outputs in units of the bank's output scale, (..., 6): of the weights, without any limit."""
+        with torch.no_grad():
+            return self.bank.free(nu) / self.bank.output_scale
+
+    def limited(self, nu: Tensor) -> Tensor:
+        """Return the outputs as the model uses them, kept from giving energy where it is passive, (..., 6)."""
         with torch.no_grad():
             return self.bank(nu) / self.bank.output_scale
 
@@ -91,7 +96,7 @@ class Weights:
         """Return outputs (6,) in units of the output scale, and their slopes by the weights (6, P), at one nu."""
         flat = [p for _, found in self._groups for p in found]
         with torch.enable_grad():
-            value = self.bank(nu) / self.bank.output_scale
+            value = self.bank.free(nu) / self.bank.output_scale
             slopes = list(torch.autograd.grad(value.sum(), flat, allow_unused=True))
         blocks = [[slopes.pop(0) for _ in found] for _, found in self._groups]
         return value.detach(), self._filled(blocks)

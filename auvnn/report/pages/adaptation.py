@@ -12,6 +12,7 @@ from auvnn.report import style
 from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
+from auvnn.report.pages.sections.adaptation_words import off_words, ratio_words
 from auvnn.report.plots.adaptation import movement, skipped, with_and_without
 from auvnn.report.view import View
 from auvnn.report.words import count, finite, number, plural
@@ -37,17 +38,14 @@ class AdaptationPage(Page):
         metrics, out = view.mapping("metrics"), []
         ratio = finite(metrics.get("frozen_5_s_error_ratio"))
         if ratio is not None:
-            verdict = "less than" if ratio < 0.98 else "more than" if ratio > 1.02 else "about"
-            out.append(
-                f"Running free for 5 s with the weights frozen at each moment, the error is {number(ratio, 2)} "
-                f"times that of the model as it was ({verdict} before)."
-            )
+            out.append(f"Running free for 5 s with the weights frozen at each moment, {ratio_words(ratio)}.")
         changes = _changes(view)
         for change in changes[:2]:
             words = str(change.get("words", ""))
             out.append(f"Run {change.get('run')}: {words}.")
         if not changes:
             out.append("No change of the vehicle was seen.")
+            out += off_words(metrics)
         learned, samples = metrics.get("samples_learned"), metrics.get("samples")
         out.append(f"{count(learned)} of {count(samples)} samples were learned from.")
         reverted = int(metrics.get("updates_reverted") or 0)

@@ -67,16 +67,16 @@ def rollout_table(rollout: Mapping[str, Any]) -> HtmlTable:
         [
             horizon_words(horizon),
             *(number(_nested(entry, channel, "nrmse")) for channel in CHANNELS),
-            *(number(entry.get(key)) for key in ("total", "persistence")),
+            *(number(entry.get(key)) for key in ("total", "persistence", "noise_floor")),
             count(entry.get("diverged", 0)),
         ]
         for horizon, entry in rollout.items()
     ]
-    head = ["free running", *CHANNELS, "total", "velocity held", "diverged windows"]
+    head = ["free running", *CHANNELS, "total", "velocity held", "noise alone", "diverged windows"]
     caption = (
         "Root mean square error divided by the standard deviation of the measured channel. 1 is as bad as "
         "knowing only the mean; – marks a channel that does not move enough to be judged. Velocity held: "
-        "the total if the initial velocity simply stayed."
+        "the total if the initial velocity simply stayed. Noise alone: what a perfect model would show."
     )
     return HtmlTable("Free-running error by horizon", head, rows, caption)
 

@@ -47,6 +47,11 @@ class ComparisonPage(Page):
             out.append("No stretch of the log was long enough, or moved enough, to let the model run free.")
         else:
             out.append(say.verdict(common.horizon_words(horizon or ""), error, held))
+            floor = common.total(rollout, horizon, "noise_floor")
+            if floor is not None and floor > 0:
+                out.append(
+                    f"Noise alone would leave {percent(floor)}, {number(error / floor, 2)} times less."
+                )
         out += common.baseline_words(view)
         lost = sum(int(finite(e.get("diverged")) or 0) for e in rollout.values())
         if lost:
@@ -192,7 +197,9 @@ def _whole(entry: dict[str, Any]) -> Plot:
 
 def _horizons(rollout: Mapping[str, Any]) -> Figure:
     return error_against_horizon(
-        {"as given": common.over_horizons(rollout)}, common.over_horizons(rollout, "persistence")
+        {"as given": common.over_horizons(rollout)},
+        common.over_horizons(rollout, "persistence"),
+        common.over_horizons(rollout, "noise_floor"),
     )
 
 
@@ -207,6 +214,8 @@ def _horizon_caption(rollout: Mapping[str, Any]) -> str:
     words = (
         "Error of free running, averaged over the channels that move, against how long the model runs free. "
     )
+    if any(common.total(rollout, h, "noise_floor") is not None for h in rollout):
+        words += "Noise alone would leave a perfect model at the grey line. "
     if len(better) == len(rollout):
         return words + "The model beats holding the initial velocity (dotted) at every horizon."
     if not better:

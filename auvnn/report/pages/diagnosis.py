@@ -104,7 +104,7 @@ class DiagnosisPage(Page):
         return [
             Plot(
                 "ranking",
-                "The candidates, best first",
+                "The candidates",
                 lambda: ranking(candidates, missing),
                 lambda: _ranking_caption(candidates, missing),
             ),
@@ -114,7 +114,8 @@ class DiagnosisPage(Page):
                 "What could be confused",
                 lambda: _similarity(view),
                 "How alike the marks are that two effects leave on this log: 1 means that the log cannot "
-                "tell them apart, whatever the method. Framed pairs need another experiment.",
+                "tell them apart, whatever the method. Framed pairs need another experiment. Shown are what is "
+                "named, the leading candidates, and what is most like them; the answer holds all.",
             ),
             *_whiteness(view),
             *learned_plots(view),

@@ -31,8 +31,19 @@ class FleetPage(Page):
 
     def brief(self, view: View) -> list[str]:
         """Return the answer in plain words, what changes first."""
-        rows = sorted(_trends(view), key=lambda t: not t.get("changes"))
-        out = [f"{str(t.get('words', '')).rstrip('.')}." for t in rows[:4]]
+        rows = _trends(view)
+        changing = [t for t in rows if t.get("changes")]
+        out = [f"{str(t.get('words', '')).rstrip('.')}." for t in changing[:3]]
+        if more := [_named(t) for t in changing[3:]]:
+            out.append(f"Not the same on all dives either: {listing(more)}.")
+        few = [t for t in rows if (finite(t.get("dives")) or 2) < 2]
+        same = [t for t in rows if not t.get("changes") and t not in few]
+        if same:
+            # Every parameter is named: what is left out of a summary is read as not having been asked.
+            told = ", ".join(f"{_named(t)} {_mean(t)}" for t in same)
+            out.append(f"The same on all dives within their uncertainties: {told}.")
+        if few:
+            out.append(f"Too few dives say something of {listing([_named(t) for t in few])}.")
         failed = view.items("failed")
         if failed:
             out.append(f"{plural(len(failed), 'dive')} could not be fitted.")
@@ -105,6 +116,15 @@ class FleetPage(Page):
 
 def _trends(view: View) -> list[Mapping[str, Any]]:
     return [t for t in view.items("trends") if isinstance(t, Mapping)]
+
+
+def _named(trend: Mapping[str, Any]) -> str:
+    return f"{trend.get('effect')}.{trend.get('parameter')}"
+
+
+def _mean(trend: Mapping[str, Any]) -> str:
+    mean = trend.get("mean") or {}
+    return interval(mean.get("value"), mean.get("std"), str(trend.get("unit") or ""))
 
 
 def _start(dive: Mapping[str, Any]) -> str:

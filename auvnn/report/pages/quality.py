@@ -23,7 +23,8 @@ class QualityPage(Page):
 
     def title(self, view: View) -> str:
         """Return the heading."""
-        return f"Quality of the log {_name(view)}"
+        name = _name(view)
+        return "Quality of the log" if name in ("", "log") else f"Quality of the log {name}"
 
     def about(self, view: View) -> str:
         """Return the files."""

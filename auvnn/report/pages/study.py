@@ -28,10 +28,15 @@ HELD_OUT = {
 }
 
 
+# Columns that a page has room for.
+WIDE = 8
+
+
 class StudyPage(Page):
     """What a case study says."""
 
     kind = "study"
+    shown = 12  # the paper's figures are the story
 
     def title(self, view: View) -> str:
         """Return the heading."""
@@ -65,15 +70,17 @@ class StudyPage(Page):
         cells = [[_cell(row.get(key)) for key in head] for row in rows]
         metrics = [[str(k), _cell(v)] for k, v in view.mapping("metrics").items()]
         return [
-            HtmlTable("Compared", [h.replace("_", " ") for h in head], cells, folded=False),
+            *_upright([h.replace("_", " ") for h in head], cells),
             HtmlTable("Metrics", ["name", "value"], metrics, folded=True),
         ]
 
     def assumed(self, view: View) -> list[tuple[str, str]]:
-        """Return what the paper leaves open and was decided here."""
-        return [
-            (words.partition(": ")[0], words.partition(": ")[2] or words) for words in view.texts("assumed")
-        ]
+        """Return what the paper leaves open and was decided here, said once and then counted."""
+        told = [words.partition(": ")[::2] for words in view.texts("assumed")]
+        own = [rest for head, rest in told if head == "ours"]
+        out = [(head, rest or head) for head, rest in told if head != "ours"]
+        first = "Not in the paper, decided here" if own else ""
+        return [*out, *((first if k == 0 else "", f"{k + 1}. {words}") for k, words in enumerate(own))]
 
 
 def _plot(found: Mapping[str, Any]) -> Plot:
@@ -91,6 +98,22 @@ def _plot(found: Mapping[str, Any]) -> Plot:
         raise NoData(f"a figure of kind {kind} is not known here")
 
     return Plot(found["name"], found["title"], draw, found["caption"])
+
+
+def _upright(head: list[str], cells: list[list[str]]) -> list[HtmlTable]:
+    """Return the comparison; a table that is too wide for a page is turned, or else divided."""
+    if len(head) <= WIDE:
+        return [HtmlTable("Compared", head, cells, folded=False)]
+    if len(cells) + 1 <= WIDE:
+        turned = [[name, *(row[k] for row in cells)] for k, name in enumerate(head) if k]
+        return [HtmlTable("Compared", [head[0], *(row[0] for row in cells)], turned, folded=False)]
+    out = []
+    for k in range(1, len(head), WIDE - 1):
+        part = slice(k, k + WIDE - 1)
+        rows = [[row[0], *row[part]] for row in cells]
+        more = "" if k == 1 else ", continued"
+        out.append(HtmlTable(f"Compared{more}", [head[0], *head[part]], rows, folded=False))
+    return out
 
 
 def _cell(value: Any) -> str:

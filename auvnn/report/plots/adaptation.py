@@ -56,7 +56,11 @@ def with_and_without(
             y = values[:, i]
             if np.isfinite(y).any():
                 drawn.append(y[np.isfinite(y)])
-                ink: dict[str, Any] = {"color": look.color, "ls": look.dashes, "lw": look.width}
+                # The one below is broad: where both are the same, it shows on either side of the upper one.
+                below = look is style.BEFORE
+                ink: dict[str, Any] = (
+                    {"color": "#f0b183", "lw": 3.0} if below else {"color": look.color, "lw": 1.0}
+                )
                 for first, last in pairwise(edges):
                     words: dict[str, Any] = {"label": name} if first == 0 else {}
                     ax.plot(*decimate(t[first:last], y[first:last], LIMIT), **ink, **words)
@@ -70,7 +74,8 @@ def with_and_without(
         for edge in edges[1:-1]:
             ax.axvline(t[edge], color=style.FAINT, lw=0.6)
         _mark(ax, changes, words=i in (0, 3))
-        ax.set_ylabel(style.axis_label(*names[i]))
+        symbol, unit = names[i]
+        ax.set_ylabel(f"rms error of ${symbol}$\n({unit})", fontsize=8)
         style.show_grid(ax)
         if i in (2, 5):
             ax.set_xlabel("time (s)")

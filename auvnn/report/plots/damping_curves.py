@@ -15,13 +15,14 @@ from auvnn.report.words import finite
 
 
 @style.styled
-def damping_curves(curves: Sequence[Mapping[str, Any]]) -> Figure:
+def damping_curves(curves: Sequence[Mapping[str, Any]], words: str = "learned") -> Figure:
     """Draw d_i over nu_i, the other velocities zero; where the log has been is shaded.
 
     Args:
         curves: one per degree of freedom, in order, {nu: (k,) m/s or rad/s, learned: (k,) N or N m,
             nominal: (k,) or None, low: (k,) and high: (k,) or None (a 95 % band), covered: (low, high) or
             None: the range of nu_i in the data}. An empty mapping leaves its panel empty.
+        words: what the curve called `learned` is.
 
     Raises:
         NoData: no degree of freedom has a curve.
@@ -58,7 +59,7 @@ def damping_curves(curves: Sequence[Mapping[str, Any]]) -> Figure:
             handles["nominal"] = ax.plot(
                 *decimate(nu, nominal), color=look.color, ls=look.dashes, lw=1.2, zorder=3
             )[0]
-        handles["learned"] = ax.plot(*decimate(nu, learned), color=style.AFTER.color, lw=1.3)[0]
+        handles[words] = ax.plot(*decimate(nu, learned), color=style.AFTER.color, lw=1.3)[0]
         ax.margins(x=0)
     figure.align_ylabels()
     figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=len(handles))

@@ -13,11 +13,20 @@ from auvnn.report import style
 from auvnn.report.panels import NoData
 from auvnn.report.words import finite, label
 
+_FLOOR = style.Look("#505050", "-", 0.9, "_")
+# Beyond three models: still apart by colour, dashes and marker.
+_FURTHER = (
+    style.Look("#009e73", "-", 1.1, "v"),
+    style.Look("#cc79a7", (0, (3, 1, 1, 1)), 1.1, "P"),
+    style.Look("#b08800", (0, (6, 2)), 1.1, "*"),
+)
+
 
 @style.styled
 def error_against_horizon(
     models: Mapping[str, Mapping[str, float | None]],
     persistence: Mapping[str, float | None] | None = None,
+    floor: Mapping[str, float | None] | None = None,
 ) -> Figure:
     """Draw the error over the free-running horizon: one line per model, and that of holding the velocity.
 
@@ -25,6 +34,7 @@ def error_against_horizon(
         models: name of the model to {horizon: total nrmse}; a horizon is seconds as text ("0.5", "5") or
             "full" for whole runs, which stands apart on the right.
         persistence: {horizon: total nrmse} of holding the initial velocity.
+        floor: {horizon: total nrmse} that noise alone would leave to a perfect model.
 
     Raises:
         NoData: no horizon has an error.
@@ -37,22 +47,26 @@ def error_against_horizon(
     end = (horizons[-1] if horizons else 1.0) * 2.2
     figure = style.new_figure(style.COLUMN * 1.25, 2.7)
     ax = figure.subplots()
-    looks = [style.BEFORE, style.AFTER, style.REFITTED]
+    looks = [style.BEFORE, style.AFTER, style.REFITTED, *_FURTHER]
     names = {"as given": style.BEFORE, "refitted": style.REFITTED, "after": style.AFTER}
     for i, (name, errors) in enumerate(models.items()):
         # The first on top: where a later one coincides, both marks stay visible.
-        _line(ax, errors, end, names.get(name) or looks[i % 3], name, 10 - i)
+        _line(ax, errors, end, names.get(name) or looks[i % len(looks)], name, 10 - i)
     if persistence:
         _line(ax, persistence, end, style.PERSISTENCE, "initial velocity held", 1)
+    if floor and any(finite(v) is not None for v in floor.values()):
+        _line(ax, floor, end, _FLOOR, "noise alone", 2)
     ax.axhline(1.0, color=style.FAINT, lw=0.6)
     ax.annotate(
         "as large as the motion itself",
-        (0.01, 1.0),
-        xycoords=("axes fraction", "data"),
+        _clear(models, persistence, end),
         xytext=(0, 2),
         textcoords="offset points",
+        ha="center",
         fontsize=7,
         color="#505050",
+        bbox={"fc": "white", "ec": "none", "pad": 0.6},
+        zorder=20,
     )
     ax.set_xscale("log")
     ticks = horizons + ([end] if full else [])
@@ -67,6 +81,30 @@ def error_against_horizon(
     style.show_grid(ax, "y")
     figure.legend(loc="outside upper center", ncols=2)
     return figure
+
+
+def _clear(
+    models: Mapping[str, Mapping[str, float | None]],
+    persistence: Mapping[str, float | None] | None,
+    end: float,
+) -> tuple[float, float]:
+    """Return where on the line at one the label lies farthest from every line's marks."""
+    marks = []
+    for errors in (*models.values(), persistence or {}):
+        for horizon, error in errors.items():
+            x = end if horizon == "full" else _seconds(horizon)
+            if x is not None and (y := finite(error)) is not None:
+                marks.append((np.log10(x), y))
+    if not marks:
+        return end, 1.0
+    x, y = np.array(marks).T
+    low, high = x.min(), x.max()
+    tries = np.linspace(low + 0.22 * (high - low), high - 0.22 * (high - low), 9)
+    # The label is about half as wide as the panel, and reaches a little above the line.
+    gaps = [
+        np.hypot(np.maximum(np.abs(x - t) / max(high - low, 1e-9) - 0.24, 0.0), y - 1.05).min() for t in tries
+    ]
+    return float(10 ** tries[int(np.argmax(gaps))]), 1.0
 
 
 def _seconds(horizon: str) -> float | None:

@@ -22,7 +22,7 @@ def ranking(
     *,
     most: int = MOST,
 ) -> Figure:
-    """Draw the candidates, best first: explained share and the fall of the cross-validated error.
+    """Draw the candidates: explained share, which orders them after what was chosen, and the fall of the error left out.
 
     What was chosen is hatched and bold; what cannot be told apart is bracketed on the right.
 
@@ -39,6 +39,7 @@ def ranking(
     shown = tried[:most] + [c for c in candidates if c.get("needs")][: max(0, min(4, most - len(tried)))]
     if not tried:
         raise NoData("no candidate could be judged")
+    shown = in_order(shown, chosen)
     figure = style.new_figure(style.PAGE, 0.75 + 0.235 * len(shown))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=[1, 1])
     names = [str(c.get("effect", "?")) for c in shown]
@@ -62,8 +63,11 @@ def ranking(
         style.show_grid(ax, "x")
     edge = right.get_yaxis_transform()
     right.text(1.24, -0.75, "p", style="italic", ha="right", va="bottom", transform=edge)
-    for column, group in enumerate(brackets(shown, chosen)):
-        _bracket(right, [names.index(name) for name in group], 1.275 + 0.04 * column)
+    groups = brackets(shown, chosen)
+    for column, group in enumerate(groups):
+        _bracket(right, [names.index(name) for name in group], 1.275 + 0.035 * column)
+    if groups:
+        right.text(1.262, -0.75, "alike", fontsize=7, ha="left", va="bottom", transform=edge)
     return figure
 
 
@@ -113,6 +117,17 @@ def _row(left: Axes, right: Axes, i: int, candidate: Mapping[str, Any], chosen: 
     )
 
 
+def in_order(candidates: Sequence[Mapping[str, Any]], chosen: Sequence[str] = ()) -> list[Mapping[str, Any]]:
+    """Return the candidates as they are drawn: what was chosen first, then by the bars; last, what was not judged."""
+
+    def place(candidate: Mapping[str, Any]) -> tuple[bool, int, float]:
+        name, explained = str(candidate.get("effect", "?")), finite(candidate.get("explained"))
+        at = list(chosen).index(name) if name in chosen else len(chosen)
+        return bool(candidate.get("needs")), at, -(explained if explained is not None else -1.0)
+
+    return sorted(candidates, key=place)
+
+
 def improvement(candidate: Mapping[str, Any]) -> tuple[float | None, float | None]:
     """Return the relative fall of the cross-validated error, and its standard deviation where stated."""
     before, after = finite(candidate.get("cv_before")), finite(candidate.get("cv_after"))
@@ -149,5 +164,3 @@ def _bracket(ax: Axes, rows: list[int], x: float) -> None:
     ax.plot([x, x], [min(rows), max(rows)], **options)
     for row in rows:
         ax.plot([x - 0.015, x], [row, row], **options)
-    middle = (min(rows) + max(rows)) / 2
-    ax.text(x + 0.012, middle, "alike", rotation=90, ha="left", va="center", fontsize=7, transform=transform)

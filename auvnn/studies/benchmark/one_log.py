@@ -91,8 +91,10 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
     simulated = time.monotonic()
     begun["made"] = True
     candidates = None if case.candidates is None else list(case.candidates)
-    # Rates are those of evidence alone: what does not matter is for users to decide.
-    found = diagnose(model, log, candidates, advice=False, whiteness=False, tolerance=0.0, costs=False)
+    # In the model's own world rates are those of evidence alone. A world that departs from every assumption leaves a
+    # force in each log: there, as for users, what does not matter does not count.
+    tolerance = None if case.world else 0.0
+    found = diagnose(model, log, candidates, advice=False, whiteness=False, tolerance=tolerance, costs=False)
     diagnosed = time.monotonic()
     row: dict[str, Any] = {
         "verdict": found.verdict,

@@ -14,7 +14,7 @@ from auvnn.answers import Answer, plain, write_text
 from auvnn.models import GreyBox
 
 
-@dataclass
+@dataclass(repr=False)
 class Study(Answer):
     """A case study of the paper; `to_dict` is `study.json` of the public contract.
 

@@ -11,7 +11,7 @@ import torch
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.layout import lay_out
-from auvnn.diagnosis.noise_law.command_holding import between, holding
+from auvnn.diagnosis.noise_law.command_holding import between, cubic_weights, holding
 from auvnn.logs import Log
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
@@ -43,7 +43,7 @@ def test_commands_that_change_every_tick_are_not_held(model):
     """Five ticks of a fast controller a sample: the mean command of an interval is two fifths on the way to the next."""
     log = thinned(make_log(model, duration=20.0, rate=25.0, noise=0.3, max_step=0.04), STEP)
     found = asked(model, log)
-    assert found.name in ("ahead", "linear") and found.share == pytest.approx(0.4, abs=0.11)
+    assert found.name in ("ahead", "linear", "smooth") and found.share == pytest.approx(0.4, abs=0.11)
     assert found.odds > np.log(100.0) and found.to_dict()["between_samples"] == found.name
 
 
@@ -57,3 +57,21 @@ def test_a_share_mixes_each_sample_with_the_next(model):
     mixed, plain = between(windows, 0.25).inputs.command, windows.inputs.command
     assert torch.allclose(mixed[:, :-1], 0.75 * plain[:, :-1] + 0.25 * plain[:, 1:])
     assert torch.equal(mixed[:, -1], plain[:, -1]) and between(windows, 0.0) is windows
+
+
+def test_the_cubic_through_four_samples_has_the_mean_of_any_cubic():
+    """Integrated in closed form; the interval itself has the weights of Adams and Moulton's kind, -1, 13, 13, -1 over 24."""
+    assert np.allclose(cubic_weights(0.5), np.array([-1.0, 13.0, 13.0, -1.0]) / 24.0)
+    at = np.array([-1.0, 0.0, 1.0, 2.0])
+    for share in (0.0, 0.3, 0.41, 1.0):
+        for power in range(4):
+            low, high = share - 0.5, share + 0.5
+            mean = (high ** (power + 1) - low ** (power + 1)) / (power + 1)
+            assert np.dot(cubic_weights(share), at**power) == pytest.approx(mean, abs=1e-12)
+
+
+def test_a_smooth_command_is_the_mean_of_its_cubic(model):
+    windows = windows_for(model, make_log(model, duration=12.0, rate=5.0))
+    mixed, plain = between(windows, 0.5, smooth=True).inputs.command, windows.inputs.command
+    own = (-plain[:, :-3] + 13.0 * plain[:, 1:-2] + 13.0 * plain[:, 2:-1] - plain[:, 3:]) / 24.0
+    assert torch.allclose(mixed[:, 1:-2], own)

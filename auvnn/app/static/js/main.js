@@ -107,7 +107,7 @@ function take(state) {
     document.getElementById("status").textContent = `${now.words}: ${now.state}`;
     if (now.state === "done") {
       settle();
-      const next = { compare: "where", diagnose: "missing", add: "try", example: "log" }[now.kind];
+      const next = { compare: "where", diagnose: "missing", add: "try", improve: "result", example: "log" }[now.kind];
       if (app.name !== next) app.go(next);
     }
   }

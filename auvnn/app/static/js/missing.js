@@ -44,7 +44,8 @@ export class MissingScreen {
   draw(state, done) {
     const answer = this.answer, missing = answer.missing || [];
     const [tone, words] = VERDICTS[answer.verdict] || ["warn", answer.verdict];
-    const named = missing.length ? missing : [];
+    // Of a partial verdict nothing is named as the cause; what predicts a part stands first all the same.
+    const named = missing.length ? missing : answer.verdict === "partial" ? answer.nearest || [] : [];
     const candidates = [...answer.candidates].sort((a, b) => rank(a, named) - rank(b, named));
     const judged = candidates.filter((c) => !c.needs.length), others = candidates.filter((c) => c.needs.length);
     const first = judged.slice(0, Math.max(6, named.length)), rest = judged.slice(first.length);

@@ -2,7 +2,7 @@
 
 import { attempt, get, post } from "./api.js";
 import { againstHorizon, waterfall } from "./charts.js";
-import { card, choice, DOF, h, number, percent, show } from "./dom.js";
+import { card, choice, DOF, h, measured, number, percent, show } from "./dom.js";
 import { parameters } from "./missing.js";
 import { Group, key } from "./plot.js";
 
@@ -16,16 +16,16 @@ export class ResultScreen {
   }
 
   async update(state) {
-    const key_ = JSON.stringify([state.history, state.answers, state.saved, state.can_keep, Boolean(state.log && state.log.ready)]);
+    const key_ = JSON.stringify([state.history, state.answers, state.saved, state.can_keep, state.can_keep_improved, Boolean(state.log && state.log.ready)]);
     if (key_ === this.seen) return;
     this.seen = key_;
     if (!(state.log && state.log.ready && state.history.length)) {
       show(this.element, card("Nothing to show yet", h("a", { href: "#log", class: "button" }, "Choose a log and a model first")));
       return;
     }
-    const found = await attempt(() => Promise.all([state.answers.improvement ? get("answer", { kind: "improvement" }) : null, get("script")]));
+    const found = await attempt(() => Promise.all([state.answers.improvement ? get("answer", { kind: "improvement" }) : null, get("script"), state.answers.improve ? get("answer", { kind: "improve" }) : null]));
     if (!found) return;
-    [this.answer, this.script] = found;
+    [this.answer, this.script, this.improved] = found;
     this.draw(state);
   }
 
@@ -38,6 +38,7 @@ export class ResultScreen {
       answer && h("div", { class: "two" }, card("Held-out error at 5 s", waterfall(answer.waterfall)), this.horizons()),
       answer && this.traces(),
       answer && this.table(),
+      this.loop(state),
       h("div", { class: "two" }, this.history(state), this.save(state)),
       this.scripts());
   }
@@ -51,6 +52,26 @@ export class ResultScreen {
         state.can_keep && h("button", { type: "button", class: "primary", id: "keep", onclick: (e) => attempt(async () => { await post("keep"); await this.app.changed(); }, e.target) }, "Keep it in the model"),
         state.answers.improvement.report && h("a", { href: "report/improvement", target: "_blank", rel: "noopener", class: "button" }, "Report")),
       a.warnings.length > 0 && h("details", {}, h("summary", {}, `${a.warnings.length} ${a.warnings.length === 1 ? "warning" : "warnings"}`), h("ul", {}, a.warnings.map((w) => h("li", {}, w)))));
+  }
+
+  // The whole loop by one button: what it took, step by step, and the error budget.
+  loop(state) {
+    const a = this.improved;
+    const start = h("button", { type: "button", class: a ? "small" : "primary", id: "improve", onclick: (e) => this.app.start("improve", [], e.target) }, a ? "Walk it again" : "Improve");
+    const about = h("p", { class: "soft" }, "Walks the whole loop by itself until nothing pays: refits, diagnoses, adds, learns what has no name. It takes minutes and can be stopped.");
+    if (!a) return card("The whole loop", about, h("p", { class: "row" }, start));
+    const improved = state.answers.improve;
+    return card("The whole loop", h("p", { class: "word", id: "improved" }, a.verdict), waterfall(a.waterfall),
+      a.steps.length > 0 && h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Steps of the loop" }, h("table", {},
+        h("thead", {}, h("tr", {}, ["step", "what it is", "error on runs left out, before", "after", "fall"].map((w) => h("th", { scope: "col" }, w)))),
+        h("tbody", {}, a.steps.map((step) => h("tr", {}, h("th", { scope: "row" }, step.step), h("td", {}, step.kind), h("td", { class: "num" }, number(step.before)), h("td", { class: "num" }, number(step.after)), h("td", { class: "num" }, step.gain && Number.isFinite(step.gain.value) ? measured(step.gain.value, step.gain.std, "1") : "–")))))),
+      Object.entries(a.loses || {}).filter(([, names]) => names.length > 0).map(([what, names]) => h("p", { class: "alike" }, `Worse than ${what === "baseline" ? "the plain regression" : "holding the speed"} in ${names.join(", ")}.`)),
+      h("details", {}, h("summary", {}, "How it went"), h("ol", {}, (a.story || []).map((line) => h("li", {}, line))), (a.tried || []).length > 0 && h("p", { class: "soft" }, `Tried and not taken: ${a.tried.map((t) => t.step).join(", ")}.`)),
+      (a.warnings || []).length > 0 && h("details", {}, h("summary", {}, `${a.warnings.length} ${a.warnings.length === 1 ? "warning" : "warnings"}`), h("ul", {}, a.warnings.map((w) => h("li", {}, w)))),
+      h("p", { class: "row" },
+        state.can_keep_improved && h("button", { type: "button", class: "primary", id: "keep-improved", onclick: (e) => attempt(async () => { await post("keep", { kind: "improve" }); await this.app.changed(); }, e.target) }, "Keep it in the model"),
+        improved && improved.report && h("a", { href: "report/improve", target: "_blank", rel: "noopener", class: "button" }, "Report"), start),
+      about);
   }
 
   horizons() {

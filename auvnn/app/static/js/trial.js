@@ -159,12 +159,22 @@ export class TryScreen {
     const view = this.view;
     if (!view) return;
     const began = performance.now();
-    const found = await post("try", this.asked({ ...view, whole: false }));
+    const found = await post("try", this.asked({ ...view, whole: false, judge: false }));
     if (view !== this.view) return;
     this.base = { ...this.base, ...found.traces.series };
     this.group.set({ t: found.traces.t, series: this.base });
-    this.gauge(found);
     document.dispatchEvent(new CustomEvent("redrawn", { detail: performance.now() - began }));
+    this.judge();
+  }
+
+  // The error follows when the slider rests: working it out takes as long as the traces.
+  judge() {
+    clearTimeout(this.judging);
+    const view = this.view;
+    this.judging = setTimeout(() => attempt(async () => {
+      const found = await post("try", this.asked({ ...view, points: 16, whole: false }));
+      if (view === this.view) this.gauge(found);
+    }), 60);
   }
 
   gauge(found) {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from auvnn.report.html import HtmlTable
@@ -17,6 +18,9 @@ from auvnn.report.plots.residual_tests import residual_tests
 from auvnn.report.plots.similarity import similarity
 from auvnn.report.view import View
 from auvnn.report.words import count, finite, listing, number, p_value, percent, plural
+
+# Effects in the figure of similarities at most, and how like the named ones the others there must be.
+MOST_ALIKE, LEAST_ALIKE = 14, 0.4
 
 
 def _candidates(view: View) -> list[Mapping[str, Any]]:
@@ -163,7 +167,7 @@ def _ranking_caption(candidates: list[Mapping[str, Any]], missing: list[str]) ->
         "error falls on runs that were not fitted; left of zero the effect harms."
     )
     if missing:
-        words += " Hatched and bold: what the verdict names."
+        words += " Hatched and bold, and first: what the verdict names; the others by what each explains by itself."
     if brackets(candidates, missing):
         words += " Brackets join what this log can hardly tell apart."
     return words
@@ -179,7 +183,41 @@ def _similarity(view: View) -> Figure:
     found = view.get("similarity")
     if not isinstance(found, (list, tuple)) or len(found) != 2:
         raise NoData("the answer holds no similarities")
-    return similarity([str(n) for n in found[0]], found[1])
+    names, table = [str(n) for n in found[0]], np.abs(np.asarray(found[1], dtype=float))
+    if table.shape != (len(names), len(names)):
+        raise NoData("the answer holds no similarities")
+    kept = in_question(names, table, [*view.texts("missing"), *view.texts("nearest")], _candidates(view))
+    return similarity([names[k] for k in kept], table[np.ix_(kept, kept)])
+
+
+def in_question(
+    names: list[str], table: np.ndarray, named: list[str], candidates: list[Mapping[str, Any]]
+) -> list[int]:
+    """Return which effects a person would confuse: those named, the leading candidates, and what is like them.
+
+    Args:
+        names: of all effects, n.
+        table: (n, n) similarities, 0 to 1.
+        named: by the verdict.
+        candidates: best first.
+    """
+    if len(names) <= MOST_ALIKE:
+        return list(range(len(names)))
+    leading = [str(c.get("effect")) for c in candidates if not c.get("needs")]
+    first = [n for n in dict.fromkeys([*named, *leading[:4]]) if n in names]
+    kept = [names.index(n) for n in first[: MOST_ALIKE // 2]] or [0]
+    alike = np.nan_to_num(table[kept].max(axis=0))
+    for k in np.argsort(-alike, kind="stable"):
+        if len(kept) >= MOST_ALIKE or alike[k] < LEAST_ALIKE:
+            break
+        if int(k) not in kept:
+            kept.append(int(k))
+    for name in leading:
+        if len(kept) >= max(6, len(first)):
+            break
+        if name in names and names.index(name) not in kept:
+            kept.append(names.index(name))
+    return kept
 
 
 def _whiteness(view: View) -> list[Plot]:

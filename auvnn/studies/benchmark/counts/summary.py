@@ -31,7 +31,7 @@ KEYS = ("vehicle", "hidden", "size", "noise", "excitation")
 FURTHER = {"plant": "own", "accelerations": None, "coefficients": "exact", "part": ""}
 
 
-@dataclass
+@dataclass(repr=False)
 class Benchmark(Answer):
     """What the diagnosis found in logs with known hidden effects.
 

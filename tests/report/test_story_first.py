@@ -1,0 +1,80 @@
+"""The story stands first and nothing on a page misleads: what is folded, in which order, and what is not drawn."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from auvnn.report.pages.fleet import PAGE as FLEET
+from auvnn.report.pages.sections.adaptation_words import off_words, ratio_words
+from auvnn.report.pages.sections.diagnosis_words import MOST_ALIKE, in_question
+from auvnn.report.pages.study import PAGE as STUDY
+from auvnn.report.plots.error_against_horizon import error_against_horizon
+from auvnn.report.plots.free_running import free_running
+from auvnn.report.plots.ranking import in_order, ranking
+from auvnn.report.view import View
+from tests.report.report_fakes import candidates, comparison, drawer
+from tests.report.test_fleet_page import dives, row
+from tests.report.test_study_plots import PLANT, T, study
+
+
+def test_what_is_not_the_story_is_folded_away():
+    page = drawer("comparison").page(comparison(n=400))
+    before, _, after = page.partition("<details")
+    assert before.count("<figure") == 3 and "What was read and assumed" in after
+    assert "--least:" in page and "min-width: var(--least)" in page
+
+
+def test_candidates_are_drawn_in_the_order_of_their_bars_after_those_chosen():
+    found = in_order(candidates(), [str(candidates()[2]["effect"])])
+    assert found[0]["effect"] == candidates()[2]["effect"]
+    shares = [c["explained"] for c in found[1:] if not c.get("needs")]
+    assert shares == sorted(shares, reverse=True)
+    texts = [t.get_text() for ax in ranking(candidates()).axes for t in ax.texts]
+    assert texts.count("alike") <= 1
+
+
+def test_of_many_effects_those_are_shown_that_somebody_would_confuse():
+    names = [f"e{k}" for k in range(37)]
+    table = np.eye(37)
+    table[5, 30] = table[30, 5] = 0.95
+    kept = in_question(names, table, ["e5"], [{"effect": "e5"}, {"effect": "e9"}])
+    assert {5, 30, 9} <= set(kept) and len(kept) <= MOST_ALIKE
+    assert in_question(names[:4], np.eye(4), [], []) == [0, 1, 2, 3]
+
+
+def test_a_model_that_leaves_every_panel_is_said_not_drawn():
+    figure = free_running(T, {"plant": PLANT, "networks": PLANT * 1.01, "zero damping": PLANT * 9 + 1})
+    assert len(figure.axes[0].lines) == 2
+    assert any("zero damping" in t.get_text() for t in figure.texts)
+    alone = free_running(T, {"plant": PLANT, "zero damping": PLANT * 9 + 1})
+    assert len(alone.axes[0].lines) == 2, "where nothing else is left to draw it is drawn"
+
+
+def test_the_noise_floor_is_a_line_of_its_own():
+    errors = {"0.5": 0.3, "5": 0.4}
+    figure = error_against_horizon({"as given": errors}, errors, {"0.5": 0.02, "5": 0.03})
+    assert "noise alone" in [t.get_text() for t in figure.legends[0].get_texts()]
+
+
+def test_the_fleets_summary_names_every_parameter():
+    rows = [
+        row() | {"words": "net_buoyancy.force: changes"},
+        *(row(n) | {"changes": False} for n in "XYZKMN"),
+    ]
+    told = " ".join(FLEET.brief(View({"trends": rows, "dives": dives(3), "failed": []})))
+    assert all(f"net_buoyancy.{n} " in told for n in "XYZKMN")
+
+
+def test_ours_is_said_once_and_wide_tables_are_turned():
+    answer = study() | {"assumed": ["ours: a", "ours: b", "paper: c"]}
+    told = STUDY.assumed(View(answer))
+    assert told == [("paper", "c"), ("Not in the paper, decided here", "1. a"), ("", "2. b")]
+    assert all(len(t.head) <= 8 for t in STUDY.tables(View(answer)))
+
+
+def test_an_adaptation_that_saw_no_change_of_a_model_that_was_off_points_to_diagnose():
+    assert ratio_words(1.0) == "the error is the same as that of the model as it was"
+    assert "smaller than" in ratio_words(0.7) and "larger" in ratio_words(1.3)
+    steps = {"one_step_rmse_du_m_s2_adapted": 0.7, "one_step_rmse_du_m_s2_unadapted": 1.0}
+    assert "auvnn diagnose" in off_words({"frozen_5_s_error_ratio": 1.0, **steps})[0]
+    assert off_words({"frozen_5_s_error_ratio": 0.99}) == []
