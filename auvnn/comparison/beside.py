@@ -35,10 +35,11 @@ def beside(
     Returns:
         `total`, `u` ... `r`, `diverged`, `persistence` with the same, `horizon` in s, `model` with the model's own
         errors, and `loses`: velocities in which it is worse than `baseline` and than `persistence`. Empty where no
-        window was run.
+        window was run, or a velocity has no sensor.
     """
     key = next((h for h in HORIZONS if h in rolled), None)
-    if key is None:
+    # A regression of accelerations has nothing to begin from where velocities have no sensor.
+    if key is None or log.estimated or rolled[key].windows.estimated:
         return {}
     try:
         found = Regression.of(log, kind, how)

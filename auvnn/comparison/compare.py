@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from auvnn.answers import PLOTTED, Answer, plain
 from auvnn.cards import Card, figure
+from auvnn.checks.blind import blind
 from auvnn.checks.doubts import doubts
 from auvnn.comparison.beside import beside, standing
 from auvnn.comparison.locate import AXES, failures, locate
@@ -21,6 +22,7 @@ from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.one_step import OneStep, one_step, scores
 from auvnn.metrics.rollouts import HORIZONS, NAMES, Rolled, Scale, rollout_table, scale_of
+from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
 from auvnn.models.free_running.excursions import region_of, words_of
 from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
@@ -125,8 +127,7 @@ def compare(
     """
     log = as_log(log)
     model = as_model(model, log)
-    wanted = tuple(_horizon(h) for h in horizons)
-    log.refuse_unmeasured()
+    wanted, log = tuple(_horizon(h) for h in horizons), completed(model, log)
     how = choose_derivative(log, derivative)
     parts = one_step(model, log, how)
     scale = scale_of(log)
@@ -140,8 +141,8 @@ def compare(
     with np.errstate(invalid="ignore"):
         residual = {
             axis: {
-                "rms": float(np.sqrt(np.nanmean(wrench[:, k] ** 2))),
-                "mean": float(np.nanmean(wrench[:, k])),
+                "rms": float(np.sqrt(_mean(wrench[:, k] ** 2))),
+                "mean": _mean(wrench[:, k]),
                 "noise_floor": float(noise[k]),
             }
             for k, axis in enumerate(AXES)
@@ -158,12 +159,16 @@ def compare(
         residual,
         failures(parts, located, noise),
         _warnings(model, log, rolled),
-        [_series(run.number, run.nu, p, shown) for run, p in zip(log.runs, parts, strict=True)],
+        [_series(run.number, run.measured.nu, p, shown) for run, p in zip(log.runs, parts, strict=True)],
         located,
         noise,
         None,
         beside(rolled, model.actuation, scale, log, how),
     )
+
+
+def _mean(x: Array) -> float:
+    return float(np.nanmean(x)) if not np.isnan(x).all() else float("nan")
 
 
 def floor_of(model: GreyBox, rolled: Rolled, log: Log, scale: Scale) -> float:
@@ -175,7 +180,7 @@ def floor_of(model: GreyBox, rolled: Rolled, log: Log, scale: Scale) -> float:
 
 def _horizon(value: str | float) -> str:
     if value == "full":
-        return "full"
+        return value
     try:
         number = float(value)
     except ValueError:
@@ -261,7 +266,7 @@ def write_predictions(series: list[dict[str, Any]] | Mapping[str, list[dict[str,
 
 
 def _warnings(model: GreyBox, log: Log, rolled: dict[str, Rolled]) -> list[str]:
-    found = [*model.vehicle.warnings, *log.quality().reservations]
+    found = [*model.vehicle.warnings, *log.quality().reservations, *assumed(log, model), *blind(log)]
     if not model.vehicle.has_damping and model.damping is None:
         found.append("the model has no damping at all: train its subnetworks, or state damping in its file")
     gone = {h: int(r.diverged.sum()) for h, r in rolled.items() if r.diverged.any()}

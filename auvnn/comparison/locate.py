@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -52,12 +53,14 @@ def locate(log: Log, parts: list[OneStep]) -> dict[str, dict[str, Any]]:
     """Return by regime the bins' edges, the residual's root mean square (6, bins) and the samples in each bin."""
     values = [regimes(run) for run in log.runs]
     wrench = np.concatenate([p.wrench for p in parts])
+    # Degrees of freedom without a sensor have no residual.
+    told = np.isfinite(wrench[:, np.isfinite(wrench).any(0)]).all(1)
     found: dict[str, dict[str, Any]] = {}
     for name in UNITS:
         if not all(name in v for v in values):
             continue
         x = np.concatenate([v[name] for v in values])
-        good = np.isfinite(x) & np.isfinite(wrench).all(1)
+        good = np.isfinite(x) & told
         if good.sum() < 10 * BINS or np.ptp(x[good]) < 1e-9:
             continue
         if name in ("heading", "time", "depth"):
@@ -120,7 +123,10 @@ def failures(
     """
     wrench = np.concatenate([p.wrench for p in parts])
     unit = np.where(floor > 0, floor, 1e-9)
-    energy = np.nanmean((wrench / unit) ** 2, axis=0) - 1.0
+    with warnings.catch_warnings():
+        # A degree of freedom without a sensor has no residual to take the mean of.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        energy = np.nanmean((wrench / unit) ** 2, axis=0) - 1.0
     energy = np.where(energy > BARELY, energy, 0.0)
     whole = float(energy.sum())
     if not np.isfinite(whole) or whole <= 0:

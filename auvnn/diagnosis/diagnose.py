@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from auvnn.checks.blind import blind
 from auvnn.checks.doubts import doubts
 from auvnn.comparison.beside import stands
 from auvnn.diagnosis.answers.answer import Diagnosis
@@ -24,6 +25,7 @@ from auvnn.estimation.normal_equations import TRUST, motion
 from auvnn.estimation.prediction_error import SINGULAR
 from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
+from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
 from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
 from auvnn.threads import on_one_thread
@@ -138,6 +140,7 @@ def searched(
     say = progress or (lambda words: None)
     if max_effects < 1:
         raise ConfigError(f"max_effects={max_effects} must be at least 1")
+    log = completed(model, log)
     usable, needs = candidates_for(model, log, effects)
     log.quality().refuse_contradictions(force)
     allowed = Tolerance.of(tolerance)
@@ -162,7 +165,7 @@ def searched(
         advice=advice,
         whiteness=whiteness,
         absorbed=absorbed,
-        notes=(*notes, *doubts(model, log)),
+        notes=(*assumed(log, model), *blind(log), *notes, *doubts(model, log)),
         say=say,
     )
     try:

@@ -27,6 +27,7 @@ from auvnn.errors import InputError
 from auvnn.estimation.prediction_error import SINGULAR, FitError
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import Rolled, roll, scale_of
+from auvnn.metrics.unmeasured import completed
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 
@@ -111,6 +112,7 @@ def left_out(
         ConfigError: an unknown effect or objective.
         InputError: the log is too short.
     """
+    log = completed(model, log)
     layout = lay_out(model, list(names))
     fitter = fitter_for(model, log, objective, window=window, derivative=derivative)
     return _of_names(
@@ -144,6 +146,7 @@ def each_name(
         progress: told in words what is being done.
     """
     say = progress or (lambda words: None)
+    log = completed(model, log)
     layout = lay_out(model, list(names))
     fitter = fitter_for(model, log, objective, window=window, derivative=derivative)
 

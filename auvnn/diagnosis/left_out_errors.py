@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.metrics.rollouts import NAMES, Scale
+from auvnn.metrics.rollouts import Scale
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
@@ -71,7 +71,7 @@ class LeftOut:
     @property
     def by_dof(self) -> dict[str, float]:
         """Velocity to its error; NaN where it is not excited."""
-        return {n: float(v) for n, v in zip(NAMES, self.nrmse(), strict=True)}
+        return {n: float(v) for n, v in zip(self.scale.names, self.nrmse(), strict=True)}
 
     @property
     def by_run(self) -> dict[int, float]:
@@ -165,7 +165,9 @@ def gain(before: LeftOut, after: LeftOut) -> Gain:
         with np.errstate(invalid="ignore"):
             std = np.fmax(std, np.sqrt((n - 1) / n * ((values - values.mean(0)) ** 2).sum(0)))
     by_dof = {
-        n: (float(whole[k + 1]), float(std[k + 1])) for k, n in enumerate(NAMES) if np.isfinite(whole[k + 1])
+        n: (float(whole[k + 1]), float(std[k + 1]))
+        for k, n in enumerate(before.scale.names)
+        if np.isfinite(whole[k + 1])
     }
     return Gain(float(whole[0]), float(std[0]), by_dof, before.total, after.total, after.by_dof)
 

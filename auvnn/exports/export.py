@@ -119,10 +119,16 @@ def export(
         raise ConfigError(f"precision={precision}: to={to} knows {', '.join(target.precisions)}")
     if not (math.isfinite(dt) and dt > 0):
         raise ConfigError(f"dt={dt}: give a positive step in s")
+    known = model if isinstance(model, GreyBox) else load(model)
+    vehicle = known.vehicle
+    if vehicle.glides or (vehicle.reduced and to == "sdf"):
+        raise ConfigError(
+            f"{vehicle.name} is a reduced model, which to={to} has no place for: state all its degrees"
+        )
     path = Path(out).expanduser()
     if path.exists() and (not path.is_dir() or any(path.iterdir())) and not overwrite:
         raise InputError(f"{path}: is not an empty folder: choose another, or say overwrite=true")
-    system = System(model if isinstance(model, GreyBox) else load(model), dt, name)
+    system = System(known, dt, name)
     path.parent.mkdir(parents=True, exist_ok=True)
     staged = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}.", suffix=".partial"))
     try:

@@ -23,6 +23,7 @@ from auvnn.logs.leakage import leakage
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.rollouts import HORIZONS
+from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
 from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
 from auvnn.threads import on_one_thread
@@ -76,6 +77,7 @@ def add(
     names, notes = _wanted(names_of(effects))
     _check_request(model, names)
     held_out = f"{test.name} is held out" if test is not None else ""
+    log, test = completed(model, log), None if test is None else completed(model, test)
     if test is None:
         log, test, held_out = log.split()
     else:
@@ -125,7 +127,13 @@ def _assembled(
         {"step": "noise floor", "error": noise_floor(fits.final, rolled[last][key], test, judged.scale)}
     )
     said = [w for w in (fits.final.effect(n).words() for n in names) if w]
-    warnings = [*log.quality().reservations, *said, *notes, *words(layout, best, judged)]
+    warnings = [
+        *log.quality().reservations,
+        *assumed(log, model),
+        *said,
+        *notes,
+        *words(layout, best, judged),
+    ]
     if key != "5":
         warnings.append(f"no held-out stretch is 5 s long: gain and waterfall are for horizon {key}")
     one_step = objective == "one_step"
@@ -150,7 +158,7 @@ def _assembled(
             {
                 "run": run.number,
                 "t": run.t,
-                "measured": run.nu,
+                "measured": run.measured.nu,
                 "before": stitch(rolled[GIVEN][key], run.number, run.nu),
                 "refitted": stitch(rolled[REFITTED][key], run.number, run.nu),
                 "after": stitch(rolled[last][key], run.number, run.nu),

@@ -10,7 +10,9 @@ VELOCITY = ("u", "v", "w", "p", "q", "r")
 ACCELERATION = ("du", "dv", "dw", "dp", "dq", "dr")
 POSITION = ("x", "y", "z")
 WRENCH = ("tau_X", "tau_Y", "tau_Z", "tau_K", "tau_M", "tau_N")
-SCALARS = ("altitude", "voltage")
+SCALARS = ("altitude", "voltage", "ballast", "density", "moving_mass")
+DRIVES = ("ballast", "moving_mass")
+"""What moves a vehicle without thrusters: a volume that changes, m3, larger is lighter; the shift of a mass, m."""
 RESET = "reset"
 """Counter of the estimator's resets, or number of its core: where it changes, the pose starts afresh."""
 FIXED = ("run", "t", *EULER, *QUATERNION, *VELOCITY, *ACCELERATION, *POSITION, *WRENCH, *SCALARS, RESET)
@@ -30,6 +32,9 @@ _UNITS = {
     **dict.fromkeys(WRENCH[3:], "N m"),
     "altitude": "m",
     "voltage": "V",
+    "ballast": "m3",
+    "density": "kg/m3",
+    "moving_mass": "m",
     RESET: "1",
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -63,6 +64,9 @@ def rows_of(runs: Iterable[Run]) -> NDArray[np.void]:
     parts = []
     for run in runs:
         sign = np.where(run.quaternion[:, :1] < 0.0, -1.0, 1.0)
+        # Of what has no sensor there is nothing to compare.
+        seen = run.measured.nu
+        run = replace(run, nu=np.where(np.isnan(seen).all(axis=0), 0.0, seen))
         rows = np.concatenate([run.nu, sign * run.quaternion], axis=1)
         moving = np.isfinite(rows).all(axis=1) & (run.nu != 0.0).any(axis=1)
         parts.append(rows[moving].astype(np.float32) + np.float32(0.0))  # -0 and 0 are the same

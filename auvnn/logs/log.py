@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from auvnn.errors import ConfigError, InputError
-from auvnn.logs.channels import VELOCITY
+from auvnn.logs.channels import SCALARS, VELOCITY
 from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.run import MIN_SAMPLES, Run
 from auvnn.logs.shown import ShownLog
@@ -192,17 +192,28 @@ class Log(ShownLog):
     def _quality(self) -> Quality:
         from auvnn.logs.quality.quality import assess
 
-        return assess(self)
+        return assess(self.measured)
 
     def quality(self) -> Quality:
         """Return what was read, repaired, implausible and excited; computed once."""
         return self._quality
 
     @property
+    def measured(self) -> Log:
+        """The log as it was recorded; itself where nothing was estimated."""
+        return self._part([run.measured for run in self.runs]) if self.estimated else self
+
+    @property
+    def estimated(self) -> tuple[str, ...]:
+        """Channels whose values were estimated and not measured."""
+        return tuple(dict.fromkeys(n for run in self.runs for n in run.estimated))
+
+    @cached_property
     def unmeasured(self) -> list[str]:
         """What a model needs of every sample and no run has measured: of attitude, u, v, w, p, q, r."""
-        absent = [n for i, n in enumerate(VELOCITY) if all(np.isnan(run.nu[:, i]).all() for run in self.runs)]
-        attitude = all(np.isnan(run.quaternion).any(axis=1).all() for run in self.runs)
+        runs = [run.measured for run in self.runs]
+        absent = [n for i, n in enumerate(VELOCITY) if all(np.isnan(run.nu[:, i]).all() for run in runs)]
+        attitude = all(np.isnan(run.quaternion).any(axis=1).all() for run in runs)
         return (["attitude"] if attitude else []) + absent
 
     def refuse_unmeasured(self) -> None:
@@ -213,8 +224,8 @@ class Log(ShownLog):
         """
         if self.unmeasured:
             raise InputError(
-                f"log '{self.name}': {', '.join(self.unmeasured)} not measured; comparing and fitting need attitude "
-                "and u, v, w, p, q, r in some samples. `auvnn check` reads such a log; a mapping can make velocities of "
+                f"log '{self.name}': {', '.join(self.unmeasured)} not measured, which this needs in some samples: check, "
+                "compare, diagnose, add and train (objective=rollout) do without; a mapping can make velocities of "
                 "positions (difference: true)"
             )
 
@@ -279,9 +290,7 @@ class Log(ShownLog):
 
 def blocks_of(run: Run) -> frozenset[str]:
     """Return the names of the blocks a run has, thrusters and fins with their number."""
-    names = {
-        b for b in ("nu_dot", "position", "wrench", "altitude", "voltage") if getattr(run, b) is not None
-    }
+    names = {b for b in ("nu_dot", "position", "wrench", *SCALARS) if getattr(run, b) is not None}
     for block in ("thrusters", "fins"):
         value = getattr(run, block)
         if value is not None:

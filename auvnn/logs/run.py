@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from auvnn.cards import Card, Shown
 from auvnn.catalogue import unknown_name
 from auvnn.errors import InputError
-from auvnn.logs.channels import ACCELERATION, EULER, POSITION, QUATERNION, RESET, VELOCITY, WRENCH
+from auvnn.logs.channels import ACCELERATION, EULER, POSITION, QUATERNION, RESET, SCALARS, VELOCITY, WRENCH
 from auvnn.logs.signals.rotation import to_euler
 from auvnn.logs.signals.segments import stretches
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 _WIDTHS = {
     **{"quaternion": 4, "nu": 6, "nu_dot": 6, "position": 3, "wrench": 6},
-    **{"altitude": 0, "voltage": 0, "reset": 0},
+    **dict.fromkeys((*SCALARS, RESET), 0),
 }
 _BLOCKS = {
     "quaternion": QUATERNION,
@@ -49,8 +49,15 @@ class Run(Shown):
         fins: fin angles, rad, (N, m).
         altitude: height above the bottom, m, (N,).
         voltage: battery, V, (N,).
+        ballast: volume that changes at constant mass, m3, (N,); larger is lighter.
+        density: of the water, kg/m3, (N,).
+        moving_mass: shift of a moving mass along its axis, m, (N,).
         reset: counter of the estimator's resets or number of its core, (N,): where it changes, the pose starts afresh.
         extra: columns outside the contract, kept as they were, (N,) each.
+        estimated: channels whose values were not measured but estimated, where a vehicle has no sensor for them: free
+            running starts from them, and nothing is scored or fitted by them.
+        given: measured channels that drive the model rather than check it: nothing is scored by them.
+        recorded: the run as it was recorded, where estimates stand in this one.
 
     Raises:
         InputError: shapes disagree, time does not increase, or there are fewer than three samples.
@@ -69,6 +76,12 @@ class Run(Shown):
     voltage: Array | None = None
     reset: Array | None = None
     extra: dict[str, Array] = field(default_factory=dict)
+    estimated: tuple[str, ...] = ()
+    given: tuple[str, ...] = ()
+    ballast: Array | None = None
+    density: Array | None = None
+    moving_mass: Array | None = None
+    recorded: Run | None = None
 
     def __post_init__(self) -> None:
         """Make every array a read-only float64 view and check the shapes."""
@@ -79,17 +92,8 @@ class Run(Shown):
             raise InputError(f"run {self.number}: t must be finite and strictly increasing")
         object.__setattr__(self, "number", int(self.number))
         object.__setattr__(self, "t", t)
-        for name in (
-            "quaternion",
-            "nu",
-            "nu_dot",
-            "position",
-            "wrench",
-            "thrusters",
-            "fins",
-            *_SCALAR,
-            RESET,
-        ):
+        blocks = ("quaternion", "nu", "nu_dot", "position", "wrench", "thrusters", "fins")
+        for name in (*blocks, *_SCALAR, RESET):
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, self._checked(name, value))
@@ -197,8 +201,17 @@ class Run(Shown):
 
     @cached_property
     def channels(self) -> dict[str, Array]:
-        """The columns with at least one sample, by name; `"z" in run.channels` asks for the depth."""
-        return {name: column for name, column in self.columns() if not np.isnan(column).all()}
+        """The measured columns with at least one sample, by name; `"z" in run.channels` asks for the depth."""
+        return {
+            name: column
+            for name, column in self.columns()
+            if name not in self.estimated and not np.isnan(column).all()
+        }
+
+    @cached_property
+    def measured(self) -> Run:
+        """The run as it was recorded; itself where nothing was estimated."""
+        return self if self.recorded is None else self.recorded
 
     @cached_property
     def outliers(self) -> dict[str, NDArray[np.bool_]]:
@@ -263,10 +276,12 @@ class Run(Shown):
                 changes["extra"] = {k: v[part] for k, v in value.items()}
             elif isinstance(value, np.ndarray):
                 changes[item.name] = value[part]
+        if self.recorded is not None:
+            changes["recorded"] = self.recorded.cut(part, number)
         return replace(self, **changes)
 
 
-_SCALAR = ("altitude", "voltage")
+_SCALAR = SCALARS
 
 
 def _frozen(value: Any, name: str, number: int) -> Array:

@@ -43,7 +43,7 @@ def predict(
 
 
 def initial_states(model: GreyBox, windows: Windows) -> Tensor:
-    """Return the states (B, 13) that the first measurements stand for."""
+    """Return the states (B, 13) that the first measurements stand for, and estimates of what has no sensor."""
     first = model.unsense(Sensed(windows.eta[:, 0, :3], windows.eta[:, 0, 3:], windows.nu[:, 0]))
     return torch.cat([first.position, first.quaternion, first.nu], dim=-1).detach()
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import torch
 
+from auvnn.effects import Sensed
 from auvnn.logs import Log
+from auvnn.metrics.coordinates import coordinates, spread
 from auvnn.metrics.free_run import initial_states, moved, predict
 from auvnn.metrics.noise import attitude_noise, white
 from auvnn.metrics.rollouts import Rolled, Scale
@@ -42,10 +46,18 @@ def noise_floor(
         axis=1,
     )
     with torch.no_grad():
-        true = predict(model, windows, states, engine=engine)[1].numpy()
-        started = predict(model, windows, moved(states, torch.as_tensor(kick)), engine=engine)[1].numpy()
+        eta, nu = predict(model, windows, states, engine=engine)
+        eta_started, nu_started = predict(model, windows, moved(states, torch.as_tensor(kick)), engine=engine)
+    true, started = nu.numpy(), nu_started.numpy()
     error = true + rng.normal(size=true.shape) * noise_nu - started
     mask = windows.mask[..., 6:12].numpy().copy()
+    # The model's own run stands for the measurements.
+    itself = replace(windows, eta=eta, mask=windows.mask)
+    instead = coordinates(itself, Sensed(eta_started[..., :3], eta_started[..., 3:], nu_started), scale.names)
+    if instead is not None:
+        rough = spread(log, scale.names)[1][instead.places]
+        error[..., instead.places] = instead.gap + rng.normal(size=instead.gap.shape) * np.nan_to_num(rough)
+        mask[..., instead.places] = instead.mask
     mask[:, 0] = 0.0
     good = np.isfinite(error).all((1, 2))
     if not good.any():

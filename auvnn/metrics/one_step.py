@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from auvnn.effects import Moment, Sensed
 from auvnn.errors import InputError
 from auvnn.logs import Log, Run
+from auvnn.logs.channels import VELOCITY
 from auvnn.logs.signals.derivatives import LocalPolynomial
 from auvnn.metrics.derivative import REPEATS, Derivative
 from auvnn.metrics.noise import with_more_noise
@@ -201,11 +202,41 @@ def one_step(model: GreyBox, log: Log, derivative: Derivative) -> list[OneStep]:
         louder = [accelerations(model, with_more_noise(run, k), derivative) for k in range(REPEATS)]
         floor = np.concatenate([a - b - gap for a, b in louder])
         found.append(
-            OneStep(
-                run.number, run.t, measured, predicted, gap @ to_wrench, _rms(floor), _rms(floor @ to_wrench)
+            _of_measured(
+                run,
+                OneStep(
+                    run.number,
+                    run.t,
+                    measured,
+                    predicted,
+                    gap @ to_wrench,
+                    _rms(floor),
+                    _rms(floor @ to_wrench),
+                ),
+                to_wrench,
             )
         )
     return found
+
+
+def _of_measured(run: Run, part: OneStep, to_wrench: Array) -> OneStep:
+    """Return a comparison without the degrees of freedom whose velocity has no sensor: nothing can be said of them.
+
+    What the others' wrench owes to accelerations that are not known is left out of it.
+    """
+    blind = [name in run.estimated for name in VELOCITY]
+    if not any(blind):
+        return part
+    gap = np.where(blind, 0.0, part.measured - part.model)
+    noise = np.where(blind, np.nan, part.noise)
+    return replace(
+        part,
+        measured=np.where(blind, np.nan, part.measured),
+        model=np.where(blind, np.nan, part.model),
+        wrench=np.where(blind, np.nan, gap @ to_wrench),
+        noise=noise,
+        wrench_noise=np.where(blind, np.nan, part.wrench_noise),
+    )
 
 
 def accelerations(model: GreyBox, run: Run, derivative: Derivative) -> tuple[Array, Array]:

@@ -12,7 +12,9 @@ from auvnn.effects import Sensed
 from auvnn.errors import InputError
 from auvnn.logs import Log
 from auvnn.logs.signals.noise import noise_std
+from auvnn.metrics.coordinates import Coordinates, coordinates, names_of, spread
 from auvnn.metrics.free_run import initial_states, predict
+from auvnn.metrics.likely_states import likely_states
 from auvnn.metrics.windows import MAX_STEP, VELOCITY, Windows, cut_windows
 from auvnn.models import GreyBox
 from auvnn.models.free_running.rollout import LIMIT
@@ -29,10 +31,20 @@ SHORTEST_STEP = 0.001
 
 @dataclass(frozen=True)
 class Scale:
-    """What errors are measured by: standard deviation of each velocity, and which count as excited."""
+    """What errors are measured by: standard deviation of each velocity, and which count as excited.
+
+    Where a velocity has no sensor, the coordinate that it moves stands in its place where that was measured: x, y, z for
+    u, v, w and phi, theta, psi for p, q, r, with the standard deviation of its change over 5 s.
+
+    Attributes:
+        std: (6,).
+        excited: (6,).
+        names: of the six channels.
+    """
 
     std: Array
     excited: NDArray[np.bool_]
+    names: tuple[str, ...] = NAMES
 
 
 def scale_of(log: Log) -> Scale:
@@ -40,6 +52,13 @@ def scale_of(log: Log) -> Scale:
     nu = np.concatenate([run.nu for run in log.runs])
     noise = np.nanmean([np.asarray(noise_std(run.t, run.nu)) for run in log.runs], axis=0)
     std = np.nanstd(nu, axis=0)
+    if log.estimated:
+        names = names_of(log)
+        moves, rough = spread(log, names)
+        std, noise = np.where(np.isfinite(moves), moves, std), np.where(np.isfinite(moves), rough, noise)
+        given = {n for run in log.runs for n in run.given}
+        counts = np.array([n not in log.estimated and n not in given for n in names])
+        return Scale(std, counts & (std > EXCITED * np.nan_to_num(noise)) & (std > 1e-9), names)
     return Scale(std, (std > EXCITED * np.nan_to_num(noise)) & (std > 1e-9))
 
 
@@ -136,27 +155,34 @@ def roll_windows(model: GreyBox, windows: Windows, scale: Scale, engine: str = "
         start = initial_states(model, windows)
         first = windows.inputs.command[:, windows.warmup]
         rate = fastest_rate(model, start[:, :7], start[:, 7:], first)
-        eta, nu = predict(model, windows, start, max(followed(MAX_STEP, rate), SHORTEST_STEP), engine)
-        seen = model.sense(Sensed(eta[..., :3], eta[..., 3:], nu)).nu.numpy()
-    return scored(windows, seen, scale)
+        step = max(followed(MAX_STEP, rate), SHORTEST_STEP)
+        if windows.estimated:
+            start = likely_states(model, windows, step)
+        eta, nu = predict(model, windows, start, step, engine)
+        seen = model.sense(Sensed(eta[..., :3], eta[..., 3:], nu))
+    return scored(windows, seen.nu.numpy(), scale, coordinates(windows, seen, scale.names))
 
 
-def scored(windows: Windows, seen: Array, scale: Scale) -> Rolled:
+def scored(windows: Windows, seen: Array, scale: Scale, instead: Coordinates | None = None) -> Rolled:
     """Return free runs with their errors, whoever predicted them.
 
     Args:
         windows: what was run.
         seen: (B, L, 6) predicted velocities as the sensors would report them; not finite once one has run away.
         scale: of the log.
+        instead: coordinates that stand in the place of velocities without a sensor.
     """
     measured, mask = windows.nu.numpy(), windows.mask[..., VELOCITY].numpy().copy()
+    gap, stay = measured - seen, measured - measured[:, :1]
+    if instead is not None:
+        gap[..., instead.places], stay[..., instead.places] = instead.gap, instead.stay
+        mask[..., instead.places] = instead.mask
     mask[:, 0] = 0.0
     sound = (np.isfinite(seen) & (np.abs(seen) < LIMIT)).all(axis=-1)
     gone = np.maximum.accumulate(~sound, axis=1)
     diverged = gone.any(axis=1)
-    error = np.where(gone[..., None], CUT * scale.std, measured - seen)
+    error = np.where(gone[..., None], CUT * scale.std, gap)
     error[diverged] = np.clip(error[diverged], -CUT * scale.std, CUT * scale.std)
-    stay = measured - measured[:, :1]
     return Rolled(
         windows,
         np.where(gone[..., None], np.nan, seen),
@@ -184,7 +210,7 @@ def rollout_table(
         rolled = roll(model, log, horizon, scale)
         if rolled is None:
             out[horizon] = {
-                **{n: {"rmse": None, "nrmse": None} for n in NAMES},
+                **{n: {"rmse": None, "nrmse": None} for n in (*NAMES, *scale.names)},
                 "total": None,
                 "persistence": None,
                 "noise_floor": None,
@@ -196,7 +222,9 @@ def rollout_table(
             rmse = np.sqrt(rolled.squared.sum(0) / rolled.count.sum(0))
         nrmse = rolled.nrmse(scale)
         out[horizon] = {
-            **{n: {"rmse": float(rmse[k]), "nrmse": float(nrmse[k])} for k, n in enumerate(NAMES)},
+            # Of a velocity without a sensor nothing is known; what stands in its place has a name of its own.
+            **{n: {"rmse": float("nan"), "nrmse": float("nan")} for n in NAMES if n not in scale.names},
+            **{n: {"rmse": float(rmse[k]), "nrmse": float(nrmse[k])} for k, n in enumerate(scale.names)},
             "total": rolled.total(scale),
             "persistence": rolled.total(scale, held=True),
             "diverged": int(rolled.diverged.sum()),

@@ -58,6 +58,7 @@ class Windows:
         warmup: rows of history.
         max_step: longest step with which an integrator may run them, s.
         law: of a stochastic force that acts in them; None for none.
+        estimated: channels that were estimated and not measured: free running starts from them, and they do not count.
     """
 
     run: np.ndarray
@@ -72,6 +73,7 @@ class Windows:
     warmup: int
     max_step: float = MAX_STEP
     law: ForceLaw | None = None
+    estimated: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         """Return the number of windows."""
@@ -251,6 +253,8 @@ def gathered(pieces: Sequence[Piece], warmup: float) -> Windows:
     attitude = np.repeat(seen[..., 3:7].all(-1, keepdims=True), 3, axis=-1)
     mask = np.concatenate([seen[..., :3], attitude, seen[..., 7:]], axis=-1) & ~spikes
     mask &= (np.arange(rows)[None, :] < length[:, None])[..., None]
+    estimated = tuple(dict.fromkeys(n for run, *_ in pieces for n in run.estimated))
+    mask[..., [CHANNELS.index(n) for n in estimated]] = False
     filled = np.where(seen, measured, 0.0)
     filled[..., 3] = np.where(attitude[..., 0], filled[..., 3], 1.0)
     fins, voltage, altitude = optional("fins"), optional("voltage"), optional("altitude")
@@ -271,6 +275,7 @@ def gathered(pieces: Sequence[Piece], warmup: float) -> Windows:
         _double(mask),
         length,
         before,
+        estimated=estimated,
     )
 
 

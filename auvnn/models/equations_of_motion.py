@@ -98,7 +98,13 @@ class EquationsOfMotion(nn.Module):
             body = effect.body(body, moment)
         rigid = rigid_body_inertia(body.mass, body.inertia, body.cg)
         total = rigid + body.added_mass
-        return Prepared(body, rigid, body.added_mass, total, torch.linalg.inv(total))
+        return Prepared(body, rigid, body.added_mass, total, self._inverse(total))
+
+    def _inverse(self, total: Tensor) -> Tensor:
+        """Return the inverse of the inertia; of a reduced model, that of the part that forces and moments move."""
+        if (kept := self._known("kept")) is None:
+            return torch.linalg.inv(total)
+        return kept @ torch.linalg.inv(kept.mT @ total @ kept) @ kept.mT
 
     def forward(
         self,
@@ -181,7 +187,11 @@ class EquationsOfMotion(nn.Module):
         first, *others = terms.values()
         for term in others:
             first = first + term
-        return matvec(prepared.inverse, first)
+        if self._known("turned") is None:
+            return matvec(prepared.inverse, first)
+        # The last three of the command are then the accelerations of the measured attitude, not moments.
+        turning = self._known("turned") * inputs.command
+        return matvec(prepared.inverse, first - matvec(prepared.total, turning)) + turning
 
     def wrenches(
         self, position: Tensor, rotation: Tensor, nu: Tensor, thrust: Tensor, inputs: Inputs, time: Tensor

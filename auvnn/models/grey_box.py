@@ -128,6 +128,9 @@ class GreyBox(ShownModel, EquationsOfMotion):
             "fin_frame",
             fin_frame(_tensor([f.position for f in fins]), _tensor([f.axis for f in fins])) if fins else None,
         )
+        reduced = vehicle.reduced
+        keep("kept", np.eye(6)[:, list(reduced.moved)] if reduced else None)
+        keep("turned", np.isin(np.arange(6), reduced.turned).astype(float) if reduced.turned else None)
 
     @property
     def before_thrust(self) -> list[Effect]:

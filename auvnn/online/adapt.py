@@ -100,6 +100,11 @@ def adapt(
     """
     log = as_log(log)
     model = as_model(model, log)
+    log.refuse_unmeasured()
+    if model.vehicle.reduced or model.vehicle.glides:
+        raise InputError(
+            f"{model.vehicle.name} is a reduced model: adaptation takes all six degrees of freedom"
+        )
     if log.kind != model.actuation:
         raise InputError(
             f"{log.name} is driven by {log.kind}, the model by {model.actuation}: load the model with "

@@ -120,6 +120,16 @@ def simulate(
     """
     model = as_model(model)
     _check(seed, runs, duration, rate, coefficients, max_step)
+    vehicle = model.vehicle
+    if vehicle.glides or (vehicle.reduced and plant != "own"):
+        raise ConfigError(
+            f"{vehicle.name} cannot be simulated so: excitations are forces in six degrees of freedom"
+            + (
+                "; plant=own knows planes"
+                if not vehicle.glides
+                else ", and a log's ballast or attitude moves it"
+            )
+        )
     if accelerations is not None and not isinstance(accelerations, bool):
         raise ConfigError(f"accelerations = {accelerations!r}: true or false is needed, or null")
     manner = make_excitation(excitation, EXCITATIONS)

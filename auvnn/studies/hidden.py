@@ -18,7 +18,9 @@ from auvnn.errors import ConfigError
 from auvnn.estimation.normal_equations import linearise, normal_equations
 from auvnn.estimation.priors import set_parameters
 from auvnn.logs import Log
+from auvnn.logs.without import without as lacking
 from auvnn.metrics.free_run import initial_states, moved
+from auvnn.metrics.unmeasured import completed
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
 from auvnn.simulation import bottom_below, simulate
@@ -114,6 +116,7 @@ def sized(
     duration: float = 60.0,
     rate: float = 20.0,
     accelerations: bool | None = None,
+    without: Sequence[str] = (),
 ) -> dict[str, float]:
     """Return parameters of an effect in a random direction and of a stated size.
 
@@ -133,6 +136,7 @@ def sized(
         rate: samples per second.
         accelerations: whether the log will have them. They count only for an effect that needs them, so that all
             others have the same size with and without.
+        without: channels that the log will lack; the oracle lacks them too.
 
     Raises:
         ConfigError: an unknown size or effect, or one that the manoeuvre says nothing about.
@@ -165,7 +169,8 @@ def sized(
     further = list(ACCELERATION_NOISE.values()) if felt else [np.inf] * 6
     sigma = np.array([0.05, 0.05, 0.01, 0.003, 0.003, 0.008] + [0.006] * 3 + [0.003] * 3 + further)
     shape = _shape(type(layout.model.effect(effect)), described, made.log, generator)
-    information = oracle_information(model, made.log, effect, sigma, shape)
+    log = completed(model, lacking(made.log, without))
+    information = oracle_information(model, log, effect, sigma, shape)
     step = np.where(fixed, 0.0, direction * scale)
     distance = float(np.sqrt(step @ information @ step))
     if not distance > 1e-9:

@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 
 from auvnn.answers import Answer, plain
 from auvnn.damping.bank import DampingBank
+from auvnn.errors import ConfigError
 from auvnn.logs import Log
 from auvnn.logs.leakage import leakage
 from auvnn.metrics.derivative import Derivative, choose_derivative
 from auvnn.metrics.one_step import OneStep, one_step, scores
 from auvnn.metrics.rollouts import roll, scale_of
+from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
 from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
 from auvnn.training.confounding.confounded_effects import confounded_effects
@@ -134,6 +136,12 @@ def train(
     model = as_model(model, log)
     test = None if test is None else as_log(test, "test")
     goal = build_objective(objective)
+    log, test = completed(model, log), None if test is None else completed(model, test)
+    if log.unmeasured and goal.name == "one_step":
+        raise ConfigError(
+            f"{log.name}: {', '.join(log.unmeasured)} not measured, so that there are no accelerations to train on: take "
+            "objective=rollout"
+        )
     if test is None:
         log, test, held_words = log.split()
     else:
@@ -171,6 +179,7 @@ def train(
     warnings = [
         *model.vehicle.warnings,
         *log.quality().reservations,
+        *assumed(log, model),
         *(w for w in fit.warnings if w not in fit.energy),
     ]
     start, begun = trained, "the one-step fit"

@@ -13,6 +13,7 @@ from auvnn.vehicle.doubts import doubts
 from auvnn.vehicle.fields import Fields, number, shown
 from auvnn.vehicle.parts import DEFAULT_UNCERTAINTY, Array, DampingElement
 from auvnn.vehicle.reading_parts import read_element, read_fin, read_thruster, turned
+from auvnn.vehicle.reduced import Ballast, MovingMass, Reduced, check_drives
 
 if TYPE_CHECKING:
     from auvnn.vehicle.vehicle import Vehicle
@@ -37,6 +38,9 @@ KEYS = (
     "thrusters",
     "fins",
     "reference_voltage",
+    "reduced",
+    "ballast",
+    "moving_mass",
     "uncertainty",
     "effects",
     "source",
@@ -113,7 +117,17 @@ def vehicle_from_dict(
         uncertainty=_uncertainty(fields, groups, warnings),
         effects=_effects(fields),
         source=fields.text("source", ""),
+        reduced=Reduced.read(fields.data["reduced"], f"{fields.where}: reduced")
+        if fields.has("reduced")
+        else Reduced(),
+        ballast=Ballast.read(fields.data["ballast"], f"{fields.where}: ballast")
+        if fields.has("ballast")
+        else None,
+        moving_mass=MovingMass.read(fields.data["moving_mass"], f"{fields.where}: moving_mass")
+        if fields.has("moving_mass")
+        else None,
     )
+    check_drives(vehicle, where)
     if doubt:
         warnings.append(doubt)
     if turn is not _FRD and vehicle.effects:

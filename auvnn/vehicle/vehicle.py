@@ -11,6 +11,7 @@ from auvnn.cards import Card, Shown, Text
 from auvnn.vehicle.checks import rigid_body
 from auvnn.vehicle.parts import DEFAULT_UNCERTAINTY, Array, DampingElement, Fin, Thruster, freeze
 from auvnn.vehicle.reading import vehicle_from_dict
+from auvnn.vehicle.reduced import Ballast, MovingMass, Reduced
 from auvnn.vehicle.summary import summary
 from auvnn.vehicle.validation import validate
 
@@ -44,6 +45,9 @@ class Vehicle(Shown):
         effects: effects that are part of the model, name to parameters.
         source: where the numbers come from.
         warnings: what is doubtful about the file, in words.
+        reduced: which degrees of freedom the model has.
+        ballast: a volume that changes, or None.
+        moving_mass: a mass that is shifted, or None.
 
     Raises:
         ModelError: a value is not physical; one line names the field, the value and the cure.
@@ -75,6 +79,9 @@ class Vehicle(Shown):
     effects: dict[str, dict[str, Any]] = field(default_factory=dict)
     source: str = ""
     warnings: tuple[str, ...] = ()
+    reduced: Reduced = field(default_factory=Reduced)
+    ballast: Ballast | None = None
+    moving_mass: MovingMass | None = None
 
     def __post_init__(self) -> None:
         """Check that the vehicle is physical, and make the arrays read-only."""
@@ -136,6 +143,11 @@ class Vehicle(Shown):
                 data[name] = [part.to_dict() for part in parts]
         if self.reference_voltage is not None:
             data["reference_voltage"] = self.reference_voltage
+        if self.reduced:
+            data["reduced"] = self.reduced.to_dict()
+        for name in ("ballast", "moving_mass"):
+            if getattr(self, name) is not None:
+                data[name] = getattr(self, name).to_dict()
         data["uncertainty"] = dict(self.uncertainty)
         if self.effects:
             data["effects"] = copy.deepcopy(self.effects)
@@ -163,6 +175,12 @@ class Vehicle(Shown):
             or self.quadratic_damping is not None
             or bool(self.damping_elements)
         )
+
+    @property
+    def glides(self) -> bool:
+        """Whether a log's ballast, moving mass or attitude moves it, and not forces alone."""
+        driven = self.ballast is not None or self.moving_mass is not None
+        return driven or self.reduced.attitude == "measured"
 
     @property
     def n_thrusters(self) -> int:

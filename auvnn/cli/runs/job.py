@@ -141,9 +141,9 @@ class Job:
         given = self.options.get("mapping")
         return given and Path(given).expanduser()
 
-    def held_out(self) -> Log | None:
-        """Read the log of `test=`, if one is named."""
-        return None if self.options.get("test") is None else self.log("test")
+    def held_out(self, *, partial: bool = False) -> Log | None:
+        """Read the log of `test=`, if one is named; `partial` as for `log`."""
+        return None if self.options.get("test") is None else self.log("test", partial=partial)
 
     def warn(self, warnings: list[str]) -> None:
         """Say what the answer warns of."""

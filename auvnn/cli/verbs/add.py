@@ -11,7 +11,7 @@ def _run(job: Job) -> Answering:
     from auvnn.diagnosis.answers.words import parameters
     from auvnn.improvement import add
 
-    effects, log, test = job.names("effect"), job.log(), job.held_out()
+    effects, log, test = job.names("effect"), job.log(partial=True), job.held_out(partial=True)
     model, say = job.model(log), job.say
     better = add(
         model, log, effects,

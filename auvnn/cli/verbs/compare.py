@@ -13,7 +13,7 @@ from auvnn.cli.runs.job import Answering, Job, Verb
 def _run(job: Job) -> Answering:
     from auvnn.comparison import compare
 
-    log = job.log()
+    log = job.log(partial=True)
     models = job.models(log)
     options: dict[str, Any] = {"horizons": job["horizons"], "derivative": job["derivative"]}
     if len(models) == 1 and not isinstance(job["model"], list):

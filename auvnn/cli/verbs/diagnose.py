@@ -33,7 +33,7 @@ def _run(job: Job) -> Answering:
 def _in_memory(job: Job) -> Diagnosis:
     from auvnn.diagnosis import diagnose
 
-    log = job.log()
+    log = job.log(partial=True)
     return diagnose(job.model(log), log, _effects(job), progress=job.say.progress, **_options(job))
 
 

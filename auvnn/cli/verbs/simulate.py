@@ -20,6 +20,7 @@ class _Truth:
 
 
 def _run(job: Job) -> Answering:
+    from auvnn.logs.without import without
     from auvnn.logs.writing import write_commands
     from auvnn.simulation import simulate
 
@@ -31,7 +32,7 @@ def _run(job: Job) -> Answering:
         actuation=job["actuation"], accelerations=job["accelerations"], max_step=job["max_step"], bottom=job["bottom"],
         plant=job["plant"], world=job["world"],
     )  # fmt: skip
-    made.log.write(job.folder / "log.parquet")
+    without(made.log, job.names("without") if job["without"] else []).write(job.folder / "log.parquet")
     if job["commands"]:
         write_commands(made.log, job.folder / "commands.csv")
         job.say("result    commands.csv holds what the vehicle is told to do, row by row")

@@ -48,7 +48,7 @@ def _parted(job: Job) -> bool:
 def _in_memory(job: Job) -> Any:
     from auvnn.training import train
 
-    log, test = job.log(), job.held_out()
+    log, test = job.log(partial=True), job.held_out(partial=True)
     return train(job.model(log), log, test=test, **_options(job))
 
 

@@ -156,7 +156,9 @@ def _tests(asked: Setting, state: State, notes: list[str]) -> dict[str, Any]:
 
 
 def _next(asked: Setting, state: State, notes: list[str]) -> dict[str, Any] | None:
-    if not (asked.advice and state.groups):
+    vehicle = asked.model.vehicle
+    # Manoeuvres are made of forces: a glider has none, and a measured attitude follows none.
+    if not (asked.advice and state.groups) or vehicle.glides:
         return None
     try:
         return advise(

@@ -109,6 +109,8 @@ def diagnose_files(
     for name, value in (("search", search), ("windows", windows), ("leading", leading)):
         if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
             raise ConfigError(f"{name}={value} must be a whole number, at least 1")
+    if model.vehicle.reduced or model.vehicle.glides:
+        raise ConfigError(f"{model.vehicle.name} is a reduced model: its log is read whole, stream=false")
     paths = log_files([log] if isinstance(log, (str, Path)) else log)
     plan_ = Mapping.read(mapping)
     cut = WindowCut(HORIZON if window is None else float(window), WARMUP, model.actuation, plan_)

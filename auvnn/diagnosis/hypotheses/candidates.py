@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +15,10 @@ from auvnn.metrics.windows import Windows, cut_windows
 from auvnn.models import GreyBox
 
 HORIZON, WARMUP = 5.0, 3.0
+# Where velocities have no sensor, windows must be long beside the time in which the drag forgets how they began.
+UNSEEN, MANY = 10.0, 60
+# Share of a step between samples that the integrator then takes at most at once.
+STEPS = 0.25
 
 
 def candidates_for(
@@ -32,10 +37,14 @@ def candidates_for(
     names = EFFECTS.names() if wanted is None else list(dict.fromkeys(wanted))
     needs: dict[str, list[str]] = {}
     usable = []
+    # A glider's wrench is worked out from its ballast, the water and its attitude: no actuator stands behind it.
+    of_actuators = {"command", "delay", "respond", "thrust"}
     for name in names:
         kind = EFFECTS.get(name)
         absent = [c for c in kind.channels if not _has(log, c)]
         absent += kind.lacks(model.vehicle, model.actuation)
+        if model.vehicle.glides and of_actuators & {*kind.hooks()}:
+            absent += ["thrusters"]
         needs[name] = absent
         if not absent and (name not in model.effect_names):
             usable.append(name)
@@ -50,6 +59,8 @@ def _has(log: Log, channel: str) -> bool:
 
 def windows_for(model: GreyBox, log: Log, window: float | None = None) -> Windows:
     """Cut a log for fitting: windows of 5 s, or shorter where that leaves fewer than twelve.
+
+    Where velocities have no sensor, 10 s, and sixty samples at least.
 
     Args:
         model: says which commands drive it.
@@ -69,8 +80,16 @@ def windows_for(model: GreyBox, log: Log, window: float | None = None) -> Window
                 f"window={window:g} s is longer than every run of {log.name} (the longest has {longest:.4g} s): "
                 "choose a shorter window, or record longer runs"
             )
-    horizon = float(np.clip(log.duration / 12, 1.0, HORIZON)) if window is None else float(window)
-    return cut_windows(log, horizon, warmup=WARMUP, kind=model.actuation, partial=True)
+    most = HORIZON
+    if any(n in log.estimated for n in "uvw"):
+        most = max(UNSEEN, MANY * float(np.median([run.dt for run in log.runs])))
+    horizon = float(np.clip(log.duration / 12, 1.0, most)) if window is None else float(window)
+    windows = cut_windows(log, horizon, warmup=WARMUP, kind=model.actuation, partial=True)
+    if log.estimated:
+        # A slow log is of a slow vehicle; where these steps turn out too long, the search takes shorter ones.
+        longest = STEPS * float(np.median([run.dt for run in log.runs]))
+        windows = replace(windows, max_step=max(windows.max_step, longest))
+    return windows
 
 
 def check_window_length(window: float | None) -> None:

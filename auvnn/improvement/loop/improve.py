@@ -86,6 +86,11 @@ def improve(
     if strange:
         raise ConfigError(f"learn={strange[0]}: choose from {', '.join(learned.KINDS)}")
     held_out = f"{test.name} is held out" if test is not None else ""
+    for part in (log, test):
+        if part is not None:
+            part.refuse_unmeasured()
+    if model.vehicle.reduced or model.vehicle.glides:
+        raise ConfigError(f"{model.vehicle.name} is a reduced model: take compare, diagnose and add for it")
     if test is None:
         log, test, held_out = log.split()
     else:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.logs.channels import VELOCITY
+from auvnn.logs.channels import DRIVES, VELOCITY
 
 if TYPE_CHECKING:
     from auvnn.logs.log import Log
@@ -72,11 +72,13 @@ def assess(log: Log, noise: dict[str, float]) -> tuple[dict[str, Excitation], fl
         By name "u" ... "r", and the condition number of [nu, |nu| nu] over the excited components.
     """
     nu = np.concatenate([run.nu for run in log.runs])
-    nu = nu[np.isfinite(nu).all(axis=1)]
+    # What has no sensor at all says nothing, and does not silence the others.
+    told = np.isfinite(nu).any(axis=0)
+    nu = nu[np.isfinite(nu[:, told]).all(axis=1)]
     result = {}
     for i, name in enumerate(VELOCITY):
         v = nu[:, i]
-        if len(v) == 0:
+        if len(v) == 0 or not told[i]:
             result[name] = Excitation(np.nan, np.nan, np.nan, np.nan, 0.0, np.inf)
             continue
         level = noise.get(name, np.nan)
@@ -116,7 +118,7 @@ def commands(log: Log) -> tuple[bool, list[str], list[str]]:
     columns = command_columns(log)
     for name, values in columns.items():
         good = values[np.isfinite(values)]
-        limit = _NEUTRAL if name.startswith("thruster") else 1e-6
+        limit = _NEUTRAL if name.startswith("thruster") else 1e-9 if name in DRIVES else 1e-6
         if len(good) == 0 or np.abs(good).max() <= limit:
             resting.append(name)
         elif name.startswith("thruster") and (np.abs(good) >= 0.99).mean() > 0.5:
@@ -126,6 +128,12 @@ def commands(log: Log) -> tuple[bool, list[str], list[str]]:
 
 def command_columns(log: Log) -> dict[str, Array]:
     """Return the commands of all runs by column name, thrusters where there are any, else the wrench."""
+    if log.kind == "wrench" and all(run.wrench is None for run in log.runs):
+        return {
+            name: np.concatenate([run.channels[name] for run in log.runs])
+            for name in DRIVES
+            if all(name in run.channels for run in log.runs)
+        }
     prefix = "thruster_" if log.kind == "thrusters" else "tau_"
     per_run = [dict(run.columns()) for run in log.runs]
     names = [name for name in per_run[0] if name.startswith(prefix) and name not in log.runs[0].extra]

@@ -193,7 +193,11 @@ def _excitation(log: Log, excitation: dict[str, Excitation]) -> list[Finding]:
     if saturated:
         what = f"at their limit most of the time: {', '.join(saturated)}; their gain is hard to tell"
         found.append(Finding("warning", "excitation", what, "drive with commands between the limits"))
-    still = [n for n, e in excitation.items() if not e.excited]
+    # Of a velocity without a sensor nothing is known, not even that it rests.
+    absent = [n for n in VELOCITY if n in log.unmeasured]
+    still = [n for n, e in excitation.items() if not e.excited and n not in absent]
+    if absent and len(still) == len(VELOCITY) - len(absent):
+        return found
     if len(still) == len(VELOCITY):
         what = "no velocity moves by more than three times its noise: there is nothing to fit"
         found.append(Finding("error", "excitation", what, "record a run in which the vehicle moves"))

@@ -73,6 +73,10 @@ class Quality(Answer):
         findings = sorted([*self.findings, *found], key=lambda f: LEVELS.index(f.level))
         return replace(self, findings=findings, actuators=checked.to_dict())
 
+    def with_notes(self, where: str, words: list[str]) -> Quality:
+        """Return the report with further findings for information."""
+        return replace(self, findings=[*self.findings, *(Finding("info", where, w) for w in words)])
+
     def of_level(self, level: Level) -> list[Finding]:
         """Return the findings of one level."""
         return [f for f in self.findings if f.level == level]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import InputError
+from auvnn.logs.readers.dataflash_losses import losses
 from auvnn.logs.readers.packets import chain, columns
 from auvnn.logs.readers.recordings import RecordingReader
 from auvnn.logs.reading.repairs.repair import Repair
@@ -89,14 +91,14 @@ class DataFlashReader(RecordingReader):
         _say(where, len(data), lost, breaks, unknown, notes)
         read = _Read(data, formats, places, where)
         parts = read.settle_clock(notes)
-        facts = {"parameters": read.parameters()}
+        notes += losses({f.name: partial(read.topics, n) for n, f in formats.items() if n in places}, where)
         topics: dict[str, Topic] = {}
         for number, form in formats.items():
             if number not in places or form.name in ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"):
                 continue
             if wanted is None or wanted(form.name, "dataflash"):
                 topics |= read.topics(number)
-        return Recording(topics, notes, facts, parts)
+        return Recording(topics, notes, {"parameters": read.parameters()}, parts)
 
 
 def _formats(data: NDArray[np.uint8], where: str, notes: list[Repair]) -> dict[int, Format]:

@@ -179,6 +179,9 @@ def _run(
         fins=block(numbered("fin", columns)),
         altitude=columns.get("altitude"),
         voltage=columns.get("voltage"),
+        ballast=columns.get("ballast"),
+        density=columns.get("density"),
+        moving_mass=columns.get("moving_mass"),
         reset=columns.get(RESET),
         extra={n: columns[n] for n in outside},
     )

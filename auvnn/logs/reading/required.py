@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from auvnn.errors import InputError
-from auvnn.logs.channels import ACCELERATION, EULER, POSITION, QUATERNION, VELOCITY, WRENCH, numbered
+from auvnn.logs.channels import ACCELERATION, DRIVES, EULER, POSITION, QUATERNION, VELOCITY, WRENCH, numbered
 from auvnn.logs.readers.base import Table
 from auvnn.logs.reading.mapping_file.suggest import actuator_columns, hint
 from auvnn.logs.reading.repairs.repair import Repair
@@ -33,8 +33,9 @@ def check_required(table: Table, where: str) -> None:
     if any(n in names for n in ACCELERATION):
         missing += [n for n in ACCELERATION if n not in names]
     commands = actuator_columns(names)
-    if missing or not (thrusters or some_wrench):
-        raise InputError(_words(missing, bool(thrusters or some_wrench), commands, names, where))
+    driven = bool(thrusters or some_wrench or any(n in names for n in DRIVES))
+    if missing or not driven:
+        raise InputError(_words(missing, driven, commands, names, where))
     for kind in ("thruster", "fin"):
         found = numbered(kind, names)
         wanted = [f"{kind}_{i + 1}" for i in range(len(found))]
@@ -85,7 +86,9 @@ def _words(missing: list[str], commanded: bool, commands: list[str], names: list
         parts.append(f"{columns} {', '.join(missing)} missing")
     wanted = list(missing)
     if not commanded:
-        parts.append("no command: neither thruster_1 ... thruster_n nor tau_X ... tau_N")
+        parts.append(
+            "no command: neither thruster_1 ... thruster_n nor tau_X ... tau_N (of a glider, ballast)"
+        )
         wanted += list(WRENCH)
     words = f"{where}: {'; '.join(parts)}. {hint(wanted, names)}"
     if not commanded and commands:

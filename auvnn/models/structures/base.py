@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 from torch import Tensor, nn
 
 from auvnn.effects import Effect
+from auvnn.errors import ConfigError
 from auvnn.models.grey_box import GreyBox
 from auvnn.models.saving import STRUCTURE
 from auvnn.vehicle import Vehicle
@@ -37,6 +38,10 @@ class Structure(GreyBox):
         self, vehicle: Vehicle, effects: Iterable[Effect] = (), actuation: str | None = None
     ) -> None:
         """Set up the known part; the member then fills `learned`."""
+        if vehicle.reduced:
+            raise ConfigError(
+                f"{vehicle.name} is a reduced model: these structures have all six degrees of freedom"
+            )
         super().__init__(vehicle, effects, None, actuation)
         self.learned = nn.ModuleDict()
 

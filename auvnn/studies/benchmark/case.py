@@ -42,6 +42,7 @@ class Case:
         part: of a plan.
         world: what departs from the model's assumptions; the usual one if empty.
         oracle: whether it is worked out what an oracle sees that knows the world's law.
+        without: channels for which the vehicle has no sensor.
     """
 
     vehicle: str
@@ -63,6 +64,7 @@ class Case:
     part: str = ""
     world: str = ""
     oracle: bool = False
+    without: tuple[str, ...] = ()
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -83,6 +85,7 @@ class Case:
         """Return the case as the beginning of its row."""
         row = asdict(self)
         row["candidates"] = None if self.candidates is None else list(self.candidates)
+        row["without"] = list(self.without)
         return {**row, "effects": list(self.effects), "loop": self.loop}
 
     @classmethod
@@ -91,6 +94,7 @@ class Case:
         known = {f.name: row[f.name] for f in fields(cls) if f.name in row}
         if known.get("candidates") is not None:
             known["candidates"] = tuple(known["candidates"])
+        known["without"] = tuple(known.get("without") or ())
         return cls(**known)
 
 

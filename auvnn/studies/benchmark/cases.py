@@ -27,7 +27,7 @@ TRIES = 1000
 KEYS = (
     "effects", "sizes", "noises", "excitations", "vehicles", "coefficients", "repeats", "seed", "runs", "duration",
     "rate", "plants", "accelerations", "loops", "pairs", "triples", "strangers", "held_out", "ties", "candidates",
-    "worlds", "balanced", "costs", "variants", "oracle",
+    "worlds", "balanced", "costs", "variants", "oracle", "without",
 )  # fmt: skip
 OF_A_PLAN = ("name", "common", "parts", "targets")
 
@@ -119,6 +119,7 @@ def _combined(options: Mapping[str, Any], part: str) -> list[Case]:
             accelerations=accelerations, runs=int(options["runs"]), duration=float(options["duration"]),
             rate=float(options["rate"]), held_out=_count(options, "held_out"), ties=bool(options.get("ties")),
             candidates=tuple(candidates) or None, part=part, world=str(world), oracle=bool(options.get("oracle")),
+            without=tuple(map(str, _several(options, "without"))),
         )  # fmt: skip
         names = _names(asked, load_vehicle(vehicle), noise, accelerations, str(plant))
         for hidden in names:
@@ -154,6 +155,7 @@ def _balanced(
         runs=int(options["runs"]), duration=float(options["duration"]), rate=float(options["rate"]),
         held_out=_count(options, "held_out"), ties=bool(options.get("ties")), candidates=tuple(candidates) or None,
         part=part, world=str(worlds[0]), oracle=bool(options.get("oracle")),
+        without=tuple(map(str, _several(options, "without"))),
     )  # fmt: skip
     variants = [dict(v) for v in _several(options, "variants")] or [{"world": str(w)} for w in worlds]
     for variant in variants:

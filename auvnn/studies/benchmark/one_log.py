@@ -66,6 +66,8 @@ def noise_of(case: Case) -> str | dict[str, Any]:
 def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
     """Return what is answered; note in `begun` once there is a log to answer for."""
     from auvnn.diagnosis import diagnose
+    from auvnn.logs.without import without
+    from auvnn.metrics.unmeasured import completed
     from auvnn.models import load
     from auvnn.simulation import simulate
     from auvnn.studies.benchmark.falls import fall, names_to_add
@@ -85,6 +87,7 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
     begun["world_law"] = made.truth.get("world")
     numbers = [run.number for run in made.log.runs]
     log = made.log.select(numbers[: case.runs]) if case.held_out else made.log
+    log = completed(model, without(log, case.without))
     simulated = time.monotonic()
     begun["made"] = True
     candidates = None if case.candidates is None else list(case.candidates)
@@ -124,7 +127,7 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
     if of_the_catalogue:
         row["errors"] = errors_of(case, hidden, row["parameters"])
         if case.held_out:
-            held = made.log.select(numbers[case.runs :])
+            held = completed(model, without(made.log.select(numbers[case.runs :]), case.without))
             row["fall"] = fall(model, made.plant, log, held, names_to_add(found.steps))
         if case.ties:
             row.update(_ties(case, model, log, made.truth, found))
@@ -152,7 +155,7 @@ def _hidden(case: Case, model: Any) -> dict[str, dict[str, float]]:
     return {
         name: _costly(case, model, name, size)
         if size.endswith("%")
-        else sized(model, name, size, **conditions(case), accelerations=logged)
+        else sized(model, name, size, **conditions(case), accelerations=logged, without=case.without)
         for name, size in zip(case.effects, case.sizes, strict=True)
     }
 

@@ -32,7 +32,8 @@ def training_windows(model: GreyBox, log: Log, horizon: float) -> Windows:
     """Cut a log into windows that follow one another, judged by velocity and attitude.
 
     Measured accelerations are left out, because the velocities of a window hold what they say and more;
-    positions, because they are known far worse than the velocities that they are the sums of.
+    positions, because they are known far worse than the velocities that they are the sums of, unless these have no
+    sensor.
 
     Args:
         model: for its actuation and its lags.
@@ -51,7 +52,8 @@ def training_windows(model: GreyBox, log: Log, horizon: float) -> Windows:
             "use a longer log or a shorter objective.window"
         )
     mask = windows.mask.clone()
-    mask[..., POSITION] = 0.0
+    if not any(n in windows.estimated for n in "uvw"):
+        mask[..., POSITION] = 0.0
     mask[..., ACCELERATION] = 0.0
     return replace(windows, nu_dot=None, mask=mask)
 

@@ -25,6 +25,9 @@ _ABSURD = {
     "fins": 1e3,
     "altitude": 1e6,
     "voltage": 1e6,
+    "ballast": 1e3,
+    "density": 1e5,
+    "moving_mass": 1e3,
 }
 
 

@@ -1,0 +1,76 @@
+"""The glider experiment: its files are sound, and the record is foretold where it is at hand."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from auvnn.logs import Log
+from auvnn.metrics.unmeasured import completed
+from auvnn.models import load
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = ROOT / "experiments" / "glider"
+DATA = Path(os.environ.get("AUVNN_DATA", ROOT.parent / "shared" / "data")) / "glider"
+
+
+@pytest.fixture
+def study():
+    sys.path.insert(0, str(HERE))
+    try:
+        sys.modules.pop("run", None)
+        import run
+
+        yield run
+    finally:
+        sys.path.remove(str(HERE))
+        sys.modules.pop("run", None)
+
+
+def test_the_model_file_has_the_published_numbers():
+    """Parasite drag 0.15 and lift slopes 3.8 + 3.7 per rad on 0.1 m2 in 1004 kg/m3, with the drag's share in the lift."""
+    vehicle = load(HERE / "glider.yaml").vehicle
+    pressure = 0.5 * 1004.0 * 0.1
+    assert vehicle.quadratic_damping[0, 0] == pytest.approx(0.15 * pressure, rel=0.01)
+    assert vehicle.effects["body_lift"]["Zuw"] == pytest.approx(-(3.8 + 3.7 + 0.15) * pressure, rel=0.01)
+    assert vehicle.glides and vehicle.reduced.turned == (4,) and vehicle.reduced.moved == (0, 2)
+
+
+def test_the_mapping_reads_what_a_glider_writes(tmp_path):
+    path = tmp_path / "raw.csv"
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["unix_s", "pressure_bar", "pitch_rad", "drive_cm3", "density", "speed_adcp", "dive"])
+        for k in range(60):
+            writer.writerow([1466704292.0 + k, 1.5 + 0.01 * k, -0.4, -200.0, 1005.0, "", 1])
+    log = Log.read(path, HERE / "mapping.yaml")
+    run = log.runs[0]
+    assert log.unmeasured == ["u", "v", "w", "p", "q", "r"]
+    np.testing.assert_allclose(run.ballast, -2e-4)
+    np.testing.assert_allclose(run.euler[:, 1], -0.4)
+    np.testing.assert_allclose(np.diff(run.position[:, 2]), 1000.0 / (1005.3 * 9.80665), rtol=1e-9)
+    driven = completed(load(HERE / "glider.yaml"), log).runs[0]
+    lift = 9.81 * (1005.0 * -2e-4 + 1.0 * 686.7 / (9.81 * 1004.0))
+    np.testing.assert_allclose(driven.wrench[:, 2], -lift * np.cos(-0.4), rtol=1e-9)
+
+
+def test_what_is_expected_holds_together():
+    expected = json.loads((HERE / "expected.json").read_text())
+    assert expected["fitted"]["depth_rate_r2"] >= 0.95 > expected["as_given"]["depth_rate_r2"]
+
+
+@pytest.mark.data
+@pytest.mark.skipif(
+    not (DATA / "gliderflight_data.npy").is_file(),
+    reason="the glider's record is not here: set AUVNN_DATA to the folder above glider/",
+)
+def test_mass_and_drag_of_one_half_foretell_the_other(study, tmp_path):
+    first, second = study.halves(DATA, tmp_path)
+    made, _ = study.fitted(load(HERE / "glider.yaml"), first)
+    assert study.scores(study.predicted_rate(made, second))["depth_rate_r2"] >= 0.95
