@@ -7,6 +7,7 @@ from pathlib import Path
 
 from auvnn.cli.dry import foreseen
 from auvnn.cli.job import Answering, Job, Verb, files
+from auvnn.cli.notes import once
 
 _STYLE = {"error": "red", "warning": "yellow"}
 
@@ -60,11 +61,10 @@ def _run(job: Job) -> Answering:
         checked = check_actuators(job.model(log), log)
         quality = quality.with_actuators(checked)
     quality.write(job.folder)
-    findings = quality.to_dict()["findings"]
-    for finding in findings:
-        level = finding["level"]
-        cure = f"; {finding['cure']}" if finding["cure"] else ""
-        job.say(f"{level:<9} {finding['where']}: {finding['what']}{cure}", style=_STYLE.get(level))
+    findings = quality.findings
+    for first, words in once(findings):
+        cure = f"; {first.cure}" if first.cure else ""
+        job.say(f"{first.level:<9} {words}{cure}", style=_STYLE.get(first.level))
     if not findings:
         job.say("result    nothing to complain of")
     if quality.actuators is not None:
