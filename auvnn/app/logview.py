@@ -15,8 +15,8 @@ from auvnn.logs.channels import is_canonical, unit
 from auvnn.logs.quality.quality import Quality
 from auvnn.logs.quality.situations import find
 from auvnn.logs.readers import choose
-from auvnn.logs.reading.mapping import Mapping
-from auvnn.logs.reading.suggest import likely
+from auvnn.logs.reading.mapping_file.mapping import Mapping
+from auvnn.logs.reading.mapping_file.suggest import likely
 from auvnn.logs.signals.segments import default_gap
 
 SPARK = 60

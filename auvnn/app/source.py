@@ -9,7 +9,7 @@ from typing import Any
 from auvnn.app.logview import columns, findings, guesses, overview, raw_columns
 from auvnn.errors import AuvnnError, one_line
 from auvnn.logs import Log
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 
 
 @dataclass

@@ -9,7 +9,7 @@ from auvnn.checks import actuators, unseen_current
 from auvnn.logs import Log
 from auvnn.metrics.windows import MAX_STEP
 from auvnn.models import GreyBox
-from auvnn.models.stiffness import fastest_rate, followed, slow_log, words
+from auvnn.models.free_running.stiffness import fastest_rate, followed, slow_log, words
 
 _STATES = 64  # of the log at which the model is linearised
 

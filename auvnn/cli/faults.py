@@ -11,8 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from auvnn.answers import write_text
+from auvnn.cli.runs.working import WORK, marked
 from auvnn.cli.speech import complain
-from auvnn.cli.working import WORK, marked
 from auvnn.errors import AuvnnError, ConfigError, one_line
 
 OK, FAULT, BAD_INPUT, INTERRUPTED, UNHEARD, TERMINATED = 0, 1, 2, 130, 141, 143

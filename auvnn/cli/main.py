@@ -45,7 +45,7 @@ def _dispatch(verb: str, rest: list[str]) -> int:
         print(PAGES[verb](rest))
         return OK
     found = VERBS.get(verb)
-    from auvnn.cli.application import run_verb
+    from auvnn.cli.runs.application import run_verb
 
     return run_verb(verb, found, rest)
 

@@ -20,7 +20,7 @@ from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.one_step import OneStep, one_step, scores
 from auvnn.metrics.rollouts import HORIZONS, NAMES, Rolled, rollout_table, scale_of
 from auvnn.models import GreyBox
-from auvnn.models.excursions import region_of, words_of
+from auvnn.models.free_running.excursions import region_of, words_of
 from auvnn.threads import on_one_thread
 
 Array = NDArray[np.float64]

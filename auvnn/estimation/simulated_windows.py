@@ -14,7 +14,7 @@ from auvnn.estimation.few_inputs import slopes
 from auvnn.metrics.free_run import predict
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.models.rollout import steps_per_interval
+from auvnn.models.free_running.rollout import steps_per_interval
 from auvnn.physics.attitude import quat_conjugate, quat_multiply, quat_to_matrix, quat_to_rotvec
 
 

@@ -14,7 +14,7 @@ from auvnn.exports.c_code import Dialect, block, grouped
 from auvnn.exports.check import agreement
 from auvnn.exports.origin import ORIGIN
 from auvnn.exports.system import System
-from auvnn.models.rate import SIZE
+from auvnn.models.free_running.rate import SIZE
 
 CASES = 12
 TOLERANCE = {"double": 1e-11, "float": 1e-4}

@@ -13,7 +13,7 @@ from auvnn.exports.base import Target, Written
 from auvnn.exports.check import COUNT, agreement, relative
 from auvnn.exports.graph import Graph
 from auvnn.exports.system import System
-from auvnn.models.rate import SIZE
+from auvnn.models.free_running.rate import SIZE
 
 ABSENT = "writing CasADi functions"
 INFIX = {

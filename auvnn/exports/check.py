@@ -9,7 +9,7 @@ import torch
 
 from auvnn.exports.graph import evaluate
 from auvnn.exports.system import System
-from auvnn.models.linearise import linearise
+from auvnn.models.linear.linearise import linearise
 
 COUNT = 200
 

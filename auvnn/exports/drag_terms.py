@@ -11,7 +11,7 @@ from torch import Tensor
 
 from auvnn.effects import Effect
 from auvnn.models import GreyBox, Inputs
-from auvnn.models.actuators import Actuators
+from auvnn.models.actuation.actuators import Actuators
 
 SPEEDS = torch.tensor([1.5, 0.75, 0.75, 0.75, 0.75, 0.75], dtype=torch.float64)
 """Velocities up to which the terms are fitted where the damping states no region, m/s and rad/s."""

@@ -17,8 +17,8 @@ from auvnn.exports.c import header, source
 from auvnn.exports.check import agreement
 from auvnn.exports.origin import ORIGIN
 from auvnn.exports.system import System
-from auvnn.models.actuator_states import PADE
-from auvnn.models.rate import SIZE
+from auvnn.models.actuation.actuator_states import PADE
+from auvnn.models.free_running.rate import SIZE
 
 UNITS = {
     "m": {"m": 1}, "m/s": {"m": 1, "s": -1}, "rad/s": {"rad": 1, "s": -1}, "N": {"kg": 1, "m": 1, "s": -2},

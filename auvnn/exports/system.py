@@ -12,8 +12,8 @@ from torch import Tensor, nn
 from auvnn.errors import ConfigError
 from auvnn.exports.graph import Graph, differentiated, traced
 from auvnn.models import GreyBox
-from auvnn.models.rate import SIZE, unit_attitude
-from auvnn.models.state_space import StateSpace
+from auvnn.models.free_running.rate import SIZE, unit_attitude
+from auvnn.models.linear.state_space import StateSpace
 
 RESERVED = frozenset(
     (  # noqa: SIM905

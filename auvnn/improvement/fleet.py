@@ -20,7 +20,7 @@ from auvnn.errors import ConfigError, InputError
 from auvnn.executors import Lost, executor_for
 from auvnn.improvement.one_dive import _DAY, Question, dive
 from auvnn.improvement.trend import Trend, trend
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.portions import kind_of, log_files
 from auvnn.models import GreyBox
 

@@ -26,7 +26,7 @@ from auvnn.estimation.normal_equations import TRUST, motion
 from auvnn.log_chunks.scan import WindowCut
 from auvnn.log_chunks.windows import plan_file, runs_of
 from auvnn.logs import Log
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.portions import is_large, start_of
 from auvnn.models import GreyBox
 

@@ -16,7 +16,7 @@ from auvnn.errors import InputError
 from auvnn.log_chunks.scan import CHANGED, HOLD, ScanState, WindowCut
 from auvnn.logs import Run
 from auvnn.logs.log import blocks_of
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.portions import Portion, read_portion
 from auvnn.logs.seal import file_hash
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from auvnn.errors import InputError
 from auvnn.logs import Run
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.portions import Portion, read_portion, rows_in, verify
 from auvnn.metrics.windows import commands, starts
 

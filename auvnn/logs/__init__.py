@@ -6,7 +6,7 @@ from auvnn.logs.log import Log
 from auvnn.logs.quality.findings import Finding
 from auvnn.logs.quality.quality import Quality
 from auvnn.logs.readers import READERS
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.run import Run
 from auvnn.logs.signals.derivatives import (
     LocalPolynomial,

@@ -10,7 +10,7 @@ import numpy as np
 from auvnn.errors import InputError, MissingExtra, one_line
 from auvnn.logs.readers.base import Table
 from auvnn.logs.readers.frame import clean_names, to_table
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,7 +13,7 @@ import numpy as np
 
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs.channels import VELOCITY
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.run import MIN_SAMPLES, Run
 
 if TYPE_CHECKING:

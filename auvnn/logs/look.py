@@ -13,7 +13,7 @@ from auvnn.logs.channels import is_canonical
 from auvnn.logs.known import Proposal, propose
 from auvnn.logs.readers import choose
 from auvnn.logs.readers.recordings import RecordingReader
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.recording import Recording, Topic
 
 _SHOWN_FIELDS = 400

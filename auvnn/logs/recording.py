@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from auvnn.catalogue import unknown_name
 from auvnn.errors import InputError
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 
 Array = NDArray[np.float64]
 Wanted = Callable[[str, str], bool]

@@ -201,7 +201,7 @@ class Run:
     @cached_property
     def restarts(self) -> NDArray[np.intp]:
         """First samples after the pose has started afresh: an estimator's reset, a moved origin, another core."""
-        from auvnn.logs.reading.resets import restarts
+        from auvnn.logs.reading.repairs.resets import restarts
 
         return restarts(self)
 

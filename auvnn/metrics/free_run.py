@@ -8,7 +8,7 @@ from torch import Tensor
 from auvnn.effects import Sensed
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.models.rollout import rollout
+from auvnn.models.free_running.rollout import rollout
 from auvnn.physics.attitude import quat_multiply, rotvec_to_quat
 
 

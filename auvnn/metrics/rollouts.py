@@ -15,8 +15,8 @@ from auvnn.logs.signals.noise import noise_std
 from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.windows import MAX_STEP, VELOCITY, Windows, cut_windows
 from auvnn.models import GreyBox
-from auvnn.models.rollout import LIMIT
-from auvnn.models.stiffness import fastest_rate, followed
+from auvnn.models.free_running.rollout import LIMIT
+from auvnn.models.free_running.stiffness import fastest_rate, followed
 
 Array = NDArray[np.float64]
 HORIZONS = ("0.5", "1", "2", "5", "10", "full")

@@ -16,9 +16,10 @@ from auvnn.damping.bank import Description
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run
 from auvnn.models import GreyBox
-from auvnn.online.adapter import Adapter, Update
+from auvnn.online.adapter import Adapter
 from auvnn.online.frozen import frozen_errors
 from auvnn.online.guards import REASONS, Guards
+from auvnn.online.update import Update
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from torch.func import functional_call, vmap
 from auvnn.errors import ConfigError
 from auvnn.logs import Run
 from auvnn.models import GreyBox, Inputs
-from auvnn.models.limits import LIMIT
+from auvnn.models.free_running.limits import LIMIT
 
 Array = NDArray[np.float64]
 # Windows run side by side at a time, which bounds the memory.

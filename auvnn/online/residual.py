@@ -18,7 +18,7 @@ from torch import Tensor
 
 from auvnn.effects import Moment
 from auvnn.models import GreyBox, Inputs
-from auvnn.models.grey_box import Prepared
+from auvnn.models.equations_of_motion import Prepared
 from auvnn.physics.attitude import quat_to_matrix
 from auvnn.physics.kinematics import eta6_to_eta7
 

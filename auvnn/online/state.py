@@ -21,7 +21,7 @@ from torch import Tensor
 from auvnn.errors import AuvnnError, ModelError
 from auvnn.models.loading import from_contents
 from auvnn.models.saving import MODEL, contents
-from auvnn.online.change import Monitor
+from auvnn.online.change_detection.change import Monitor
 from auvnn.online.counts import Counts
 from auvnn.online.guards import Guards
 from auvnn.online.residual import Sample

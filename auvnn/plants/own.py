@@ -12,8 +12,8 @@ from torch import Tensor
 
 from auvnn.effects import Moment, Sensed
 from auvnn.models import GreyBox, Inputs, Trajectory
-from auvnn.models.rollout import LIMIT, steps_per_interval
-from auvnn.models.thrust_signal import ThrustSignal
+from auvnn.models.actuation.thrust_signal import ThrustSignal
+from auvnn.models.free_running.rollout import LIMIT, steps_per_interval
 from auvnn.physics.attitude import quat_derivative, quat_to_matrix
 from auvnn.plants.base import Controller, Look, Motion, Plant, PlantTask, diverged, refuse, refuse_laws
 

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.models import GreyBox, Inputs
-from auvnn.models.grey_box import DRAG_TERMS
+from auvnn.models.equations_of_motion import DRAG_TERMS
 from auvnn.simulation.allocation import Allocation
 from auvnn.simulation.cruise import Cruise, cruise
 from auvnn.vehicle import Vehicle

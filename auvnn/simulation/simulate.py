@@ -22,13 +22,13 @@ from auvnn.plants.strangers import STRANGERS
 from auvnn.simulation.excitations import EXCITATIONS, make_excitation
 from auvnn.simulation.noise import make_noise
 from auvnn.simulation.plant import as_hidden, drawn_factors, make_plant, typical_values
+from auvnn.simulation.requests import _can_be_hidden, _check, _told
 from auvnn.simulation.worlds import World, make_world
 from auvnn.simulation.worlds.law import disturbed, drawn_laws
 from auvnn.simulation.worlds.sensing import Sensing
 
 Array = NDArray[np.float64]
 
-COEFFICIENTS = ("exact", "drawn")
 # Every kind of random number has a stream of its own: another noise must not change the manoeuvre.
 STREAMS = ("excitation", "noise", "hidden", "voltage", "added_mass", "linear_damping", "quadratic_damping",
            "inertia", "altitude", "law", "force", "sensing")  # fmt: skip
@@ -210,22 +210,6 @@ def simulate(
     return Simulation(log, truth, hiding, thinned, task, motion)
 
 
-def _told(world: World, task: PlantTask, sensing: Sensing, wandering: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a world and what was drawn of it, as plain data."""
-    laws = task.laws
-    return {
-        **world.to_dict(),
-        "true_names": list(world.true_names),
-        "drawn": {
-            "exponent": None if laws.exponent is None else laws.exponent.tolist(),
-            "speed": None if laws.speed is None else laws.speed.tolist(),
-            "thrust_phase": None if laws.phase is None or laws.thrust == 0.0 else laws.phase.tolist(),
-            "tilt": sensing.tilt.tolist(),
-            "force": dict(wandering) or None,
-        },
-    }
-
-
 def bottom_below(
     model: GreyBox, excitation: str | Mapping[str, Any], seed: int, *, runs: int, duration: float, rate: float
 ) -> float:
@@ -238,30 +222,6 @@ def bottom_below(
     )
     deepest = max(float(run.eta[:, 2].max()) for run in nominal.log.runs)
     return deepest + 1.3 * radius(model.vehicle)
-
-
-def _can_be_hidden(model: GreyBox, name: str) -> None:
-    lacking = EFFECTS.get(name).lacks(model.vehicle, model.actuation)
-    if lacking:
-        raise ConfigError(
-            f"{name} cannot be hidden in a log of {model.vehicle.name}: its model file states no "
-            f"{lacking[0]}; state it, or choose another vehicle"
-        )
-
-
-def _check(seed: int, runs: int, duration: float, rate: float, coefficients: str, max_step: float) -> None:
-    for name, value, good in (
-        ("seed", seed, isinstance(seed, (int, np.integer)) and seed >= 0),
-        ("runs", runs, isinstance(runs, (int, np.integer)) and 1 <= runs <= 10_000),
-        ("rate", rate, 0 < rate <= 10_000),
-        ("max_step", max_step, 0 < max_step <= 1.0),
-    ):
-        if not good or isinstance(value, bool):
-            raise ConfigError(f"{name} = {value!r} is out of range: a positive number is needed")
-    if not 2.0 / rate <= duration <= 1e6 / rate:
-        raise ConfigError(f"duration = {duration}: choose {2 / rate:g} to {1e6 / rate:g} s at {rate:g} Hz")
-    if coefficients not in COEFFICIENTS:
-        raise ConfigError(f"coefficients = {coefficients!r}: choose from {', '.join(COEFFICIENTS)}")
 
 
 def _generator(seed: int, stream: str, index: int) -> np.random.Generator:

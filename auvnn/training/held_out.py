@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from auvnn.executors import Executor
 from auvnn.log_chunks.samples import Piece, inside, run_of
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.metrics.derivative import Derivative
 from auvnn.metrics.one_step import accelerations
 from auvnn.models import GreyBox

@@ -28,7 +28,7 @@ from auvnn.errors import ConfigError
 from auvnn.executors import Executor, executor_for
 from auvnn.log_chunks.samples import Pieces, Reading, evenly_spread_runs
 from auvnn.logs import Log
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.models import GreyBox
 from auvnn.training.confounding.confounded_effects import confounded_effects
 from auvnn.training.distributed.data_split import (

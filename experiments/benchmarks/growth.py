@@ -90,7 +90,7 @@ def measure(what: str, path: Path, workers: int) -> dict[str, float]:
     from auvnn.executors import executor_for
     from auvnn.log_chunks.scan import WindowCut
     from auvnn.log_chunks.windows import plan_files
-    from auvnn.logs.reading.mapping import Mapping
+    from auvnn.logs.reading.mapping_file.mapping import Mapping
 
     model = auvnn.load("rov90", actuation="wrench")
     begin, cpu = time.perf_counter(), _cpu()

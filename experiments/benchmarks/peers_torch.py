@@ -6,8 +6,8 @@ import torch
 from standard import STEP, STEPS, Work
 from torch import Tensor
 
+from auvnn.models.free_running.rate import state_rate
 from auvnn.models.inputs import Inputs
-from auvnn.models.rate import state_rate
 from auvnn.physics.attitude import _MATRIX, _RATE
 from auvnn.physics.coriolis import _FORCE
 

@@ -34,12 +34,12 @@ def test_imports_only_go_down():
     [
         ("floors", "effects/added_mass.py", "import auvnn.models"),
         ("floors", "logs/log.py", "import auvnn.effects"),
-        ("floors", "models/rollout.py", "import auvnn.report"),
+        ("floors", "models/free_running/rollout.py", "import auvnn.report"),
         ("floors", "strange/__init__.py", ""),
         ("effects", "effects/added_mass.py", "import auvnn.effects.cg_offset"),
         ("plants", "plants/independent/equations.py", "import auvnn.physics.coriolis"),
-        ("drawing", "models/rollout.py", "import matplotlib.pyplot"),
-        ("hydra", "models/rollout.py", "import omegaconf"),
+        ("drawing", "models/free_running/rollout.py", "import matplotlib.pyplot"),
+        ("hydra", "models/free_running/rollout.py", "import omegaconf"),
     ],
 )
 def test_each_contract_bites(tmp_path, contract, path, line):

@@ -62,7 +62,7 @@ def test_every_verb_has_a_config_and_a_file_of_its_name():
     configs = {path.stem for path in (ROOT / "configs").glob("*.yaml")}
     assert configs == set(VERBS.names())
     for verb in VERBS.names():
-        lines = (ROOT / "auvnn" / "cli" / f"{verb}.py").read_text().splitlines()
+        lines = (ROOT / "auvnn" / "cli" / "verbs" / f"{verb}.py").read_text().splitlines()
         assert len(lines) <= 80, f"{verb}.py is more than a thin layer"
 
 

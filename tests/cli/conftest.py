@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from auvnn.cli import check
-from auvnn.cli.job import Job, Verb
+from auvnn.cli.runs.job import Job, Verb
+from auvnn.cli.verbs import check
 from tests.cli.stand_ins import write_two
 from tests.command_line import auvnn, refused
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import auvnn
-from auvnn.cli.job import Job
+from auvnn.cli.runs.job import Job
 
 # For other processes in other folders: the package that is under test here, installed or not.
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(auvnn.__file__).parents[1])}

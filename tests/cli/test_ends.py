@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 SLEEPER = """
 import sys, time
 from auvnn.cli import check
-from auvnn.cli.job import Verb
+from auvnn.cli.runs.job import Verb
 from auvnn.cli.main import main
 
 def run(job):

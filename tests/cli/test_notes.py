@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from auvnn.cli.job import Job
 from auvnn.cli.notes import noted, once
+from auvnn.cli.runs.job import Job
 from auvnn.logs.quality.finding import Finding
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 
 FLIPS = "sign flips of the quaternion undone"
 

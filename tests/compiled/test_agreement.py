@@ -9,7 +9,7 @@ from auvnn.compiled.program import Numbers
 from auvnn.damping.bank import DampingBank
 from auvnn.models import GreyBox, Inputs
 from auvnn.models import engine as engines
-from auvnn.models.rate import unit_attitude
+from auvnn.models.free_running.rate import unit_attitude
 from auvnn.vehicle import load_vehicle
 
 DOUBLE = torch.float64
@@ -142,7 +142,7 @@ def test_the_derivative_agrees_at_many_states_and_other_weights(compiler, case):
 
 
 def engines_tableau():
-    from auvnn.models.rollout import TABLEAUS
+    from auvnn.models.free_running.rollout import TABLEAUS
 
     return TABLEAUS["rk4"]
 

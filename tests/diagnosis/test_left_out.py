@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from auvnn.diagnosis.left_out import each_name, gain, left_out, left_out_by
+from auvnn.diagnosis.left_out import each_name, left_out, left_out_by
+from auvnn.diagnosis.left_out_errors import gain
 from auvnn.diagnosis.left_out_folds import folds_of
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox

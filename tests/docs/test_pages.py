@@ -18,8 +18,8 @@ from auvnn.docs import FOLDER, page, page_names
 from auvnn.effects import EFFECTS
 from auvnn.effects.describe import describe_all
 from auvnn.errors import ConfigError
-from auvnn.logs.reading.mapping import Mapping
-from auvnn.online.adapter import with_subnetworks
+from auvnn.logs.reading.mapping_file.mapping import Mapping
+from auvnn.online.adapter_parts import with_subnetworks
 from auvnn.vehicle import Vehicle
 
 # Launchers that need a package of their own: their lines are only looked at.

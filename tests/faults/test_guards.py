@@ -187,7 +187,7 @@ def test_row_84_a_comparison_with_a_stiff_model_stays_finite_and_warns():
 
 
 def test_row_86_a_budget_of_steps(monkeypatch):
-    import auvnn.models.torchdiffeq_solver as solver
+    import auvnn.models.free_running.torchdiffeq_solver as solver
 
     eta, nu = torch.tensor([0.0, 0, 0, 1, 0, 0, 0]).double(), torch.full((6,), 0.1).double()
     command, t = torch.zeros(3, 6).double(), torch.tensor([0.0, 0.5, 1.0]).double()
@@ -326,7 +326,7 @@ def test_row_95_runs_of_different_lengths_do_not_disturb_one_another():
 
 
 def test_the_fastest_rate_is_that_of_the_linear_model():
-    from auvnn.models.stiffness import fastest_rate
+    from auvnn.models.free_running.stiffness import fastest_rate
 
     model = stiff_model(80.0)
     eta, nu = torch.tensor([[0.0, 0, 0, 1, 0, 0, 0]]).double(), torch.zeros(1, 6).double()

@@ -13,7 +13,7 @@ from auvnn.errors import ConfigError, InputError
 from auvnn.improvement.fleet import fleet
 from auvnn.improvement.one_dive import Question, dive
 from auvnn.improvement.trend import trend
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
 

@@ -13,7 +13,7 @@ from auvnn.log_chunks import scan as parts_
 from auvnn.log_chunks.scan import WindowCut
 from auvnn.log_chunks.windows import concatenate_windows, plan_file, runs_of, windows_of
 from auvnn.logs import Log, Run
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.metrics.windows import Windows, cut_windows
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle

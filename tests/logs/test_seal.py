@@ -18,7 +18,7 @@ from auvnn.logs.readers import file_bytes, frame
 from auvnn.logs.readers.csv import CsvReader
 from auvnn.logs.readers.parquet import ParquetReader
 from auvnn.logs.reading import portions
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.seal import compare, file_hash, seal_of, write_seal
 from tests.command_line import auvnn, refused
 from tests.log_samples import frame as table

@@ -12,8 +12,8 @@ import torch
 from auvnn.errors import ConfigError, ModelError
 from auvnn.models import from_vehicle
 from auvnn.online import Adapter, Guards
-from auvnn.online.bounds import known_drag
 from auvnn.online.schemes.base import Lesson, OnlineScheme
+from auvnn.online.updates.bounds import known_drag
 from tests.online.online_world import bare, driven, fed, parameters, vehicle, with_networks
 
 

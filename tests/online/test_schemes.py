@@ -11,7 +11,7 @@ from auvnn.online import Adapter, frozen_errors
 from auvnn.online.residual import Predictor, Sample
 from auvnn.online.schemes.base import Lesson
 from auvnn.online.schemes.rls import RLS
-from auvnn.online.weights import Weights
+from auvnn.online.updates.weights import Weights
 from tests.online.online_world import bare, driven, fed, vehicle, with_networks
 
 

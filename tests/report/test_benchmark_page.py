@@ -17,7 +17,7 @@ from auvnn.answers import DRAWERS
 from auvnn.report import style
 from auvnn.report.html import SECURITY
 from auvnn.report.pages.benchmark import PAGE, BenchmarkPage
-from auvnn.report.pages.benchmark_words import TARGET
+from auvnn.report.pages.sections.benchmark_words import TARGET
 from auvnn.report.panels import NoData
 from auvnn.report.plots.confusion import OUTCOMES, confusion
 from auvnn.report.plots.coverage import coverage
@@ -185,7 +185,7 @@ def test_several_conditions_get_a_figure_each():
 
 
 def test_the_page_counts_as_the_study_does():
-    from auvnn.report.pages import outcomes
+    from auvnn.report.pages.sections import outcomes
     from auvnn.studies.benchmark import in_group, named_first, summarise
 
     more = {"errors": {"x": {"relative": 0.5, "z": 3.0}}}

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from auvnn.report.pages import outcomes
 from auvnn.report.pages.benchmark import PAGE, BenchmarkPage
+from auvnn.report.pages.sections import outcomes
 from auvnn.report.panels import NoData
 from auvnn.report.plots.falls import HIGH, LOW, falls
 from auvnn.report.plots.recovery import ALL

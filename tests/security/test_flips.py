@@ -20,7 +20,7 @@ from auvnn.studies.benchmark import cases
 from auvnn.studies.benchmark.journal import Journal
 from auvnn.training.checkpoint import Checkpoints
 from tests.log_samples import make_log
-from tests.studies.test_benchmark_running import OPTIONS, answered
+from tests.studies.benchmark.test_benchmark_running import OPTIONS, answered
 
 Made = tuple[list[Path], Callable[[], Any]]
 

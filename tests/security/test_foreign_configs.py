@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from auvnn.cli.compose import resolver_in
-from auvnn.cli.foreign import is_plain_parameter, read_configs
+from auvnn.cli.options.foreign import is_plain_parameter, read_configs
+from auvnn.cli.options.suggestions import resolver_in
 
 GLOBAL = "# @package _global_\n"
 SIMULATE = [
@@ -140,7 +140,7 @@ def test_two_folders_cannot_be_named(refused):
 
 def test_what_is_composed_is_what_was_judged(auvnn, monkeypatch):
     """The user's folder is exchanged after it was read: the copy counts."""
-    from auvnn.cli import application
+    from auvnn.cli.runs import application
 
     def then_exchanged(folder: Path) -> dict[str, str]:
         found = read_configs(folder)

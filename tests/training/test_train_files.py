@@ -22,7 +22,7 @@ from auvnn.log_chunks import samples as pieces
 from auvnn.log_chunks import scan as parts
 from auvnn.log_chunks.samples import Reading, evenly_spread_runs, pieces_of_file
 from auvnn.logs import Log
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.one_step import one_step, scores
 from auvnn.models import GreyBox

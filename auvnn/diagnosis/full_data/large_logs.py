@@ -42,7 +42,7 @@ from auvnn.executors import Executor, executor_for
 from auvnn.log_chunks.scan import Plan, WindowCut
 from auvnn.log_chunks.windows import concatenate_windows, plan_file, runs_of
 from auvnn.logs import Log
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.portions import log_files
 from auvnn.models import GreyBox
 

@@ -5,7 +5,7 @@ Forward, one effect at a time; and backward: what was taken before must still be
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
@@ -15,13 +15,13 @@ from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, log_evidence
 from auvnn.diagnosis.hypotheses.layout import Layout, initial_guess, shapes
-from auvnn.diagnosis.score_tests.score import Score, variance_inflation
+from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.model_comparison import ALPHA_NEEDED, ODDS, ModelComparison
 from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
+from auvnn.diagnosis.selection.prune import Pruning
 from auvnn.effects import effect_class
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
-from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
 ALPHA = 0.05
@@ -52,7 +52,7 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Chooser:
+class Chooser(Pruning):
     """Weighs explanations of one log.
 
     Attributes:
@@ -60,10 +60,6 @@ class Chooser:
         windows: of the log.
         say: told in words what is being done.
     """
-
-    layout: Layout
-    windows: Windows
-    say: Callable[[str], None]
 
     @property
     def rivals(self) -> ModelComparison:
@@ -151,16 +147,6 @@ class Chooser:
         ]
         return sorted(more, key=lambda s: s.degrees - s.gain)[:1]
 
-    def _settled(self, best: FittedHypothesis, at: Layout, base: Sequence[str]) -> FittedHypothesis:
-        """Return an explanation refitted with the weights that follow from the errors that it leaves."""
-        guess = replace(at, model=best.fitted.model)
-        try:
-            return fit_hypothesis(
-                self.layout, self.windows, base, best.effects, start=best.fitted, guess=guess
-            )
-        except FitError:
-            return best
-
     def _instead(
         self, taken: FittedHypothesis, base: Sequence[str], name: str, other: FittedHypothesis
     ) -> FittedHypothesis:
@@ -229,70 +215,6 @@ class Chooser:
             return None
         return self._settled(both, at, base)
 
-    def withdrawn(self, taken: FittedHypothesis, base: Sequence[str]) -> tuple[FittedHypothesis, list[str]]:
-        """Return the explanation without those effects that it no longer needs, and their names.
-
-        An effect that was taken first may have stood in for the ones that came after it. It goes where the
-        evidence is no lower without it, or where it does not pay on runs left out, everything else refitted.
-
-        Args:
-            taken: the explanation, the newest effect last.
-            base: effects that are free whatever is chosen.
-        """
-        gone: list[str] = []
-        for name in taken.effects[:-1]:
-            left = tuple(e for e in taken.effects if e != name)
-            self.say(f"asking whether {name} is still needed")
-            model = taken.fitted.model.rebuilt(taken.fitted.model.copied_effects())
-            set_parameters(model, [name], self.layout.means[name])
-            try:
-                without = fit_hypothesis(
-                    self.layout,
-                    self.windows,
-                    base,
-                    left,
-                    start=taken.fitted,
-                    guess=replace(self.layout, model=model),
-                    sigma=taken.fitted.sigma,
-                    iterations=6,
-                )
-            except FitError:
-                # What cannot be fitted without it needs it.
-                continue
-            factor = self._factor(taken)
-            needed = (
-                log_evidence(self.layout, taken, factor).evidence
-                > log_evidence(self.layout, without, factor).evidence
-            )
-            if not needed or not improves_predictive_density(taken, without):
-                gone.append(name)
-                taken = self._settled(without, self.layout, base)
-        return taken, gone
-
-    def without(
-        self,
-        taken: FittedHypothesis,
-        base: Sequence[str],
-        names: Sequence[str],
-        sigma: Array | None = None,
-    ) -> FittedHypothesis:
-        """Return the explanation refitted without some of its effects.
-
-        Args:
-            taken: the explanation.
-            base: effects that are free whatever is chosen.
-            names: effects to do without.
-            sigma: weights to keep, so that the two can be compared; those that follow from the errors by default.
-        """
-        model = taken.fitted.model.rebuilt(taken.fitted.model.copied_effects())
-        for name in names:
-            set_parameters(model, [name], self.layout.means[name])
-        left = tuple(e for e in taken.effects if e not in names)
-        guess = replace(self.layout, model=model)
-        return fit_hypothesis(
-            self.layout, self.windows, base, left, start=taken.fitted, guess=guess, sigma=sigma
-        )
-
     def _refitted(
         self, candidate: Score, at: Layout, base: list[str], chosen: list[str], current: FittedHypothesis
     ) -> FittedHypothesis:
@@ -326,31 +248,3 @@ class Chooser:
         if found is None:
             raise problem or FitError(f"{name} has nowhere to begin")
         return found
-
-    def _without(
-        self, after: FittedHypothesis, base: list[str], current: FittedHypothesis
-    ) -> FittedHypothesis:
-        """Return the same model without the effect, everything else refitted.
-
-        Where the effect is a coefficient group that is uncertain anyway, that group stays as stated.
-        """
-        effect = after.effects[-1]
-        if effect not in base:
-            return current
-        try:
-            return fit_hypothesis(
-                self.layout,
-                self.windows,
-                [n for n in base if n != effect],
-                after.effects[:-1],
-                start=current.fitted,
-                sigma=current.fitted.sigma,
-                iterations=6,
-            )
-        except FitError:
-            return current
-
-    @staticmethod
-    def _factor(explanation: FittedHypothesis) -> float:
-        sums = explanation.fitted.statistics
-        return variance_inflation(sums.slope, sums.total, sums.run)

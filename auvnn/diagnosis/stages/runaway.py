@@ -12,7 +12,7 @@ from auvnn.logs import Log
 from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.models.limits import LIMIT
+from auvnn.models.free_running.limits import LIMIT
 
 # Lengths that are tried where the usual one is too long, s; share of the windows that must hold, and least number.
 SHORTER = (2.0, 1.0, 0.5)

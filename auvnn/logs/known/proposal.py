@@ -10,7 +10,7 @@ import numpy as np
 
 from auvnn.logs.channels import EULER, POSITION, QUATERNION, VELOCITY, is_canonical
 from auvnn.logs.known.rule import BLOCKS, Rule
-from auvnn.logs.reading.suggest import likely
+from auvnn.logs.reading.mapping_file.suggest import likely
 from auvnn.logs.recording import Recording, Topic
 
 _NEEDS = {

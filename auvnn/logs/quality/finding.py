@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 
-from auvnn.logs.reading.repair import Level
+from auvnn.logs.reading.repairs.repair import Level
 
 
 @dataclass(frozen=True)

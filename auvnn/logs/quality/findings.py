@@ -15,7 +15,7 @@ from auvnn.logs.quality.finding import Finding
 from auvnn.logs.quality.kinematics import Agreement
 from auvnn.logs.quality.run_findings import by_run
 from auvnn.logs.quality.vertical import Vertical
-from auvnn.logs.reading.repair import Level
+from auvnn.logs.reading.repairs.repair import Level
 from auvnn.logs.signals.lags import Lag
 from auvnn.logs.signals.rotation import rotate
 from auvnn.logs.signals.segments import default_gap

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from auvnn.logs.quality import kinematics
-from auvnn.logs.quality.kinematics import half_width
+from auvnn.logs.quality.kinematic_pairs import half_width
 from auvnn.logs.signals.derivatives import LocalPolynomial
 
 if TYPE_CHECKING:

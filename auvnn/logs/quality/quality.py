@@ -14,7 +14,7 @@ from auvnn.logs.quality.channel_quality import Channel
 from auvnn.logs.quality.excitation import Excitation
 from auvnn.logs.quality.findings import Finding
 from auvnn.logs.quality.kinematics import Agreement
-from auvnn.logs.reading.repair import LEVELS, Level
+from auvnn.logs.reading.repairs.repair import LEVELS, Level
 
 if TYPE_CHECKING:
     from auvnn.logs.log import Log

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.logs.quality.finding import Finding
-from auvnn.logs.quality.kinematics import Agreement, velocities
+from auvnn.logs.quality.kinematic_pairs import velocities
+from auvnn.logs.quality.kinematics import Agreement
 from auvnn.logs.run import Run
 from auvnn.logs.signals.rotation import rotate
 

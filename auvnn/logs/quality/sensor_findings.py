@@ -11,7 +11,7 @@ from auvnn.logs.quality import lever, situations
 from auvnn.logs.quality.finding import Finding
 from auvnn.logs.quality.kinematics import Agreement
 from auvnn.logs.quality.vertical import Vertical
-from auvnn.logs.reading import resets
+from auvnn.logs.reading.repairs import resets
 from auvnn.logs.signals import lags
 from auvnn.logs.signals.lags import Lag
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from auvnn.logs.quality.kinematics import fit, half_width
+from auvnn.logs.quality.kinematic_pairs import half_width
+from auvnn.logs.quality.kinematics import fit
 from auvnn.logs.signals.derivatives import LocalPolynomial, noise_gain
 from auvnn.logs.signals.noise import noise_std
 from auvnn.logs.signals.rotation import rotate

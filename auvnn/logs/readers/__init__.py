@@ -8,7 +8,7 @@ from auvnn.answers import read_start
 from auvnn.catalogue import Catalogue
 from auvnn.errors import InputError
 from auvnn.logs.readers.base import Reader, Table, Text
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 
 __all__ = ["READERS", "Reader", "Table", "Text", "choose"]
 

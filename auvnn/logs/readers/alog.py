@@ -14,7 +14,7 @@ import numpy as np
 from auvnn.errors import InputError
 from auvnn.logs.readers.memory import refuse_more_than_memory
 from auvnn.logs.readers.recordings import RecordingReader
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.recording import Recording, Topic, Wanted
 
 _START = re.compile(rb"^%%+[ \t]*LOGSTART[ \t]+([-+.0-9eE]+)", re.MULTILINE)

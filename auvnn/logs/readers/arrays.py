@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import InputError
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.recording import Recording, Topic
 
 _TIMES = ("t", "time", "Time", "timestamp", "Timestamp", "stamp", "times", "TIME", "time_s", "tout")

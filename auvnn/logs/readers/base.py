@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 
 if TYPE_CHECKING:
-    from auvnn.logs.reading.mapping import Mapping
+    from auvnn.logs.reading.mapping_file.mapping import Mapping
 
 
 @dataclass

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from auvnn.errors import InputError
 from auvnn.logs.readers.packets import chain, columns
 from auvnn.logs.readers.recordings import RecordingReader
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.recording import Recording, Topic, Wanted
 
 _HEAD = b"\xa3\x95\x80"

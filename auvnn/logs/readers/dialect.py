@@ -10,7 +10,7 @@ import numpy as np
 
 from auvnn.errors import InputError
 from auvnn.logs.readers.frame import MISSING, clean_names
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 
 _SEPARATORS = (";", "\t", ",", "|")
 _MAX_DAMAGED = 0.05

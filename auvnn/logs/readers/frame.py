@@ -10,7 +10,7 @@ import polars as pl
 
 from auvnn.errors import InputError
 from auvnn.logs.readers.base import Table, Text
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 
 MISSING = ("", "-", "--", "nan", "na", "n/a", "#n/a", "null", "none", "inf", "+inf", "-inf", "infinity", "?")
 _INFINITE = re.compile(r"[+-]?inf(inity)?", re.IGNORECASE)

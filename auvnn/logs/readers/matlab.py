@@ -19,7 +19,7 @@ from auvnn.errors import InputError, one_line
 from auvnn.logs.readers.arrays import to_recording
 from auvnn.logs.readers.memory import refuse_more_than_memory
 from auvnn.logs.readers.recordings import RecordingReader
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.recording import Recording, Wanted
 
 _HEADER = 128

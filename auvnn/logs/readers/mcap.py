@@ -15,7 +15,7 @@ from typing import BinaryIO
 from auvnn.errors import InputError
 from auvnn.logs.readers.ros import Channel, Message, Notes, RosReader
 from auvnn.logs.readers.unpack import LIMIT, unpack
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 
 MAGIC = b"\x89MCAP0\r\n"
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END, _FOOTER = 3, 4, 5, 6, 15, 2

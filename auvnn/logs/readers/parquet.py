@@ -17,7 +17,7 @@ from auvnn.logs.readers.base import Reader, Table, Text
 from auvnn.logs.readers.file_bytes import excerpt
 from auvnn.logs.readers.frame import clean_names, to_table
 from auvnn.logs.readers.memory import refuse_more_than_memory
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.writing import HASH_KEY, frame_bytes, frame_hash
 
 _DAMAGED = "{}: the numbers differ from those that were written: damaged; copy it again"

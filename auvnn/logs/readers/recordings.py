@@ -12,7 +12,7 @@ from auvnn.logs.readers.base import Reader, Table
 from auvnn.logs.recording import Recording, Wanted
 
 if TYPE_CHECKING:
-    from auvnn.logs.reading.mapping import Mapping as Plan
+    from auvnn.logs.reading.mapping_file.mapping import Mapping as Plan
 
 
 class RecordingReader(Reader):
@@ -44,7 +44,7 @@ class RecordingReader(Reader):
         Raises:
             InputError: as `record`, or the known types hold no log.
         """
-        from auvnn.logs.reading.mapping import Mapping as Changes
+        from auvnn.logs.reading.mapping_file.mapping import Mapping as Changes
 
         return self.mapped(path, Changes())
 
@@ -54,7 +54,7 @@ class RecordingReader(Reader):
         Raises:
             InputError: as `record`; a topic or field of the mapping is not there.
         """
-        from auvnn.logs.reading.assemble import assemble
+        from auvnn.logs.reading.recordings.assemble import assemble
 
         return assemble(self, path, plan, until)
 

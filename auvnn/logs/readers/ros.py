@@ -14,7 +14,7 @@ from auvnn.errors import InputError
 from auvnn.logs.readers import ros_definitions
 from auvnn.logs.readers.recordings import RecordingReader
 from auvnn.logs.readers.ros_layout import Decoder
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.recording import Recording, Topic, Wanted
 
 _BATCH = 2_000

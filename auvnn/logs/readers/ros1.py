@@ -12,7 +12,7 @@ from pathlib import Path
 from auvnn.errors import InputError
 from auvnn.logs.readers.ros import Channel, Message, Notes, RosReader
 from auvnn.logs.readers.unpack import LIMIT, unpack
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 
 MAGIC = b"#ROSBAG V2.0\n"
 _MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7

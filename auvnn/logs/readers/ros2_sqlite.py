@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from auvnn.errors import InputError, one_line
 from auvnn.logs.readers.ros import Channel, Message, Notes, RosReader
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 
 _LONGEST_MESSAGE = 100_000_000
 _PATIENCE = 5.0  # s that a damaged file may keep SQLite busy without yielding a message

@@ -14,7 +14,7 @@ import numpy as np
 
 from auvnn.errors import InputError, MissingExtra
 from auvnn.logs.readers.recordings import RecordingReader
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.recording import Recording, Topic, Wanted
 
 _MAGIC = b"ULog\x01\x12\x35"

@@ -1,7 +1,7 @@
 """From files to runs.
 
-`reading` calls the others in order: a reader's table is mapped (`mapping`, `frames`), its stamps put in order
-(`clock`, `delays`), void samples masked (`validity`, `masks`, `cores`), attitudes made quaternions (`attitude`),
-restarts split (`resets`), and what is missing or implausible refused (`required`, `suggest`, `plausible`). Each
-step is counted as a `repair`; `head` and `portions` read parts of files.
+`reading` calls the others in order: `recordings` make one table of a file with many topics, `mapping_file` gives its
+columns their canonical names, units and axes, and `repairs` put stamps in order, mask void samples and split where
+poses restart. What is missing is refused by `required`. `head` and `portions` read parts of long files by the same
+steps.
 """

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs.readers import Reader, Table
-from auvnn.logs.reading.mapping import Mapping
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.mapping_file.mapping import Mapping
+from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.signals.segments import GAP_STEPS
 
 _FIRST = 64_000_000  # bytes of the file with which to begin

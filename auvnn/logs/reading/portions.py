@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from auvnn.errors import InputError
 from auvnn.logs.readers import READERS, choose
 from auvnn.logs.readers.ros2_folder import ros2_files
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.reading import Collector, collect
 from auvnn.logs.run import Run
 from auvnn.logs.seal import compare, file_hash, sealed

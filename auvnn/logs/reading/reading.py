@@ -25,20 +25,13 @@ from auvnn.logs.channels import (
 )
 from auvnn.logs.readers import Table, choose
 from auvnn.logs.readers.ros2_folder import ros2_files
-from auvnn.logs.reading import (
-    attitude,
-    clock,
-    delays,
-    frames,
-    in_world,
-    masks,
-    plausible,
-    required,
-    several_rates,
-)
+from auvnn.logs.reading import required
 from auvnn.logs.reading.head import read_table
-from auvnn.logs.reading.mapping import Mapping
-from auvnn.logs.reading.repair import Repair
+from auvnn.logs.reading.mapping_file import frames, in_world
+from auvnn.logs.reading.mapping_file.mapping import Mapping
+from auvnn.logs.reading.recordings import several_rates
+from auvnn.logs.reading.repairs import attitude, clock, delays, masks, plausible
+from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.run import MIN_SAMPLES, Run
 from auvnn.logs.seal import compare, file_hash, sealed
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from auvnn.errors import InputError
 from auvnn.logs.channels import ACCELERATION, EULER, POSITION, QUATERNION, VELOCITY, WRENCH, numbered
 from auvnn.logs.readers.base import Table
-from auvnn.logs.reading.repair import Repair
-from auvnn.logs.reading.suggest import actuator_columns, hint
+from auvnn.logs.reading.mapping_file.suggest import actuator_columns, hint
+from auvnn.logs.reading.repairs.repair import Repair
 
 
 def check_required(table: Table, where: str) -> None:

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from auvnn.effects import Effect
-from auvnn.models.grey_box import Prepared
+from auvnn.models.equations_of_motion import Prepared
 from auvnn.models.inputs import Inputs
 from auvnn.models.structures.base import Structure, without_damping
 from auvnn.models.structures.networks import Networks

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from auvnn.effects import Effect, Moment
 from auvnn.errors import ConfigError
-from auvnn.models.grey_box import Prepared
+from auvnn.models.equations_of_motion import Prepared
 from auvnn.models.inputs import Inputs
 from auvnn.models.structures.base import Structure
 from auvnn.models.structures.damping import velocity_features

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from auvnn.errors import ConfigError
 from auvnn.online.schemes import ONLINE_SCHEMES
-from auvnn.online.weights import Weights
+from auvnn.online.updates.weights import Weights
 
 
 @dataclass(frozen=True)

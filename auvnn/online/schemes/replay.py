@@ -10,7 +10,7 @@ from torch import Tensor
 
 from auvnn.damping.base import positive_int
 from auvnn.online.schemes.base import Lesson, OnlineScheme, number
-from auvnn.online.weights import Weights
+from auvnn.online.updates.weights import Weights
 
 # How exactly the damping vanishes at rest, of the force scale.
 REST = 0.01

@@ -10,7 +10,7 @@ from scipy import stats
 from torch import Tensor
 
 from auvnn.online.schemes.base import Lesson, OnlineScheme, anchors, number
-from auvnn.online.weights import Weights
+from auvnn.online.updates.weights import Weights
 
 # Chance of a wake-up at a sample without cause, each degree of freedom.
 FALSE_ALARM = 1e-8

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from auvnn.damping.base import true_or_false
 from auvnn.online.schemes.base import Lesson, OnlineScheme, number
-from auvnn.online.weights import Weights
+from auvnn.online.updates.weights import Weights
 
 
 class SGD(OnlineScheme):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.plants.independent.around import Around
 from auvnn.plants.independent.fins import Fins
 from auvnn.plants.independent.hull import build, curved, grasp
 from auvnn.plants.independent.loads import LOADS, Instant
@@ -25,25 +25,6 @@ Array = NDArray[np.float64]
 Values = Mapping[str, float]
 # Command (R, n), fin angles (R, m) or None, voltage (R,) or None.
 Held = tuple[Array, Array | None, Array | None]
-
-
-@dataclass(frozen=True)
-class Around:
-    """The water where the vehicles are.
-
-    Attributes:
-        flow: velocity through it, body axes, as all but the drag feel it, (R, 3).
-        dragged: the same, as the drag feels it.
-        gain: rate of its own velocity as the turning body sees it, (R, 3), or None where it is still.
-        walls: of each boundary, share of the added mass and its slope with depth, (R, 1) each.
-        grown: factor on the added mass, (R, 1).
-    """
-
-    flow: Array
-    dragged: Array
-    gain: Array | None
-    walls: list[tuple[Array, Array]]
-    grown: Array
 
 
 class Equations:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
-from auvnn.report.pages import outcomes
-from auvnn.report.pages.benchmark_rates import other_words, p_values_of, rate_tables, target_words
-from auvnn.report.pages.benchmark_words import (
+from auvnn.report.pages.sections import outcomes
+from auvnn.report.pages.sections.benchmark_rates import other_words, p_values_of, rate_tables, target_words
+from auvnn.report.pages.sections.benchmark_words import (
     MOST_CONDITIONS,
     TARGET,
     _case_table,
@@ -21,7 +21,7 @@ from auvnn.report.pages.benchmark_words import (
     _wrong_table,
     _wrong_words,
 )
-from auvnn.report.pages.outcomes import rows_of, text, values
+from auvnn.report.pages.sections.outcomes import rows_of, text, values
 from auvnn.report.plots.coverage import coverage
 from auvnn.report.plots.falls import falls
 from auvnn.report.plots.uniformity import uniformity

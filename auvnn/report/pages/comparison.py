@@ -13,7 +13,7 @@ from auvnn.report import style
 from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
-from auvnn.report.pages import comparison_words as say
+from auvnn.report.pages.sections import comparison_words as say
 from auvnn.report.panels import NoData
 from auvnn.report.plots.error_against_horizon import error_against_horizon
 from auvnn.report.plots.measured_against_model import measured_against_model

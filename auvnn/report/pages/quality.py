@@ -8,7 +8,7 @@ from typing import Any
 from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
-from auvnn.report.pages import quality_reading as reading
+from auvnn.report.pages.sections import quality_reading as reading
 from auvnn.report.plots.excitation import excitation
 from auvnn.report.plots.kinematics import kinematics
 from auvnn.report.plots.timeline import timeline

@@ -1,4 +1,9 @@
-"""The hidden-effect benchmark: hide, diagnose, count what was named, by effect, size, noise and manoeuvre."""
+"""The hidden-effect benchmark: hide, diagnose, count what was named, by effect, size, noise and manoeuvre.
+
+`cases` lists the logs to make, by hand or by the balanced `designs` with hidden effects of stated `costs` and
+`strangers`. `running` sends each through `one_log` on several processes, and the `journal` keeps the rows. `counts`
+makes rates of them, `identifiability` says what was there to be seen, `falls` by how much the held-out error falls.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +15,11 @@ from typing import Any
 from auvnn.answers import plain
 from auvnn.errors import InputError
 from auvnn.studies.benchmark.cases import NOTHING, Case, cases
-from auvnn.studies.benchmark.counting import false_names, in_group, named_first
+from auvnn.studies.benchmark.counts.counting import false_names, in_group, named_first
+from auvnn.studies.benchmark.counts.summary import Benchmark, summarise
 from auvnn.studies.benchmark.journal import Journal
 from auvnn.studies.benchmark.one_log import run_case
 from auvnn.studies.benchmark.running import run_all
-from auvnn.studies.benchmark.summary import Benchmark, summarise
 
 __all__ = [
     "NOTHING",

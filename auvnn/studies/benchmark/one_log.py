@@ -12,7 +12,7 @@ from auvnn.answers import plain
 from auvnn.effects import EFFECTS
 from auvnn.errors import AuvnnError, one_line
 from auvnn.studies.benchmark.cases import Case
-from auvnn.studies.benchmark.counting import TIED
+from auvnn.studies.benchmark.counts.counting import TIED
 from auvnn.studies.benchmark.strangers import axis_of, said_axis, sized_stranger
 
 # The plant's step, s: the error of 2e-5 m/s that the longer one leaves is far below any noise, but not below none.
@@ -170,7 +170,7 @@ def _seen(case: Case, model: Any, log: Any, made: Any, found: Any) -> dict[str, 
     Rivals are the names of the first step that are not hidden, and the three that lead the table.
     """
     from auvnn.studies.benchmark.costs import cost_of
-    from auvnn.studies.benchmark.oracle import Oracle
+    from auvnn.studies.benchmark.identifiability.oracle import Oracle
 
     hidden = {name: made.truth["hidden"][name] for name in case.effects}
     first = next((list(s["effects"]) for s in found.steps if s["effects"]), [])
@@ -186,8 +186,8 @@ def _ties(case: Case, model: Any, log: Any, truth: Mapping[str, Any], found: Any
     Of every candidate by the package's own equations; of a group that was declared, holds a hidden effect
     and one that can pass for it, also by differences of the plant, where another plant made the log and windows say it.
     """
-    from auvnn.studies.benchmark.information import Truth, imitation, information, truth_point
-    from auvnn.studies.benchmark.plant_information import covers, plant_information
+    from auvnn.studies.benchmark.identifiability.information import Truth, imitation, information, truth_point
+    from auvnn.studies.benchmark.identifiability.plant_information import covers, plant_information
 
     hidden = {name: truth["hidden"][name] for name in case.effects}
     rivals = [c["effect"] for c in found.candidates if c["p_value"] is not None]

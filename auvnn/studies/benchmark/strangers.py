@@ -70,8 +70,8 @@ def sized_stranger(model: Any, name: str, size: str, *, seed: int = 0, **how: An
     from auvnn.estimation.sensitivity import Response
     from auvnn.metrics.free_run import initial_states
     from auvnn.simulation import simulate
-    from auvnn.studies.benchmark.information import noise_sigma
-    from auvnn.studies.benchmark.plant_information import PlantOutputs, change, state_slopes
+    from auvnn.studies.benchmark.identifiability.information import noise_sigma
+    from auvnn.studies.benchmark.identifiability.plant_information import PlantOutputs, change, state_slopes
     from auvnn.studies.hidden import SIZES
 
     how = {**how, "noise": "realistic"}

@@ -9,7 +9,7 @@ import torch
 
 from auvnn.logs import Log
 from auvnn.models import GreyBox, Inputs
-from auvnn.models.grey_box import DRAG_TERMS
+from auvnn.models.equations_of_motion import DRAG_TERMS
 
 
 def drag(model: GreyBox, nu: torch.Tensor) -> torch.Tensor:

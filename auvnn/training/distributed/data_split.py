@@ -25,7 +25,7 @@ from auvnn.log_chunks.samples import (
     run_of,
 )
 from auvnn.logs.leakage import refuse_shared, rows_of
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.portions import log_files
 from auvnn.metrics.derivative import Derivative, chosen_derivative
 from auvnn.training.train import STOPPING

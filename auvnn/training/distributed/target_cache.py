@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from auvnn.executors.packing import pack
 from auvnn.log_chunks.samples import Piece, inside, run_of
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.metrics.derivative import Derivative
 from auvnn.models import GreyBox
 from auvnn.training.targets import Targets

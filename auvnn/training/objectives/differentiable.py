@@ -18,7 +18,7 @@ from auvnn.logs import Log
 from auvnn.metrics.free_run import moved
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.models.torchdiffeq_solver import FIXED, solve
+from auvnn.models.free_running.torchdiffeq_solver import FIXED, solve
 from auvnn.training.objectives.base import Objective, Refined, Tell
 from auvnn.training.objectives.starting import best_start, sound_shots, start_option
 from auvnn.training.objectives.weights import get_weights, set_weights

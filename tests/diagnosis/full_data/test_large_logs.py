@@ -28,7 +28,7 @@ from auvnn.log_chunks import scan as parts_
 from auvnn.log_chunks.scan import Plan, WindowCut
 from auvnn.log_chunks.windows import plan_files
 from auvnn.logs import Log
-from auvnn.logs.reading.mapping import Mapping
+from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle

@@ -219,8 +219,8 @@ def test_frames_that_lie_are_refused(tmp_path: Path) -> None:
     odometry.name = "/mavros/global_position/local"
     recording.topics[odometry.name] = odometry
     from auvnn.logs.known import propose
-    from auvnn.logs.reading.assemble import from_recording
-    from auvnn.logs.reading.mapping import Mapping
+    from auvnn.logs.reading.mapping_file.mapping import Mapping
+    from auvnn.logs.reading.recordings.assemble import from_recording
 
     proposal = propose(recording)
     assert "u" not in proposal.mapping["columns"]

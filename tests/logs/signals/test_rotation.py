@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from auvnn.logs.reading.frames import position_to_ned, quaternion_to_ned_frd, six_to_frd
+from auvnn.logs.reading.mapping_file.frames import position_to_ned, quaternion_to_ned_frd, six_to_frd
 from auvnn.logs.signals import rotation
 
 WXYZ = [3, 0, 1, 2]

@@ -1,0 +1,45 @@
+"""`auvnn adapt`: adapt the damping subnetworks over a log, sample by sample."""
+
+from __future__ import annotations
+
+from auvnn.cli.runs.dry import foreseen
+from auvnn.cli.runs.job import Answering, Job, Verb
+
+
+def _run(job: Job) -> Answering:
+    from auvnn.online import adapt
+
+    log = job.log()
+    model = job.model(log)
+    adaptation = adapt(
+        model, log, job["learner"], guards=job["guards"], damping=job["damping"],
+        state=job.folder / "state", progress=job.say.progress,
+    )  # fmt: skip
+    adaptation.model.save(job.folder / "model")
+    adaptation.write(job.folder)
+    data = adaptation.to_dict()
+    for words in data["assumed"]:
+        job.say(f"assumed   {words}")
+    job.say(f"compared  {data['compared']}")
+    job.warn(data["warnings"])
+    metrics = data["metrics"]
+    job.say(f"learned   from {metrics['samples_learned']} of {metrics['samples']} samples")
+    for name, told in data["skipped"].items():
+        job.say(f"skipped   {told['count']} samples ({name}): {told['words']}")
+    for change in data["changes"]:
+        job.say(f"change    run {change['run']}: {change['words']}")
+    if not data["changes"]:
+        job.say("change    none was seen")
+    ratio = metrics["frozen_5_s_error_ratio"]
+    shown = "unknown" if ratio is None else format(ratio, ".3g")
+    job.say(f"result    free running 5 s with weights frozen at each moment: {shown} times the error before")
+    return adaptation
+
+
+VERB = Verb(
+    summary="adapt the damping subnetworks over a log, sample by sample",
+    reads=("log", "mapping", "model"),
+    writes=("adaptation.json", "model/", "state/", "report.html", "figures/"),
+    run=_run,
+    foresee=foreseen,
+)

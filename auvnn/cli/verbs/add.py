@@ -1,0 +1,53 @@
+"""`auvnn add`: add effects, refit, and compare before and after on held-out data."""
+
+from __future__ import annotations
+
+from auvnn.cli.runs.dry import foreseen
+from auvnn.cli.runs.job import Answering, Job, Verb
+
+
+def _run(job: Job) -> Answering:
+    from auvnn.comparison.beside import words
+    from auvnn.diagnosis.answers.words import parameters
+    from auvnn.improvement import add
+
+    effects, log, test = job.names("effect"), job.log(), job.held_out()
+    model, say = job.model(log), job.say
+    better = add(
+        model, log, effects,
+        test=test, derivative=job["derivative"], window=job["window"], objective=job["objective"]["objective"],
+        force=job["force"], progress=say.progress,
+    )  # fmt: skip
+    better.model.save(job.folder / "model")
+    better.write(job.folder)
+    data = better.to_dict()
+    said = "assumed" if test is None else "test"
+    say(f"{said:<9} {data['held_out']}")
+    job.warn(data["warnings"])
+    for line in words(better.baseline):
+        say(f"baseline  {line}")
+    for name, values in data["parameters"].items():
+        say(f"fitted    {name}: {parameters({'parameters': values})}")
+    for step in data["waterfall"]:
+        error = "unknown" if step["error"] is None else f"{step['error']:.4g}"
+        say(f"error     {step['step']}: {error}")
+    gain = f"{data['gain']['value']:.4g} +- {data['gain']['std']:.2g}" if data["gain"]["std"] else "unknown"
+    verdict = "accepted" if data["accepted"] else "not accepted: the held-out error does not fall enough"
+    minded = [w for entry in data["by_effect"].values() for w in entry["reservations"]]
+    if data["accepted"] and minded:
+        verdict = f"accepted, but mind: {'; '.join(dict.fromkeys(minded))}"
+    for name, entry in data["by_effect"].items() if len(data["by_effect"]) > 1 else ():
+        own, pays = entry["gain"], "earns its place" if entry["accepted"] else "does not earn its place"
+        fall = f"{own['value']:.4g} +- {own['std']:.2g}" if own["std"] else "unknown"
+        say(f"effect    {name} {pays} beside the others (fall of the held-out error: {fall})")
+    say(f"result    {verdict} (fall from the refitted model: {gain})", style="bold")
+    return better
+
+
+VERB = Verb(
+    summary="add effects, refit, and compare before and after on held-out data",
+    reads=("log", "mapping", "model", "test"),
+    writes=("improvement.json", "model/", "report.html", "figures/"),
+    run=_run,
+    foresee=foreseen,
+)

@@ -1,0 +1,153 @@
+"""Check, compare, refit, diagnose: causes come from the diagnosis, and what pays is added."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from auvnn.diagnosis.diagnose import diagnose
+from auvnn.improvement.loop.answer import CAUSE, REFITTED
+from auvnn.improvement.loop.excerpt import liveliest
+from auvnn.improvement.loop.state import (
+    Recipe,
+    State,
+    fitted,
+    fitted_one_step,
+)
+from auvnn.improvement.loop.trials import FAILURES, Trials
+
+# A diagnosis sees at most so many seconds of a log.
+DIAGNOSED = 300.0
+# Share of the time after which a diagnosis is broken off: prediction shall have its turn.
+PATIENCE = 0.3
+# Rounds of diagnosis at most.
+ROUNDS = 3
+
+
+class _TooLong(Exception):
+    """The time for a diagnosis is up."""
+
+
+class Causes(Trials):
+    """The stages that look at the model as given, refit it, and ask the diagnosis for causes."""
+
+    def check(self) -> None:
+        """Say what the quality of the log is."""
+        findings = self.log.quality().to_dict()["findings"]
+        bad = [f for f in findings if f["level"] in ("error", "warning")]
+        words = "; ".join(f"{f['where']}: {f['what']}" for f in bad[:3])
+        more = f", and {len(bad) - 3} more (auvnn check shows them)" if len(bad) > 3 else ""
+        self.told(f"Check: {words}{more}." if bad else "Check: nothing to complain of.")
+
+    def compare(self) -> None:
+        """Say where the model as given stands beside the plain regression and persistence."""
+        self.say("running the model as given, and a plain regression beside it")
+        self.regression = self.judge.regression(self.how)
+        given = self.state.left
+        self.told(
+            f"Compare: over {self.judge.horizon} s of free running the model as given errs by {given.total:.3f} of the "
+            f"motion's spread, a plain regression by {self.regression.total:.3f} ({self.judge.folds.words}), holding the "
+            f"initial velocity by {given.persistence:.3f}."
+        )
+
+    def refit(self) -> None:
+        """Refit the coefficients, by every objective, and keep the one that foresees best what was left out."""
+        found: list[State] = []
+        one_step = self._try(
+            lambda: fitted_one_step(self.model, self.judge, Recipe(objective="one_step"), self.how),
+            "refitting the coefficients one step ahead",
+        )
+        found += [one_step] if one_step else []
+        longest = float(self.judge.horizon)
+        for seconds in dict.fromkeys((longest, min(2.0, longest))):
+            state = self._try(
+                lambda seconds=seconds: fitted(
+                    self.model, self.judge, Recipe(seconds=seconds), one_step, start=self._start(one_step)
+                ),
+                f"refitting the coefficients by free running over {seconds:g} s",
+            )
+            found += [state] if state else []
+        if not found:
+            self.told("Refit: no fit of the coefficients settled; they stay as stated.")
+            return
+        best = min(found, key=lambda s: s.left.total)
+        by_rollout = [s for s in found if s.recipe.objective == "rollout"]
+        self.ground = min(by_rollout, key=lambda s: s.left.total) if by_rollout else None
+        for state in found:
+            if state is not best:
+                self._note(state, REFITTED, REFITTED, False, f"{best.recipe.words()} foresees more")
+        self._take(best, REFITTED, REFITTED, "its stated uncertainties")
+
+    def diagnose(self) -> None:
+        """Ask which causes are missing, and add those that pay, until none is named or none pays."""
+        part = liveliest(self.log, DIAGNOSED)
+        if part is not self.log:
+            self.told(
+                f"Diagnose: on the liveliest {part.duration:.0f} s of the log's {self.log.duration:.0f} s."
+            )
+        for number in range(ROUNDS):
+            if self.late() or self._full():
+                return
+            self.say(f"diagnosing what is missing ({number + 1})")
+            patience = max(self.limit * PATIENCE - (time.monotonic() - self.began), 0.0)
+            asked = (
+                None
+                if self.effects is None
+                else [n for n in self.effects if n not in self.state.model.effect_names]
+            )
+            if asked is not None and not asked:
+                return
+            try:
+                found = diagnose(
+                    self.state.model,
+                    part,
+                    asked,
+                    force=True,
+                    advice=False,
+                    whiteness=False,
+                    costs=False,
+                    progress=self._until(time.monotonic() + patience),
+                )
+            except _TooLong:
+                self.told(
+                    f"Diagnose: broken off, it took too long (seconds={self.limit:g} for everything): no cause is named "
+                    "in this round."
+                )
+                return
+            except FAILURES as problem:
+                self._failed("the diagnosis", problem)
+                return
+            last = found.steps[-1]["verdict"] if found.steps else found.verdict
+            self.diagnoses.append(
+                {
+                    "verdict": found.verdict,
+                    "missing": found.missing,
+                    "nearest": found.nearest,
+                    "story": found.story,
+                }
+            )
+            self.told(f"Diagnose: {' '.join(found.story)}")
+            if found.verdict == "adequate":
+                self.adequate = True
+                return
+            pays = False
+            groups = [[n] for n in found.missing] if found.verdict == "named" else [list(found.missing)]
+            for group in [g for g in groups if g]:
+                pays |= self._add_best(
+                    group, CAUSE, "named by the diagnosis", rivals=found.verdict != "named"
+                )
+            if not pays:
+                return
+            if found.verdict == "named" and last == "adequate":
+                self.adequate = True
+                return
+
+    def _until(self, end: float) -> Callable[[str], None]:
+        """Return who tells what is being done, and breaks it off after a time."""
+
+        def say(words: str) -> None:
+            if time.monotonic() > end:
+                raise _TooLong
+            self.say(words)
+
+        return say

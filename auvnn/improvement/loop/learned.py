@@ -1,0 +1,190 @@
+"""What has no name: drag of every coupling, and a force of what was measured, held close to nothing by a ridge.
+
+How close, and which inputs, what was left out decides, linearised about the model without; then it is fitted and
+judged as any other step is. Reference: Hoerl and Kennard (1970), Technometrics 12(1), for ridge regression.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.diagnosis.hypotheses.layout import Layout
+from auvnn.effects import Effect, effect_class
+from auvnn.effects.residual_force import INPUTS, ResidualForce
+from auvnn.estimation.priors import set_parameters
+from auvnn.improvement.free_run import FreeRunFit, normal_equations
+from auvnn.improvement.loop.judge import Judge
+from auvnn.improvement.loop.screen import PROMISE, WINDOWS
+from auvnn.improvement.loop.state import Recipe, State, held_by, laid_out, starting
+from auvnn.models import GreyBox
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+# How many of its scales a learned parameter may be away from nothing: what is tried.
+RIDGES = (10.0, 3.0, 1.0, 0.3, 0.1, 0.03)
+# Inputs of the residual force that are tried.
+SUBSETS = (
+    ("tilt",),
+    ("velocity",),
+    ("command",),
+    ("tilt", "velocity"),
+    ("tilt", "command"),
+    ("velocity", "command"),
+    ("tilt", "velocity", "command"),
+    INPUTS,
+)
+# Of terms that promise at least this share of what the best one does, the one with the fewest weights is fitted too.
+NEARLY = 0.8
+KINDS = ("polynomial", "residual_force")
+EFFECT = {"polynomial": "learned_drag", "residual_force": "residual_force"}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A learned term worth a fit.
+
+    Attributes:
+        recipe: with it.
+        fall: share of the squared error on what is left out that it would take away, linearised.
+        words: its inputs.
+    """
+
+    recipe: Recipe
+    fall: float
+    words: str
+
+
+def choose(base: GreyBox, judge: Judge, state: State, kind: str) -> list[Choice]:
+    """Return the learned terms of a kind that are worth a fit, at most two; none where none promises anything.
+
+    The one that promises most, and of those that promise nearly as much the one with the fewest weights.
+
+    Args:
+        base: the model as given.
+        judge: of the log.
+        state: what it is to stand beside.
+        kind: "polynomial", a drag of every coupling, or "residual_force".
+    """
+    name = EFFECT[kind]
+    if name in state.recipe.effects or name in base.effect_names:
+        return []
+    recipe = _with(base, state.recipe, name, None, 1.0)
+    layout, names, held = laid_out(base, recipe)
+    begin = starting(layout, names, held, state, probes=False)
+    model = layout.model.rebuilt(layout.model.copied_effects())
+    set_parameters(model, names, begin)
+    task, own, free = judge.task(state.recipe.seconds)
+    if len(task.windows) > WINDOWS:
+        chosen = np.linspace(0, len(task.windows) - 1, WINDOWS).round().astype(int)
+        task, own, free = replace(task, windows=task.windows.pick(chosen)), own[chosen], free[chosen]
+    sums = (begin, *normal_equations(model, task, names))
+    weight = 1.0 if state.fit is None else state.fit.weight
+
+    def foreseen(columns: Index, trial: Recipe) -> float:
+        return _foreseen(layout, trial, names, columns, sums, weight, own, free, judge)
+
+    own_columns = layout.places(names)[name]
+    others = np.setdiff1d(np.arange(len(begin)), own_columns)
+    before = foreseen(others, recipe)
+    found: list[tuple[int, Choice]] = []
+    for inputs in SUBSETS if kind == "residual_force" else (None,):
+        mine = _columns(layout.model.effect(name), own_columns, inputs)
+        if not len(mine):
+            continue
+        for ridge in RIDGES:
+            trial = _with(base, state.recipe, name, inputs, ridge)
+            fall = (before - foreseen(np.sort(np.concatenate([others, mine])), trial)) / max(before, 1e-300)
+            if fall > PROMISE:
+                words = " and ".join(inputs) if inputs else "velocity"
+                found.append((len(mine), Choice(trial, float(fall), words)))
+    if not found:
+        return []
+    most = max(found, key=lambda c: c[1].fall)[1]
+    few = min((c for c in found if c[1].fall >= NEARLY * most.fall), key=lambda c: (c[0], -c[1].fall))[1]
+    return [most] if few is most else [most, few]
+
+
+def _with(base: GreyBox, recipe: Recipe, name: str, inputs: Sequence[str] | None, ridge: float) -> Recipe:
+    effect: Effect
+    if name == "residual_force":
+        effect = ResidualForce.build(base.vehicle, base.actuation, inputs=inputs)
+    else:
+        effect = effect_class(name).build(base.vehicle, base.actuation)
+    return replace(
+        recipe,
+        effects=(*recipe.effects, name),
+        ridge={**recipe.ridge, name: ridge},
+        built={**recipe.built, name: effect},
+    )
+
+
+def _columns(effect: Effect, columns: Index, inputs: Sequence[str] | None) -> Index:
+    """Return those columns of an effect whose parameters belong to some inputs."""
+    if inputs is None:
+        return columns
+    wanted = []
+    for p in effect.parameters_of:
+        middle = p.name.partition("_")[2].rpartition("_")[0]
+        wanted.append(("velocity" if len(middle) == 1 else middle.partition("_")[0]) in inputs)
+    return columns[np.array(wanted)]
+
+
+def _foreseen(
+    layout: Layout,
+    recipe: Recipe,
+    names: Sequence[str],
+    index: Index,
+    sums: tuple[Array, Array, Array, Array],
+    weight: float,
+    own: NDArray[np.int64],
+    free: NDArray[np.bool_],
+    judge: Judge,
+) -> float:
+    """Return the squared error of all folds, each foreseen by the others, some columns free."""
+    begin, hessian, slope, cost = sums
+    held = held_by(layout, names, recipe)
+    total = 0.0
+    precision, mean = held.precision[index], held.mean[index]
+    fit = FreeRunFit(
+        tuple(names),
+        begin[index],
+        held,
+        hessian[:, index[:, None], index],
+        slope[:, index],
+        cost,
+        weight,
+        True,
+    )
+    for k, fold in enumerate(judge.folds.numbers):
+        mine, keep = own == fold, free[:, k]
+        if not mine.any():
+            continue
+        theta = fit.theta
+        if keep.any():
+            total_h = fit.hessian[keep].sum(0) + weight * np.diag(precision)
+            downhill = fit.slope[keep].sum(0) - weight * precision * (theta - mean)
+            unit = 1.0 / np.sqrt(np.maximum(np.diag(total_h), 1e-300))
+            even = total_h * unit[:, None] * unit
+            theta = theta + np.linalg.lstsq(even, downhill * unit, rcond=1e-12)[0] * unit
+        total += max(fit.foreseen(theta, mine), 0.0)
+    return total
+
+
+def used(state: State, share: float = 0.05) -> dict[str, list[str]]:
+    """Return which inputs and degrees of freedom the learned terms of a state use, by share of their weights."""
+    out: dict[str, list[str]] = {}
+    places = state.layout.places(state.names)
+    for name in EFFECT.values():
+        if name not in state.recipe.effects:
+            continue
+        effect, values = state.layout.model.effect(name), state.theta[places[name]]
+        by: dict[str, float] = {}
+        for p, value in zip(effect.parameters_of, values, strict=True):
+            by[p.name[0]] = by.get(p.name[0], 0.0) + (value / p.scale) ** 2
+        total = sum(by.values())
+        out[name] = [axis for axis, size in by.items() if total > 0 and size / total >= share]
+    return out

@@ -1,0 +1,139 @@
+"""Which effects are worth a fit: all of the catalogue at once, linearised, by what they foresee of what is left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.diagnosis.hypotheses.candidates import candidates_for
+from auvnn.diagnosis.hypotheses.layout import lay_out, shapes
+from auvnn.diagnosis.score_tests.probes import null_is_no_start
+from auvnn.estimation.priors import set_parameters
+from auvnn.improvement.free_run import FreeRunFit, normal_equations
+from auvnn.improvement.loop.judge import Judge
+from auvnn.improvement.loop.state import Recipe, State, held_by, laid_out, starting
+from auvnn.models import GreyBox
+
+Array = NDArray[np.float64]
+# Windows that candidates are looked at on, at most.
+WINDOWS = 120
+# Effects that go by the time since the start of a run.
+COURSES = ("payload", "flooding", "biofouling", "waves")
+# Share of the error by which a candidate must promise to lower it, to be fitted at all.
+PROMISE = 0.005
+
+
+@dataclass(frozen=True)
+class Promise:
+    """What an effect promises, before it is fitted.
+
+    Attributes:
+        effect: name.
+        fall: share of the squared error on what is left out that it would take away, linearised.
+        start: (P,) parameters from which to begin its fit.
+    """
+
+    effect: str
+    fall: float
+    start: Array
+
+
+def wanted(base: GreyBox, judge: Judge, recipe: Recipe) -> list[str]:
+    """Return the effects that may be asked for: those of the catalogue that the log and the vehicle can speak of.
+
+    What goes by the time since the start of a run tells a course of events. Where the diagnosis does not name it,
+    there is no reason why another run should follow the same course: it is not taken for its prediction alone.
+    """
+    usable, _ = candidates_for(base, judge.log, None)
+    return [n for n in usable if n not in recipe.effects and n not in base.effect_names and n not in COURSES]
+
+
+def promises(
+    base: GreyBox,
+    judge: Judge,
+    state: State,
+    names: Sequence[str],
+    say: Callable[[str], None],
+) -> list[Promise]:
+    """Return what each of several effects promises beside a state, best first.
+
+    Each is linearised where its fit would begin, everything else free beside it; a fold is foreseen by the others.
+    """
+    plain, shaped = [], []
+    whole = lay_out(base, [*(n for n in state.recipe.effects if n not in state.recipe.built), *names])
+    for name in names:
+        stateds = name in state.layout.nuisance
+        (shaped if not stateds and null_is_no_start(whole, name) else plain).append(name)
+    found: list[Promise] = []
+    groups = [plain, *([n] for n in shaped)] if plain else [[n] for n in shaped]
+    for k, group in enumerate(groups):
+        say(
+            f"looking at {group[0] if len(group) == 1 else f'{len(group)} effects'} ({k + 1} of {len(groups)})"
+        )
+        try:
+            found += _group(base, judge, state, group)
+        except (FloatingPointError, np.linalg.LinAlgError, RuntimeError, ValueError):
+            continue  # what cannot even be linearised is not fitted
+    return sorted((p for p in found if p.fall > 0), key=lambda p: -p.fall)
+
+
+def _group(base: GreyBox, judge: Judge, state: State, group: Sequence[str]) -> list[Promise]:
+    recipe = replace(state.recipe, effects=(*state.recipe.effects, *group))
+    layout, names, held = laid_out(base, recipe)
+    begin = starting(layout, names, held, state, probes=len(group) == 1)
+    model = layout.model.rebuilt(layout.model.copied_effects())
+    set_parameters(model, names, begin)
+    task, own, free = judge.task(state.recipe.seconds)
+    if len(task.windows) > WINDOWS:
+        chosen = np.linspace(0, len(task.windows) - 1, WINDOWS).round().astype(int)
+        task, own, free = replace(task, windows=task.windows.pick(chosen)), own[chosen], free[chosen]
+    hessian, slope, cost = normal_equations(model, task, names)
+    weight = 1.0 if state.fit is None else state.fit.weight
+    places = layout.places(names)
+    without = [n for n in names if n not in group or n in layout.nuisance]
+    before = _foreseen(
+        layout, state.recipe, without, places, (begin, hessian, slope, cost), weight, own, free, judge
+    )[0]
+    found = []
+    for name in group:
+        columns = [*without, *([] if name in without else [name])]
+        own_recipe = replace(state.recipe, effects=(*state.recipe.effects, name))
+        after, theta = _foreseen(
+            layout, own_recipe, columns, places, (begin, hessian, slope, cost), weight, own, free, judge
+        )
+        # The fit of this effect alone has its own columns, in its own order.
+        alone, order, alone_held = laid_out(base, own_recipe)
+        start = starting(alone, order, alone_held, state, probes=True)
+        at = alone.places(order)
+        if not shapes(layout, name).any():
+            start[at[name]] = theta[layout.places(columns)[name]]
+        reference = cost.sum() if len(group) == 1 else before
+        found.append(Promise(name, float((reference - after) / max(before, 1e-300)), start))
+    return found
+
+
+def _foreseen(layout, recipe, columns, places, sums, weight, own, free, judge) -> tuple[float, Array]:
+    """Return the squared error of all folds, each foreseen by the others, and the fit to all."""
+    begin, hessian, slope, cost = sums
+    index = np.concatenate([places[n] for n in columns]) if columns else np.zeros(0, dtype=int)
+    held = held_by(layout, columns, recipe)
+    fit = FreeRunFit(
+        tuple(columns),
+        begin[index],
+        held,
+        hessian[:, index[:, None], index],
+        slope[:, index],
+        cost,
+        weight,
+        True,
+    )
+    total = 0.0
+    for k, fold in enumerate(judge.folds.numbers):
+        mine = own == fold
+        if mine.any():
+            theta = fit.newton(layout.model, free[:, k]) if free[:, k].any() else fit.theta
+            total += max(fit.foreseen(theta, mine), 0.0)
+    return total, fit.newton(layout.model, slice(None))

@@ -1,0 +1,273 @@
+"""The equations of motion of one vehicle: every force by name, the acceleration, and what sensors report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import torch
+from torch import Tensor, nn
+
+from auvnn.effects import Body, Effect, Moment, Sensed
+from auvnn.errors import ConfigError
+from auvnn.models.actuation.actuators import Actuators
+from auvnn.models.inputs import Inputs
+from auvnn.physics.attitude import quat_to_matrix
+from auvnn.physics.coriolis import coriolis_force
+from auvnn.physics.current import water_velocity
+from auvnn.physics.fins import fin_wrench
+from auvnn.physics.inertia import rigid_body_inertia
+from auvnn.physics.kinematics import eta6_to_eta7
+from auvnn.physics.products import matvec
+from auvnn.physics.restoring import restoring_force
+from auvnn.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from auvnn.damping.bank import DampingBank
+
+
+# The terms of the equation of motion that resist motion through the water.
+DRAG_TERMS = ("linear damping", "quadratic damping", "damping elements", "damping subnetworks")
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """What of the equations does not change with the state: body and inertia matrices, (..., 6, 6)."""
+
+    body: Body
+    rigid: Tensor
+    added: Tensor
+    total: Tensor
+    inverse: Tensor
+
+
+class EquationsOfMotion(nn.Module):
+    """What follows from a vehicle's numbers, its damping and its effects: forces, accelerations, what sensors report.
+
+    Attributes:
+        vehicle: the known numbers.
+        actuation: "thrusters" or "wrench".
+        actuators: what turns commands into thrust.
+        damping: six damping subnetworks, or None.
+        bottom: depth of a flat bottom, m, or None.
+        time_varying: whether body and inertia matrices change with time.
+    """
+
+    vehicle: Vehicle
+    actuation: str
+    actuators: Actuators
+    damping: DampingBank | None
+    bottom: float | None
+    time_varying: bool
+    _by_hook: dict[str, list[Effect]]
+
+    def _known(self, name: str) -> Any:
+        return getattr(self, f"known_{name}")
+
+    def using(self, hook: str) -> list[Effect]:
+        """Return the effects that override a hook, in order of action."""
+        return self._by_hook[hook]
+
+    def prepare(self, moment: Moment | None = None) -> Prepared:
+        """Work out body and inertia matrices; `moment` is needed only where an effect varies in time."""
+        body = Body(
+            *(
+                self._known(n)
+                for n in (
+                    "mass",
+                    "weight",
+                    "buoyancy",
+                    "cg",
+                    "cb",
+                    "inertia",
+                    "added_mass",
+                    "linear",
+                    "quadratic",
+                    "element_linear",
+                    "element_quadratic",
+                )
+            )
+        )
+        for effect in self.using("body"):
+            body = effect.body(body, moment)
+        rigid = rigid_body_inertia(body.mass, body.inertia, body.cg)
+        total = rigid + body.added_mass
+        return Prepared(body, rigid, body.added_mass, total, torch.linalg.inv(total))
+
+    def forward(
+        self,
+        eta: Tensor,
+        nu: Tensor,
+        command: Tensor,
+        *,
+        time: Tensor | float = 0.0,
+        fins: Tensor | None = None,
+        voltage: Tensor | None = None,
+        altitude: Tensor | None = None,
+    ) -> Tensor:
+        """Return the acceleration, with the actuators settled at their commands.
+
+        Args:
+            eta: position and attitude (..., 7) with a quaternion (w, x, y, z), or (..., 6) with Euler angles.
+            nu: velocity (..., 6), m/s and rad/s, over ground, of the body origin.
+            command: thruster commands (..., n) in [-1, 1], or the wrench (..., 6), N and N m.
+            time: s since the start of the run, (...).
+            fins: fin angles (..., m), rad; zero where they are not given.
+            voltage: V, (...).
+            altitude: m, (...).
+
+        Returns:
+            nu_dot (..., 6), m/s2 and rad/s2.
+
+        Raises:
+            ConfigError: the last size of a tensor is not what the model takes.
+        """
+        sizes = (eta.shape[-1:], nu.shape[-1:], command.shape[-1:])
+        if sizes[0] not in ((6,), (7,)) or sizes[1:] != ((6,), (self.actuators.size,)):
+            raise ConfigError(
+                f"eta {tuple(eta.shape)}, nu {tuple(nu.shape)}, command {tuple(command.shape)}: the last sizes "
+                f"are 6 or 7, 6, and {self.actuators.size} ({self.actuation})"
+            )
+        if fins is not None and self.vehicle.fins and fins.shape[-1:] != (len(self.vehicle.fins),):
+            raise ConfigError(f"fins {tuple(fins.shape)}: the vehicle has {len(self.vehicle.fins)} fins")
+        if eta.shape[-1] == 6:
+            eta = eta6_to_eta7(eta)
+        inputs = Inputs(command, fins, voltage, altitude)
+        moment_time = torch.as_tensor(time, dtype=nu.dtype, device=nu.device)
+        lead = torch.broadcast_shapes(moment_time.shape, command.shape[:-1])
+        drive = self.actuators.drive(
+            command.expand(*lead, self.actuators.size).unsqueeze(-2),
+            moment_time.expand(lead).unsqueeze(-1),
+            self.using("command"),
+        )
+        return self.nu_dot(
+            eta[..., :3], quat_to_matrix(eta[..., 3:]), nu, drive.start[0], inputs, moment_time
+        )
+
+    def nu_dot(
+        self,
+        position: Tensor,
+        rotation: Tensor,
+        nu: Tensor,
+        thrust: Tensor,
+        inputs: Inputs,
+        time: Tensor,
+        prepared: Prepared | None = None,
+    ) -> Tensor:
+        """Return the acceleration from the thrust that acts now; see `forward` for shapes and units."""
+        terms, prepared = self._terms(position, rotation, nu, thrust, inputs, time, prepared)
+        first, *others = terms.values()
+        for term in others:
+            first = first + term
+        return matvec(prepared.inverse, first)
+
+    def wrenches(
+        self, position: Tensor, rotation: Tensor, nu: Tensor, thrust: Tensor, inputs: Inputs, time: Tensor
+    ) -> dict[str, Tensor]:
+        """Return the wrench of each term on the right-hand side of M nu_dot = ..., N and N m, (..., 6)."""
+        return self._terms(position, rotation, nu, thrust, inputs, time, None)[0]
+
+    def _terms(
+        self,
+        position: Tensor,
+        rotation: Tensor,
+        nu: Tensor,
+        thrust: Tensor,
+        inputs: Inputs,
+        time: Tensor,
+        prepared: Prepared | None,
+    ) -> tuple[dict[str, Tensor], Prepared]:
+        altitude = inputs.altitude
+        if altitude is None and self.bottom is not None:
+            altitude = self.bottom - position[..., 2]
+        moment = Moment(
+            time,
+            position,
+            rotation,
+            nu,
+            nu,
+            torch.zeros_like(nu),
+            inputs.command,
+            inputs.fins,
+            inputs.voltage,
+            altitude,
+        )
+        nu_r, moving = nu, self.using("water")
+        if moving:
+            velocity, acceleration = moving[0].water(moment)
+            for effect in moving[1:]:
+                more, faster = effect.water(moment)
+                velocity, acceleration = velocity + more, acceleration + faster
+            nu_c, nu_c_dot = water_velocity(rotation, nu[..., 3:], velocity, acceleration)
+            nu_r = nu - nu_c
+            moment = replace(moment, nu_r=nu_r, nu_c_dot=nu_c_dot)
+        if prepared is None or self.time_varying:
+            prepared = self.prepare(moment)
+        body, terms = prepared.body, {}
+        for effect in self.using("thrust"):
+            thrust = effect.thrust(thrust, moment)
+        terms["thrust"] = thrust @ self.actuators.allocation.mT
+        if moving:
+            terms["Coriolis"] = -coriolis_force(prepared.rigid, nu) - coriolis_force(prepared.added, nu_r)
+            terms["water acceleration"] = matvec(prepared.added, moment.nu_c_dot)
+        else:
+            terms["Coriolis"] = -coriolis_force(prepared.total, nu)
+        if body.linear is not None:
+            terms["linear damping"] = -matvec(body.linear, nu_r)
+        if body.quadratic is not None:
+            terms["quadratic damping"] = -matvec(body.quadratic, nu_r.abs() * nu_r)
+        if body.element_linear is not None and body.element_quadratic is not None:
+            to_parts = self._known("element_transform").flatten(0, 1)
+            own = matvec(to_parts, nu_r)
+            law = body.element_linear.flatten(-2) + body.element_quadratic.flatten(-2) * own.abs()
+            terms["damping elements"] = -matvec(to_parts.mT, law * own)
+        if self.damping is not None:
+            terms["damping subnetworks"] = -self.damping(nu_r)
+        terms["restoring"] = -restoring_force(rotation, body.weight, body.buoyancy, body.hangs, body.cb)
+        if self._known("fin_area") is not None:
+            # Fins whose angles are not known are still there: they are taken as held at zero.
+            angles = nu_r.new_zeros(len(self.vehicle.fins)) if inputs.fins is None else inputs.fins
+            terms["fins"] = fin_wrench(
+                nu_r,
+                angles,
+                self._known("fin_frame"),
+                self._known("fin_area"),
+                self._known("fin_lift_slope"),
+                self._known("fin_stall"),
+                float(self.vehicle.water_density),
+            )
+        if self.using("wrench"):
+            drag = [terms[name] for name in DRAG_TERMS if name in terms]
+            moment = replace(moment, thrust=thrust, drag=sum(drag, torch.zeros_like(nu)))
+        for effect in self.using("wrench"):
+            terms[str(effect.name)] = effect.wrench(moment, body)
+        return terms, prepared
+
+    def sense(self, sensed: Sensed) -> Sensed:
+        """Return what the sensors report of a state."""
+        for effect in self.using("sense"):
+            sensed = effect.sense(sensed)
+        return sensed
+
+    def unsense(self, sensed: Sensed, rounds: int = 4) -> Sensed:
+        """Return the state that the sensors' report stands for, by fixed-point iteration.
+
+        Sensor effects are small corrections, so each round gains about as many digits as they are small.
+        """
+        if not self.using("sense"):
+            return sensed
+        state = sensed
+        for _ in range(rounds):
+            seen = self.sense(state)
+            rate = None
+            if sensed.nu_dot is not None and state.nu_dot is not None and seen.nu_dot is not None:
+                rate = state.nu_dot + sensed.nu_dot - seen.nu_dot
+            quaternion = state.quaternion + sensed.quaternion - seen.quaternion
+            quaternion = quaternion / torch.linalg.norm(quaternion, dim=-1, keepdim=True)
+            state = Sensed(
+                state.position + sensed.position - seen.position,
+                quaternion,
+                state.nu + sensed.nu - seen.nu,
+                rate,
+            )
+        return state

@@ -1,0 +1,92 @@
+"""Logs of other worlds in the benchmark: balanced plans, effects of a stated cost, and one log all the way."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pytest
+
+from auvnn.config import config_dir, read_yaml
+from auvnn.errors import ConfigError
+from auvnn.models import load
+from auvnn.simulation import simulate
+from auvnn.studies.benchmark import cases, run_case
+from auvnn.studies.benchmark.cases import targets
+from auvnn.studies.benchmark.costs import cost_of, costly
+from auvnn.studies.benchmark.counts.rates import NUMBERS, RATES
+
+OPTIONS: dict[str, Any] = {
+    "effects": "all", "sizes": "medium", "noises": "realistic", "excitations": "multisine", "vehicles": "rov95",
+    "coefficients": "exact", "repeats": 1, "seed": 1, "runs": 2, "duration": 15.0, "rate": 20.0, "workers": 1,
+}  # fmt: skip
+WORLDS = ("between", "disturbed", "shaped", "sensors", "conventions", "everything")
+
+
+def of_plan(name: str) -> tuple[dict[str, Any], list[Any]]:
+    options = {**OPTIONS, "plan": read_yaml(config_dir() / "plan" / f"{name}.yaml")}
+    return options, cases(options)
+
+
+def test_the_blind_plan_has_every_effect_at_every_cost_in_every_world():
+    options, found = of_plan("worlds")
+    assert len({(c.part, c.seed) for c in found}) == len(found)
+    for world in WORLDS:
+        hidden = [c for c in found if c.part == world]
+        by_effect = Counter(c.hidden for c in hidden)
+        assert set(by_effect.values()) == {3} and len(by_effect) >= 39
+        assert all({c.size for c in hidden if c.hidden == n} == {"15%", "40%", "150%"} for n in by_effect)
+        nothing = [c for c in found if c.part == f"{world}_nothing"]
+        assert len(nothing) == 40 and {c.kind for c in nothing} == {"nothing"}
+        for logs in (hidden, nothing):
+            loops = Counter(c.loop for c in logs)
+            assert abs(loops["open"] - loops["closed"]) < 0.2 * len(logs)
+            assert min(Counter(c.vehicle for c in logs).values()) > 0.25 * len(logs)
+    assert {c.world for c in found if c.part == "disturbed"} == {"disturbed_10", "disturbed_25"}
+    assert {c.rate for c in found if c.part == "between"} == {20.0, 5.0}
+    assert {t["rate"] for t in targets(options)} <= {*RATES, *NUMBERS}
+
+
+def test_the_logs_on_which_rules_are_made_are_others():
+    (_, blind), (_, made) = of_plan("worlds"), of_plan("worlds_made")
+    assert not {c.seed for c in blind} & {c.seed for c in made}
+    for world in WORLDS:
+        assert len([c for c in made if c.part == f"{world}_nothing"]) == 10
+        assert 25 <= len([c for c in made if c.part == world]) <= 30
+
+
+def test_what_an_effect_gets_follows_from_its_name_alone():
+    part = {"balanced": 3, "costs": [0.15, 0.4, 1.5], "vehicles": ["rov95", "remus100"], "loops": ["open", "closed"],
+            "plants": "numpy", "worlds": "shaped"}  # fmt: skip
+    one = cases({**OPTIONS, **part, "effects": ["net_buoyancy"]})
+    more = cases({**OPTIONS, **part, "effects": ["fin_stall", "net_buoyancy"]})
+    assert one == [c for c in more if c.hidden == "net_buoyancy"]
+    assert {c.vehicle for c in more if c.hidden == "fin_stall"} == {"remus100"}
+    assert {c.excitation for c in one} == {"multisine", "survey"}
+    with pytest.raises(ConfigError, match="fin_stall can be hidden in none of rov95"):
+        cases({**OPTIONS, **part, "vehicles": "rov95", "effects": "fin_stall"})
+    with pytest.raises(ConfigError, match="costs= is needed"):
+        cases({**OPTIONS, **part, "costs": None, "effects": "net_buoyancy"})
+
+
+@pytest.mark.parametrize("cost", [0.4, 1.5])
+def test_an_effect_costs_what_it_was_asked_for(cost):
+    model = load("rov95")
+    how: dict[str, Any] = dict(excitation="multisine", noise="realistic", rate=20.0, plant="numpy")
+    values = costly(model, "constant_force", cost, seed=4, runs=2, duration=10.0, world="disturbed_10", **how)
+    log = simulate(
+        model, hidden={"constant_force": values}, seed=4, runs=2, duration=10.0, max_step=0.025, world="disturbed_10",
+        **how,
+    ).log  # fmt: skip
+    assert cost_of(model, log, {"constant_force": values}) == pytest.approx(cost, rel=0.2)
+
+
+def test_one_log_of_a_world_goes_the_whole_way():
+    part = {"balanced": 1, "costs": [1.5], "loops": ["open"], "plants": "numpy", "worlds": "disturbed_10", "oracle": True,
+            "effects": ["net_buoyancy"], "candidates": ["net_buoyancy", "constant_force"], "duration": 10.0}  # fmt: skip
+    (case,) = cases({**OPTIONS, **part})
+    row = run_case(case)
+    assert row["fault"] is None and row["size"] == "150%" and 0.7 < row["cost"] < 3.0
+    assert row["oracle"]["net_buoyancy"]["nothing"] > row["oracle"]["net_buoyancy"]["constant_force"] > 0.0
+    assert np.shape(row["world_law"]["drawn"]["force"]["rms"]) == (6,)
