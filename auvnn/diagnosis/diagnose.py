@@ -25,6 +25,7 @@ from auvnn.estimation.prediction_error import SINGULAR
 from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
+from auvnn.progress import Counted
 from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
 
@@ -109,7 +110,7 @@ def searched(
     progress: Callable[[str], None] | None = None,
 ) -> tuple[Diagnosis, Searched]:
     """Return what `diagnose` does, and the search that led to it."""
-    say = progress or (lambda words: None)
+    say = Counted(progress, 8 + 4 * bool(costs) + bool(whiteness) + 3 * bool(advice), rough=True)
     if max_effects < 1:
         raise ConfigError(f"max_effects={max_effects} must be at least 1")
     usable, needs = candidates_for(model, log, effects)

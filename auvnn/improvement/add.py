@@ -23,6 +23,7 @@ from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.rollouts import HORIZONS
 from auvnn.models import GreyBox
+from auvnn.progress import Progress
 from auvnn.threads import on_one_thread
 
 
@@ -75,7 +76,8 @@ def add(
         raise ConfigError(f"horizons={list(horizons)}: '5' must be among them, the gain is measured there")
     fits = fit_steps(model, log, names, objective=objective, window=window, derivative=derivative, say=say)
     notes += unseen(fits.layout, fits.best, names, log)
-    say("free running on the held-out data")
+    steps = 2 * len(names) + 1 if len(names) > 1 else 3
+    say(Progress("free running on the held-out data", steps - 1, steps))
     judged = judge(fits, names, test, horizons, derivative, objective == "one_step")
     return _assembled(model, log, test, names, fits, judged, objective, held_out, notes, derivative)
 

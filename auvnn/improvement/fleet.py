@@ -23,6 +23,7 @@ from auvnn.improvement.trend import Trend, trend
 from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.portions import kind_of, log_files
 from auvnn.models import GreyBox
+from auvnn.progress import Progress
 
 # Level of the tests over dives, shared by all parameters (Bonferroni).
 LEVEL = 0.05
@@ -124,8 +125,9 @@ def fleet(
     question = Question(model, tuple(names), Mapping.read(mapping), window, windows, force)
     dives, failed = [], []
     with executor_for(executor, workers, address) as pool:
+        say(Progress(f"fitting {len(paths)} dives", 0, len(paths)))
         for path, found in zip(paths, pool.run(dive, question, paths, losses=True), strict=True):
-            say(f"fitted {path}")
+            say(Progress(f"fitted {path}", len(dives) + len(failed) + 1, len(paths)))
             if isinstance(found, Lost):
                 found = str(found)
             if isinstance(found, str):

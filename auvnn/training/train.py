@@ -20,9 +20,10 @@ from auvnn.metrics.derivative import Derivative, choose_derivative
 from auvnn.metrics.one_step import OneStep, one_step, scores
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
+from auvnn.progress import Progress
 from auvnn.training.confounding.confounded_effects import confounded_effects
 from auvnn.training.confounding.confounding import Confounding
-from auvnn.training.fit_damping import Fit, fit_damping
+from auvnn.training.fit_damping import Fit, fit_damping, most_iterations
 from auvnn.training.history import Record
 from auvnn.training.objectives.base import build_objective
 from auvnn.training.problem import DampingProblem
@@ -133,10 +134,12 @@ def train(
     # What decides when to stop is a part of the log itself: the test log is for judging alone.
     fitted, stopping, stop_words = log.split(STOPPING)
     bank = DampingBank.from_description(damping, seed)
+    most = most_iterations(scheme)
 
     def told(record: Record) -> None:
         if progress is not None and record.iteration % 10 == 0:
-            progress(f"iteration {record.iteration}: worst relative error {record.worst:.3g}")
+            words = f"iteration {record.iteration}: worst relative error {record.worst:.3g}"
+            progress(Progress(words, record.iteration, max(most, record.iteration), rough=True))
 
     def one_step_fit(how: Derivative, folder: str | Path | None) -> tuple[GreyBox, Fit, Array, int]:
         problem, held, nu, held_samples = _problem(model, fitted, stopping, how)

@@ -118,6 +118,7 @@ class Walk(Causes):
             if not shortlist:
                 return
             begin = self._before()
+            self.say("looking through the catalogue for what foresees better")
             promised = promises(self.model, self.judge, begin or self.state, shortlist, self.say)
             # Later rounds look again only at what promised anything.
             shortlist = [p.effect for p in promised if p.fall > PROMISE] or shortlist[:0]
