@@ -24,6 +24,7 @@ from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.portions import kind_of, log_files
 from auvnn.models import GreyBox
 from auvnn.progress import Progress
+from auvnn.threads import on_one_thread
 
 # Level of the tests over dives, shared by all parameters (Bonferroni).
 LEVEL = 0.05
@@ -70,6 +71,7 @@ class Fleet(Answer):
         return plain({"schema": "auvnn/fleet/1", **{n: getattr(self, n) for n in names}})
 
 
+@on_one_thread
 def fleet(
     model: GreyBox | str | Path,
     logs: str | Path | Sequence[str | Path],

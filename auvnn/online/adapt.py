@@ -21,6 +21,7 @@ from auvnn.online.frozen import frozen_errors
 from auvnn.online.guards import REASONS, Guards
 from auvnn.online.update import Update
 from auvnn.progress import Progress
+from auvnn.threads import on_one_thread
 
 Array = NDArray[np.float64]
 
@@ -65,6 +66,7 @@ class Adaptation(Answer):
         )
 
 
+@on_one_thread
 def adapt(
     model: GreyBox,
     log: Log,

@@ -21,6 +21,7 @@ from auvnn.metrics.one_step import OneStep, one_step, scores
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
 from auvnn.progress import Progress
+from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
 from auvnn.training.confounding.confounding import Confounding
 from auvnn.training.fit_damping import Fit, fit_damping, most_iterations
@@ -83,6 +84,7 @@ class Training(Answer):
         )
 
 
+@on_one_thread
 def train(
     model: GreyBox,
     log: Log,

@@ -31,6 +31,7 @@ from auvnn.logs import Log
 from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.models import GreyBox
 from auvnn.progress import Progress
+from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
 from auvnn.training.distributed.data_split import (
     DataSplit,
@@ -65,6 +66,7 @@ def spreads(
     return build_scheme(scheme).parted and build_objective(objective).name == "one_step"
 
 
+@on_one_thread
 def train_files(
     model: GreyBox,
     log: str | Path | Sequence[str | Path],

@@ -46,11 +46,13 @@ from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.portions import log_files
 from auvnn.models import GreyBox
 from auvnn.progress import Progress
+from auvnn.threads import on_one_thread
 
 # Windows for the search, and for the look and the fit; effects of the catalogue that are looked at beside those found.
 SEARCH, WINDOWS, LEADING = 240, 1000, 8
 
 
+@on_one_thread
 def diagnose_files(
     model: GreyBox,
     log: str | Path | Sequence[str | Path],
