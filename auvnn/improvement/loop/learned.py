@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.hypotheses.layout import Layout
 from auvnn.effects import Effect, effect_class
 from auvnn.effects.residual_force import INPUTS, ResidualForce
-from auvnn.estimation.priors import set_parameters
-from auvnn.improvement.free_run import FreeRunFit, normal_equations
+from auvnn.estimation.priors import limits, set_parameters
+from auvnn.improvement.free_run import FreeRunFit, newton_step, normal_equations
 from auvnn.improvement.loop.judge import Judge
 from auvnn.improvement.loop.screen import PROMISE, WINDOWS
 from auvnn.improvement.loop.state import Recipe, State, held_by, laid_out, starting
@@ -39,7 +39,7 @@ SUBSETS = (
 )
 # Of terms that promise at least this share of what the best one does, the one with the fewest weights is fitted too.
 NEARLY = 0.8
-KINDS = ("polynomial", "residual_force")
+KINDS = ("polynomial", "mlp", "residual_force")
 EFFECT = {"polynomial": "learned_drag", "residual_force": "residual_force"}
 
 
@@ -149,6 +149,7 @@ def _foreseen(
     held = held_by(layout, names, recipe)
     total = 0.0
     precision, mean = held.precision[index], held.mean[index]
+    low, high = limits(layout.model, names, held)
     fit = FreeRunFit(
         tuple(names),
         begin[index],
@@ -165,11 +166,10 @@ def _foreseen(
             continue
         theta = fit.theta
         if keep.any():
-            total_h = fit.hessian[keep].sum(0) + weight * np.diag(precision)
+            square = fit.hessian[keep].sum(0) + weight * np.diag(precision)
             downhill = fit.slope[keep].sum(0) - weight * precision * (theta - mean)
-            unit = 1.0 / np.sqrt(np.maximum(np.diag(total_h), 1e-300))
-            even = total_h * unit[:, None] * unit
-            theta = theta + np.linalg.lstsq(even, downhill * unit, rcond=1e-12)[0] * unit
+            # Within the bounds, as the fit itself will be: what is promised beyond them cannot be had.
+            theta = theta + newton_step(square, downhill, theta, low[index], high[index], 0.0)
         total += max(fit.foreseen(theta, mine), 0.0)
     return total
 
