@@ -2,9 +2,9 @@
 
     python experiments/threads/run.py OUT [--only=compare,train] [--repeats=3] [--seconds=40] [--no-busy]
 
-Each command runs as its user runs it, in a process of its own, in turn with OMP_NUM_THREADS unset, 1 and 2, so that what
-else the machine does falls on all settings alike; then again beside one busy process per core. The figure is the least wall
-time of the repeats. A command passes where, unset, it takes at most 1.2 times its best setting.
+Each command runs as its user runs it, in a process of its own, in turn with OMP_NUM_THREADS unset, 1 and 2, so that
+what else the machine does falls on all settings alike; then again beside one busy process per core. The figure is the
+least wall time of the repeats. A command passes where, unset, it takes at most 1.2 times its best setting.
 """
 
 from __future__ import annotations
@@ -33,9 +33,18 @@ def commands(folder: Path) -> dict[str, list[str]]:
         "simulate": [f"model={MODEL}", "runs=2", "duration=40"],
         "check": [f"log={log}", f"model={MODEL}"],
         "compare": [f"log={log}", f"model={MODEL}"],
-        "diagnose": [f"log={log}", f"model={MODEL}", "effects=[ocean_current,net_buoyancy,quadratic_damping]"],
+        "diagnose": [
+            f"log={log}",
+            f"model={MODEL}",
+            "effects=[ocean_current,net_buoyancy,quadratic_damping]",
+        ],
         "add": [f"log={log}", f"model={MODEL}", "effect=ocean_current"],
-        "improve": [f"log={log}", f"model={MODEL}", "diagnosing=false", "effects=[ocean_current,net_buoyancy]"],
+        "improve": [
+            f"log={log}",
+            f"model={MODEL}",
+            "diagnosing=false",
+            "effects=[ocean_current,net_buoyancy]",
+        ],
         "train": [f"log={log}", f"model={MODEL}", "scheme.max_iterations=60"],
         "adapt": [f"log={log}", f"model={MODEL}"],
         "fleet": [f"log={dives}", f"model={MODEL}", "effects=[ocean_current]"],
@@ -86,14 +95,27 @@ def judged(times: dict[str, list[float]]) -> dict[str, float | bool]:
     """Return the least time of each setting, the ratio of unset to the best of them, and whether that passes."""
     least = {s: min(t) for s, t in times.items()}
     ratio = least["unset"] / min(least.values())
-    return {**{s: round(t, 2) for s, t in least.items()}, "ratio": round(ratio, 3), "passes": ratio <= ALLOWED}
+    return {
+        **{s: round(t, 2) for s, t in least.items()},
+        "ratio": round(ratio, 3),
+        "passes": ratio <= ALLOWED,
+    }
 
 
 def prepared(folder: Path, seconds: float) -> None:
     """Make the logs that are measured on."""
     (folder / "dives").mkdir(parents=True, exist_ok=True)
-    for seed, path in enumerate((folder / "log.parquet", folder / "dives/1.parquet", folder / "dives/2.parquet")):
-        line = ["simulate", f"model={MODEL}", "runs=3", f"duration={seconds}", f"seed={seed}", "noise=realistic"]
+    for seed, path in enumerate(
+        (folder / "log.parquet", folder / "dives/1.parquet", folder / "dives/2.parquet")
+    ):
+        line = [
+            "simulate",
+            f"model={MODEL}",
+            "runs=3",
+            f"duration={seconds}",
+            f"seed={seed}",
+            "noise=realistic",
+        ]
         made = folder / "made"
         subprocess.run(
             [sys.executable, "-m", "auvnn", *line, "hidden=[ocean_current]", f"out={made}", "overwrite=true"],
