@@ -1,4 +1,4 @@
-"""How much of the truth's fall `improve` reaches on sixty fresh logs whose hidden effect costs 15, 40 or 150 % of the error.
+"""How much of the truth's fall `improve` reaches on sixty fresh logs whose hidden effect costs 15, 40 or 150 %.
 
     python experiments/improve/sixty.py draw > experiments/improve/sixty.json       (done once, before any log was made)
     python experiments/improve/sixty.py run OUT [--count=60] [--seconds=600] [--no-diagnosis]
