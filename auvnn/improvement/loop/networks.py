@@ -27,7 +27,7 @@ from auvnn.training.targets import Targets
 Array = NDArray[np.float64]
 FORM = "mlp"
 # One starting point and few iterations: they are trained once for each fold, and stop when a part left out says so.
-SCHEME = {"name": "levenberg_marquardt", "restarts": 1, "max_iterations": 60}
+SCHEME = {"scheme": "levenberg_marquardt", "restarts": 1, "max_iterations": 60}
 TRAINED = "networks trained anew without each fold"
 # Samples that networks are trained on, at most: more cost time and say little more.
 SAMPLES = 20_000

@@ -29,7 +29,7 @@ def walk(model):
         bank.input_scale.copy_(torch.tensor([0.15, 0.15, 0.3, 0.3, 0.3, 0.3]))
         bank.output_scale.copy_(torch.tensor([30.0, 30.0, 0.0, 0.0, 0.0, 0.0]))
     truth = GreyBox(model.vehicle, (), bank, model.actuation)
-    found = Walk(model, make_log(truth, runs=4, duration=15.0, noise=0.3), None, [], 1, 1e4, None, None)
+    found = Walk(model, make_log(truth, runs=4, duration=30.0, noise=0.3), None, [], 1, 1e4, None, None)
     found.refit()
     found.learn("mlp")
     return found
