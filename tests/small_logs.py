@@ -81,7 +81,7 @@ def make_log(
         size: multiplies the commands.
         accelerations: whether they are logged.
         uneven: share of a step by which stamps are moved.
-        command: (N, n) instead of sines.
+        command: (N, n) instead of sines, or (runs, N, n).
         first: number of the first run.
         max_step: of the integration, s.
         stir: spread of the first velocities, m/s and rad/s.
@@ -92,7 +92,7 @@ def make_log(
         t = np.arange(round(duration * rate) + 1) / rate
         t[1:-1] += uneven / rate * random.uniform(-0.5, 0.5, len(t) - 2)
         if command is not None:
-            held = command
+            held = command if command.ndim == 2 else command[number - first]
         elif model.actuation == "wrench":
             held = size * SIZES * sines(t, 6, 1000 * seed + number)
         else:

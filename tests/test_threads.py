@@ -65,3 +65,45 @@ def test_the_command_line_asks_for_it_before_torch_is_loaded():
     environment = {k: v for k, v in ENVIRONMENT.items() if k not in ("OMP_WAIT_POLICY",)}
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=environment)
     assert done.stdout.strip() == "PASSIVE", done.stderr
+
+
+class Seen(Exception):
+    """Somebody looked at an argument."""
+
+
+class Probe:
+    """An argument that notes on how many threads it is looked at, and ends the call."""
+
+    def __init__(self):
+        self.threads = []
+
+    def look(self):
+        self.threads.append((torch.get_num_threads(), set(pools().values())))
+        raise Seen
+
+    def __getattr__(self, name):
+        self.look()
+
+    def __iter__(self):
+        self.look()
+
+
+@pytest.mark.parametrize(
+    ("room", "verb"),
+    [
+        ("comparison", "compare"), ("diagnosis", "diagnose"), ("diagnosis", "diagnose_files"),
+        ("improvement", "add"), ("improvement", "improve"), ("improvement", "fleet"), ("online", "adapt"),
+        ("simulation", "simulate"), ("training", "train"), ("training", "train_files"),
+    ],
+)  # fmt: skip
+def test_every_call_that_computes_runs_on_one_thread_and_gives_the_setting_back(room, verb):
+    import importlib
+    import inspect
+
+    call = getattr(importlib.import_module(f"auvnn.{room}"), verb)
+    wanted = [p for p in inspect.signature(call).parameters.values() if p.default is p.empty]
+    probe, before = Probe(), pools()
+    with pytest.raises(Seen):
+        call(*[probe for p in wanted])
+    assert probe.threads == [(1, {1})]
+    assert torch.get_num_threads() == 2 and pools() == before

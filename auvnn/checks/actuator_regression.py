@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -29,6 +30,11 @@ EXCITED = 0.03  # of full thrust, beyond what the others explain
 SURE = 0.95
 
 
+# Root mean square misfit, in standard errors, from which on an assignment explains the log no better than chance: what
+# the model lacks is then read as one actuator doing another's work.
+SOUND = 2.0
+
+
 # Relative misfit that no chi-square counts against an assignment: geometry and inertia are not exact either.
 MODEL_ERROR = 0.15
 
@@ -51,11 +57,23 @@ class Assignment:
     place: tuple[int, ...]
     sign: tuple[int, ...]
 
-    def words(self, names: list[str]) -> list[str]:
-        """Say what differs from the model file."""
+    @property
+    def plain(self) -> bool:
+        """Whether nothing is exchanged or reversed."""
+        return self.changes == 0
+
+    @property
+    def changes(self) -> int:
+        """How many actuators are elsewhere or reversed."""
+        return sum(k != i or s < 0 for i, (k, s) in enumerate(zip(self.place, self.sign, strict=True)))
+
+    def words(self, names: list[str], silent: Collection[int] = ()) -> list[str]:
+        """Say what differs from the model file, but nothing of those actuators that nothing is known of."""
         out = []
         seen: set[int] = set()
         for i, (k, s) in enumerate(zip(self.place, self.sign, strict=True)):
+            if i in silent:
+                continue
             if k == i and s < 0:
                 out.append(f"{names[i]} is reversed")
             if k != i and i not in seen:
@@ -148,6 +166,12 @@ class _ActuatorRegression:
                     break
         return np.maximum(gains, SMALLEST_GAIN)
 
+    def spread(self, a: Assignment) -> Array:
+        """Return the standard deviations of the gains under an assignment, (n,), at most that assumed before."""
+        c = self.columns(a)
+        square = np.einsum("di,d,dj->ij", c, self.weight, c) * self.gram + np.eye(c.shape[1]) / SPREAD**2
+        return np.sqrt(np.diag(np.linalg.inv(square)))
+
     def distance(self, a: Assignment) -> float:
         """Return the mean squared distance of the estimates from an assignment, in variances."""
         return self.cost(a) / self.estimate.size
@@ -178,9 +202,10 @@ class _ActuatorRegression:
             current = best
         return current, costs
 
-    def same(self, a: Assignment, b: Assignment) -> bool:
-        """Say whether two assignments put like columns into the same places."""
-        return bool(np.allclose(self.columns(a), self.columns(b), rtol=1e-6, atol=1e-12))
+    def same(self, a: Assignment, b: Assignment, which: Sequence[int] | slice = slice(None)) -> bool:
+        """Say whether two assignments put like columns into the same places, or into some of them."""
+        mine, theirs = self.columns(a)[:, which], self.columns(b)[:, which]
+        return bool(np.allclose(mine, theirs, rtol=1e-6, atol=1e-12))
 
     def ties(self, best: Assignment, costs: dict[Assignment, float]) -> list[tuple[int, int]]:
         """Return the pairs of commands whose exchange changes the misfit by next to nothing."""

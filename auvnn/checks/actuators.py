@@ -18,15 +18,15 @@ from numpy.typing import NDArray
 from auvnn.answers import plain
 from auvnn.checks import regression
 from auvnn.checks.actuator_regression import (
-    DEAD,
     EXCITED,
+    SOUND,
     SURE,
-    TIE,
     Assignment,
     _ActuatorRegression,
     _alone,
     _names,
 )
+from auvnn.checks.actuator_verdict import by_axis, cures, independent, judged
 from auvnn.errors import AuvnnError
 from auvnn.logs import Log
 from auvnn.metrics.one_step import inertia_of
@@ -49,6 +49,8 @@ class ActuatorCheck:
         untold: actuators that the log does not move enough by themselves.
         alike: groups of actuators whose exchange would make no difference that this log could show.
         misfit: root mean square distance of the estimated columns from the stated ones, in standard errors.
+        cures: what to do about the findings.
+        axes: force or moment of all actuators together over what is stated, by axis, where they are driven together.
     """
 
     names: list[str]
@@ -60,11 +62,13 @@ class ActuatorCheck:
     untold: list[str]
     alike: list[list[str]] = field(default_factory=list)
     misfit: float = 0.0
+    cures: list[str] = field(default_factory=list)
+    axes: dict[str, float] = field(default_factory=dict)
 
     @property
     def sure(self) -> bool:
-        """Whether something is wrong, and known with a confidence of 95 %."""
-        return bool(self.findings) and self.confidence >= SURE
+        """Whether something is wrong, and known with a confidence of 95 %: what is said then also has to fit the log."""
+        return bool(self.findings) and self.confidence >= SURE and self.misfit < SOUND
 
     @property
     def words(self) -> list[str]:
@@ -73,8 +77,7 @@ class ActuatorCheck:
             return []
         what = "; ".join(self.findings)
         return [
-            f"actuators: {what} (confidence {100 * min(self.confidence, 0.999):.3g} %): check order and signs of the "
-            "command columns against the model file"
+            f"actuators: {what} (confidence {100 * min(self.confidence, 0.999):.3g} %): {'; '.join(self.cures)}"
         ]
 
     @property
@@ -90,11 +93,19 @@ class ActuatorCheck:
             if self.findings
             else f"as the model file states them ({odds})"
         ]
+        if self.misfit >= SOUND:
+            out[0] = (
+                f"{', '.join(n for n in self.names if n not in self.untold)}: the log fits neither the model file nor "
+                "reversed, exchanged or dead actuators: something else is missing, nothing is said of them"
+            )
         if self.untold:
             out.append(
                 f"nothing can be said of {', '.join(self.untold)}: not moved independently of the others"
             )
         out += [f"{' and '.join(pair)} cannot be told from each other" for pair in self.alike]
+        if self.axes and (not self.findings or self.assignment.plain):
+            shown = ", ".join(f"{a} {100 * g:.0f} %" for a, g in self.axes.items())
+            out.append(f"driven together; by axis the log shows of the stated force or moment: {shown}")
         return out
 
     def to_dict(self) -> dict[str, Any]:
@@ -108,6 +119,8 @@ class ActuatorCheck:
                 "place": dict(zip(self.names, [self.names[k] for k in self.assignment.place], strict=True)),
                 "sign": dict(zip(self.names, self.assignment.sign, strict=True)),
                 "cannot_tell": self.untold,
+                "cures": self.cures if self.findings else [],
+                **({"axes": self.axes} if self.axes else {}),
                 "alike": self.alike,
                 "story": self.story,
             }
@@ -119,7 +132,7 @@ def check_actuators(model: GreyBox, log: Log) -> ActuatorCheck:
 
     Args:
         model: the model, driven by what the log has.
-        log: measurements in which the actuators move independently of one another.
+        log: measurements in which the actuators move independently of one another, or at least their axes do.
 
     Raises:
         InputError: the log lacks the commands that drive the model.
@@ -127,58 +140,57 @@ def check_actuators(model: GreyBox, log: Log) -> ActuatorCheck:
     data = regression.regression_rows(model, log)
     names = _names(model)
     inverse = np.linalg.inv(inertia_of(model, log.runs[0]))
-    stated = inverse @ model.actuators.allocation.numpy()
+    allocation = model.actuators.allocation.numpy()
+    stated = inverse @ allocation
     # The model's own thrust is put back: what is regressed is all of the acceleration that commands cause.
     wanted = regression.without(data.nuisance, data.gap + data.thrust @ stated.T)
     thrust = regression.without(data.nuisance, data.thrust)
     full = np.maximum(np.abs(data.thrust).max(0), 1e-9)
     moved = _alone(thrust) > EXCITED * full
-    told = np.flatnonzero(moved)
-    untold = [names[i] for i in np.flatnonzero(~moved)]
+    together = not moved.all() and len(wanted) and independent(thrust / full) > 1
+    if together:
+        # Driven by an allocation: a thruster that never moves alone shows itself by the direction of what it does.
+        moved = np.sqrt((thrust**2).mean(0)) > EXCITED * full
     same = Assignment(tuple(range(len(names))), (1,) * len(names))
     gains = np.full(len(names), np.nan)
-    if len(told) == 0 or len(wanted) < 20 * len(names):
-        return ActuatorCheck(names, True, [], 0.0, same, gains, untold or names)
-    # What the log does not move independently stays as stated.
+    if not moved.any() or len(wanted) < 20 * len(names):
+        return ActuatorCheck(names, True, [], 0.0, same, gains, names)
+    axes = by_axis(data, thrust, wanted, allocation, inverse) if together else None
+    # What the log does not move stays as stated.
     wanted = np.asarray(wanted - thrust[:, ~moved] @ stated[:, ~moved].T, dtype=np.float64)
-    problem = _ActuatorRegression.of(
-        data, thrust[:, told], wanted, np.asarray(stated[:, told], dtype=np.float64)
+    columns = np.asarray(stated[:, moved], dtype=np.float64)
+    problem = _ActuatorRegression.of(data, thrust[:, moved], wanted, columns)
+    found = judged(problem)
+    told = [int(i) for i in np.flatnonzero(moved)[found.told]]
+    if len(told) == 0:
+        return ActuatorCheck(names, True, [], 0.0, same, gains, names, axes=axes.to_dict() if axes else {})
+    which = np.flatnonzero(moved).tolist()
+    place, sign = list(same.place), list(same.sign)
+    for k, i in enumerate(which):
+        place[i], sign[i] = which[found.best.place[k]], found.best.sign[k]
+    gains[told] = found.gains[found.told]
+    dead = [i for i, gone in zip(which, found.dead, strict=True) if gone]
+    words = Assignment(tuple(place), tuple(sign)).words(
+        names, silent=[*dead, *(i for i in which if i not in told)]
     )
-    place = {int(i): k for k, i in enumerate(told)}
-    best, costs = problem.search()
-    found = Assignment(
-        tuple(int(told[best.place[place[i]]]) if i in place else i for i in range(len(names))),
-        tuple(best.sign[place[i]] if i in place else 1 for i in range(len(names))),
-    )
-    cost = np.array(list(costs.values()))
-    least = float(cost.min())
-    rivals = np.exp(-0.5 * (cost - least))
-    alike = [[names[told[i]], names[told[j]]] for i, j in problem.ties(best, costs)]
-    confidence = float(
-        np.exp(-0.5 * (costs[best] - least))
-        / (
-            rivals.sum()
-            - sum(
-                rivals[k]
-                for k, a in enumerate(costs)
-                if a != best and costs[a] - least < TIE and problem.same(a, best)
-            )
-        )
-    )
-    gains[told] = problem.gains(best)
-    words = found.words(names)
-    dead = [i for i in told if gains[i] < DEAD]
-    words += [f"{names[i]} gives {100 * gains[i]:.0f} % of the stated thrust" for i in dead]
+    words += [
+        f"{names[i]} gives {100 * gains[i]:.0f} % of the stated thrust, whatever it is told" for i in dead
+    ]
+    confidence, misfit = found.confidence, float(np.sqrt(problem.distance(found.best)))
+    if axes is not None and axes.explains_more(found):
+        words, confidence, misfit = axes.findings, axes.confidence, axes.misfit
     return ActuatorCheck(
         names,
         not words,
         words,
         confidence,
-        found,
+        Assignment(tuple(place), tuple(sign)),
         gains,
-        untold,
-        alike,
-        float(np.sqrt(problem.distance(best))),
+        [n for i, n in enumerate(names) if i not in told],
+        [[names[which[i]] for i in pair] for pair in found.ties],
+        misfit,
+        cures(words),
+        {} if axes is None else axes.to_dict(),
     )
 
 

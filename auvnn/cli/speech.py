@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, TextIO
 
 from auvnn.errors import one_line
 
 # Seconds between two lines of progress where nobody sits at a terminal.
 NOW_AND_THEN = 30.0
+# Seconds of silence after which a person at a terminal is told that work goes on, and between two such signs.
+SILENT, SIGN = 2.0, 1.0
 
 
 class Speaker:
@@ -26,21 +31,25 @@ class Speaker:
         self._shown = False
         self._clock = clock
         self._began = self._spoken = clock()
-        # Of what is counted: how many steps there are, how many were done when it was first heard of, and when.
-        self._count: tuple[int, int, float] | None = None
+        self._doing: str = "working"
+        self._lock = threading.RLock()
+        # Of what is counted: how many steps there are, how many were done when it was first heard of and when, how many
+        # are done and since when.
+        self._count: tuple[int, int, float, int, float] | None = None
 
     def __call__(self, text: str, style: str | None = None) -> None:
         """Say one line."""
         if self.only_json:
             return
-        self._clear()
-        self._spoken = self._clock()
-        if sys.stdout.isatty():
-            from rich.console import Console  # it knows NO_COLOR and dumb terminals
+        with self._lock:
+            self._clear()
+            self._spoken = self._clock()
+            if sys.stdout.isatty():
+                from rich.console import Console  # it knows NO_COLOR and dumb terminals
 
-            Console(soft_wrap=True).print(text, style=style, markup=False, highlight=False)
-        else:
-            print(text, flush=True)
+                Console(soft_wrap=True).print(text, style=style, markup=False, highlight=False)
+            else:
+                print(text, flush=True)
 
     def answer(self, data: dict[str, Any]) -> None:
         """Print the JSON answer if that is what was asked for."""
@@ -54,17 +63,75 @@ class Speaker:
         """
         if self.only_json:
             return
-        now = self._clock()
-        told = f"{one_line(words, 200)} ({self._times(words, now)})"
-        if self.verbose:
-            self._clear()
-            print(f"progress  {told}", file=sys.stderr, flush=True)
-        elif sys.stderr.isatty():
-            print(f"\r\x1b[K{one_line(told, 100)}", end="", file=sys.stderr, flush=True)
-            self._shown = True
-        elif now - self._spoken >= NOW_AND_THEN:
-            print(f"progress  {told}", file=sys.stderr, flush=True)
+        with self._lock:
+            now = self._clock()
+            self._doing = words
+            told = f"{one_line(words, 200)} ({self._times(words, now)})"
+            if self.verbose:
+                self._clear()
+                print(f"progress  {told}", file=sys.stderr, flush=True)
+                self._spoken = now
+            elif sys.stderr.isatty():
+                self._draw(words, self._times(words, now))
+                self._spoken = now
+            elif now - self._spoken >= NOW_AND_THEN:
+                print(f"progress  {told}", file=sys.stderr, flush=True)
+                self._spoken = now
+
+    @contextmanager
+    def ticking(self, words: str) -> Iterator[None]:
+        """Give signs of life while something runs that tells nothing for a while.
+
+        At a terminal the line with what is being done is drawn anew each second, time passing; redirected, it is said
+        again now and then.
+
+        Args:
+            words: what is being done, until somebody says more.
+        """
+        if self.only_json:
+            yield
+            return
+        self._doing = words
+        stop = threading.Event()
+
+        def tick() -> None:
+            while not stop.wait(SIGN):
+                self.sign()
+
+        thread = threading.Thread(target=tick, name="auvnn-progress", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            stop.set()
+            thread.join()
+            with self._lock:
+                self._clear()
+
+    def sign(self) -> None:
+        """Say that the same is still being done, if nothing has been said for long enough."""
+        with self._lock:
+            now = self._clock()
+            alone = sys.stderr.isatty() and not self.verbose
+            if now - self._spoken < (
+                SILENT if alone and not self._shown else SIGN if alone else NOW_AND_THEN
+            ):
+                return
+            if alone:
+                self._draw(self._doing, self._times(self._doing, now))
+            else:
+                print(
+                    f"progress  {one_line(self._doing, 200)} ({self._times(self._doing, now)})",
+                    file=sys.stderr,
+                    flush=True,
+                )
             self._spoken = now
+
+    def _draw(self, words: str, times: str) -> None:
+        """Put words and times into the terminal's last line; what is too long is cut, not the times."""
+        room = max(shutil.get_terminal_size((100, 24)).columns - len(times) - 4, 20)
+        print(f"\r\x1b[K{one_line(words, min(room, 100))} ({times})", end="", file=sys.stderr, flush=True)
+        self._shown = True
 
     def _times(self, words: str, now: float) -> str:
         """Return the time since the start and, where the words carry a count, what is done and the time left."""
@@ -72,12 +139,18 @@ class Speaker:
         done, total = getattr(words, "done", None), getattr(words, "total", None)
         if not isinstance(done, int) or not isinstance(total, int) or total < 1:
             return gone
-        if self._count is None or self._count[0] != total or done < self._count[1]:
-            self._count = (total, done, now)
-        _, first, since = self._count
-        out = f"{done} of {total} done, {gone}"
+        # Fewer steps done than before, or fewer in all: this is other work, whose time is counted afresh.
+        if self._count is None or total < self._count[0] or done < self._count[3]:
+            self._count = (total, done, now, done, now)
+        _, first, since, before, reached = self._count
+        self._count = (total, first, since, done, now if done > before else reached)
+        about = "about " if getattr(words, "rough", False) else ""
+        out = f"{done} of {about}{total} done, {gone}"
         if done > first:
-            out += f", about {duration((now - since) / (done - first) * (total - done))} left"
+            # What the step in hand has taken so far is no longer to come.
+            one = (self._count[4] - since) / (done - first)
+            left = max(one * (total - done) - (now - self._count[4]), 0.0)
+            out += f", about {duration(left)} left"
         return out
 
     def _clear(self) -> None:

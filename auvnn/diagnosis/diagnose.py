@@ -28,6 +28,7 @@ from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
 from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
+from auvnn.progress import Counted
 from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
 
@@ -137,7 +138,7 @@ def searched(
         costs: say what each name costs in free running.
         progress: told in words what is being done.
     """
-    say = progress or (lambda words: None)
+    say = Counted(progress, 8 + 4 * bool(costs) + bool(whiteness) + 3 * bool(advice), rough=True)
     if max_effects < 1:
         raise ConfigError(f"max_effects={max_effects} must be at least 1")
     log = completed(model, log)

@@ -30,6 +30,7 @@ from auvnn.metrics.rollouts import Rolled, roll, scale_of
 from auvnn.metrics.unmeasured import completed
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
+from auvnn.progress import Progress
 
 Array = NDArray[np.float64]
 # Horizons of free running, s: the longest that what is left out can bear.
@@ -180,15 +181,15 @@ def _of_names(
     A coefficient group that is among the names, and absent, stays as stated.
     """
     words = " and ".join(names) or "what is uncertain"
-    say(f"fitting {words}")
+    folds = folds_of(log, most)
+    say(Progress(f"fitting {words}", 0, len(folds) + 1))
     base = [
         n for n in layout.names if n not in (*names, *absent) or (n in layout.nuisance and n not in absent)
     ]
     found = fitter.fit(layout, base, names, start)
     out, reason = [], ""
-    folds = folds_of(log, most)
     for k, fold in enumerate(folds):
-        say(f"fitting {words} without part {k + 1} of {len(folds)}")
+        say(Progress(f"fitting {words} without part {k + 1} of {len(folds)}", k + 1, len(folds) + 1))
         try:
             own = fitter.without(layout, found, fold, refit)
         except (FitError, FloatingPointError, np.linalg.LinAlgError) as problem:

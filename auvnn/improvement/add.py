@@ -26,6 +26,7 @@ from auvnn.metrics.rollouts import HORIZONS
 from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
 from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
+from auvnn.progress import Progress
 from auvnn.threads import on_one_thread
 
 
@@ -90,7 +91,8 @@ def add(
         raise ConfigError(f"horizons={list(horizons)}: '5' must be among them, the gain is measured there")
     fits = fit_steps(model, log, names, objective=objective, window=window, derivative=derivative, say=say)
     notes += unseen(fits.layout, fits.best, names, log)
-    say("free running on the held-out data")
+    steps = 2 * len(names) + 1 if len(names) > 1 else 3
+    say(Progress("free running on the held-out data", steps - 1, steps))
     judged = judge(fits, names, test, horizons, derivative, objective == "one_step")
     return _assembled(model, log, test, names, fits, judged, objective, held_out, notes, derivative)
 

@@ -14,6 +14,7 @@ from auvnn.errors import InputError
 from auvnn.estimation.prediction_error import FitError
 from auvnn.logs import Log
 from auvnn.models import GreyBox
+from auvnn.progress import Counted
 
 GIVEN, REFITTED = "as given", "coefficients refitted"
 
@@ -73,6 +74,7 @@ def fit_steps(
     layout = lay_out(model, list(names))
     fitter = fitter_for(model, log, objective, window=window, derivative=derivative)
     base = [n for n in layout.names if n not in names or n in layout.nuisance]
+    say = Counted(say, 2 * len(names) + 1 if len(names) > 1 else 3)
     say("refitting the uncertain coefficients alone")
     # A coefficient group that is itself to be added stays as stated in the model that is compared with.
     nothing = fitter.fit(layout, [n for n in base if n not in names], (), None)

@@ -24,6 +24,8 @@ from auvnn.improvement.trend import Trend, trend
 from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.portions import kind_of, log_files
 from auvnn.models import GreyBox
+from auvnn.progress import Progress
+from auvnn.threads import on_one_thread
 
 # Level of the tests over dives, shared by all parameters (Bonferroni).
 LEVEL = 0.05
@@ -70,6 +72,7 @@ class Fleet(Answer):
         return plain({"schema": "auvnn/fleet/1", **{n: getattr(self, n) for n in names}})
 
 
+@on_one_thread
 def fleet(
     model: GreyBox | str | Path,
     logs: str | Path | Sequence[str | Path],
@@ -132,8 +135,9 @@ def fleet(
     question = Question(model, tuple(names), Mapping.read(mapping), window, windows, force)
     dives, failed = [], []
     with executor_for(executor, workers, address) as pool:
+        say(Progress(f"fitting {len(paths)} dives", 0, len(paths)))
         for path, found in zip(paths, pool.run(dive, question, paths, losses=True), strict=True):
-            say(f"fitted {path}")
+            say(Progress(f"fitted {path}", len(dives) + len(failed) + 1, len(paths)))
             if isinstance(found, Lost):
                 found = str(found)
             if isinstance(found, str):

@@ -98,7 +98,7 @@ class FreeRunFit:
         low, high = limits(model, self.names, priors)
         hessian = self.hessian[keep].sum(0) + self.weight * np.diag(priors.precision)
         slope = self.slope[keep].sum(0) - self.weight * priors.precision * (self.theta - priors.mean)
-        return np.clip(self.theta + _step(hessian, slope, self.theta, low, high, 0.0), low, high)
+        return np.clip(self.theta + newton_step(hessian, slope, self.theta, low, high, 0.0), low, high)
 
     def foreseen(self, theta: Array, chosen: NDArray[np.bool_]) -> float:
         """Return the squared error of some windows at other parameters, to second order about the fit."""
@@ -108,7 +108,8 @@ class FreeRunFit:
         )
 
 
-def _step(hessian: Array, slope: Array, theta: Array, low: Array, high: Array, damping: float) -> Array:
+def newton_step(hessian: Array, slope: Array, theta: Array, low: Array, high: Array, damping: float) -> Array:
+    """Return a damped Gauss-Newton step within bounds, (P,); none where the sums are not finite."""
     if not (np.isfinite(hessian).all() and np.isfinite(slope).all()):
         return np.zeros(len(theta))
     return NormalEquations(hessian, slope).bounded(low - theta, high - theta, damping=damping)
@@ -202,7 +203,7 @@ def fit_free_run(
         total = hessian[keep].sum(0) + weight * np.diag(priors.precision)
         downhill = slope[keep].sum(0) - weight * priors.precision * (theta - priors.mean)
         for _trial in range(TRIALS):
-            set_parameters(model, names, theta + _step(total, downhill, theta, low, high, damping))
+            set_parameters(model, names, theta + newton_step(total, downhill, theta, low, high, damping))
             reached = parameters_of(model, names)
             then = float(costs(model, task)[keep].sum()) + penalty(reached)
             if then < now:

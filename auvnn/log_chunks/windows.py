@@ -23,6 +23,7 @@ from auvnn.log_chunks.scan import CHANGED, Part, Plan, ScanState, WindowCut, _co
 from auvnn.logs import Run
 from auvnn.logs.reading.portions import read_portion
 from auvnn.metrics.windows import Piece, Windows, commands, gathered
+from auvnn.progress import each
 
 Array = NDArray[np.float64]
 
@@ -41,8 +42,7 @@ def plan_files(
         InputError: a file cannot be read, or none has a window.
     """
     found = []
-    for path in paths:
-        say(f"looking through {path}")
+    for path in each(paths, say, lambda path: f"looking through {path}"):
         found.append(plan_file(cut, path))
     return concatenate_windows(found)
 

@@ -21,6 +21,8 @@ from auvnn.online.adapter import Adapter
 from auvnn.online.frozen import frozen_errors
 from auvnn.online.guards import REASONS, Guards
 from auvnn.online.update import Update
+from auvnn.progress import Progress
+from auvnn.threads import on_one_thread
 
 Array = NDArray[np.float64]
 
@@ -65,6 +67,7 @@ class Adaptation(Answer):
         )
 
 
+@on_one_thread
 def adapt(
     model: GivenModel,
     log: GivenLog,
@@ -127,7 +130,8 @@ def adapt(
         frozen.append(_frozen(adapter, run, rows, snapshots, started, warnings))
         if progress is not None:
             done = sum(u.adapted for u in own)
-            progress(f"run {run.number}: {run.samples} samples, {done} learned from")
+            words = f"run {run.number}: {run.samples} samples, {done} learned from"
+            progress(Progress(words, sum(r.samples for r in log.runs[: number + 1]), log.samples))
     if state is not None:
         adapter.save(state)
     every = [u for own in updates for u in own]

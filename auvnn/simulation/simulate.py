@@ -27,6 +27,7 @@ from auvnn.simulation.requests import _can_be_hidden, _check, _told
 from auvnn.simulation.worlds import World, make_world
 from auvnn.simulation.worlds.law import disturbed, drawn_laws
 from auvnn.simulation.worlds.sensing import Sensing
+from auvnn.threads import on_one_thread
 
 Array = NDArray[np.float64]
 
@@ -57,6 +58,7 @@ class Simulation:
     motion: Motion | None = None
 
 
+@on_one_thread
 def simulate(
     model: GivenModel,
     excitation: str | Mapping[str, Any] = "multisine",

@@ -53,6 +53,12 @@ class Fit:
     energy: tuple[str, ...] = ()
 
 
+def most_iterations(description: str | Mapping[str, Any] | Scheme) -> int:
+    """Return how many iterations or epochs a scheme takes at most."""
+    options = build_scheme(description).options()
+    return int(options.get("max_iterations") or options.get("epochs") or 1)
+
+
 def build_scheme(description: str | Mapping[str, Any] | Scheme) -> Scheme:
     """Build a scheme from its name or from `{scheme: name, <options>}`.
 

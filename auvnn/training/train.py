@@ -23,9 +23,11 @@ from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
 from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
+from auvnn.progress import Progress
+from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
 from auvnn.training.confounding.confounding import Confounding
-from auvnn.training.fit_damping import Fit, fit_damping
+from auvnn.training.fit_damping import Fit, fit_damping, most_iterations
 from auvnn.training.history import Record
 from auvnn.training.objectives.base import build_objective
 from auvnn.training.problem import DampingProblem
@@ -85,6 +87,7 @@ class Training(Answer):
         )
 
 
+@on_one_thread
 def train(
     model: GivenModel,
     log: GivenLog,
@@ -153,10 +156,12 @@ def train(
     # What decides when to stop is a part of the log itself: the test log is for judging alone.
     fitted, stopping, stop_words = log.split(STOPPING)
     bank = DampingBank.from_description(damping, seed)
+    most = most_iterations(scheme)
 
     def told(record: Record) -> None:
         if progress is not None and record.iteration % 10 == 0:
-            progress(f"iteration {record.iteration}: worst relative error {record.worst:.3g}")
+            words = f"iteration {record.iteration}: worst relative error {record.worst:.3g}"
+            progress(Progress(words, record.iteration, max(most, record.iteration), rough=True))
 
     def one_step_fit(how: Derivative, folder: str | Path | None) -> tuple[GreyBox, Fit, Array, int]:
         problem, held, nu, held_samples = _problem(model, fitted, stopping, how)

@@ -31,6 +31,8 @@ from auvnn.log_chunks.samples import Pieces, Reading, evenly_spread_runs
 from auvnn.logs import Log
 from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.models import GreyBox
+from auvnn.progress import Progress
+from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
 from auvnn.training.distributed.data_split import (
     DataSplit,
@@ -44,7 +46,7 @@ from auvnn.training.distributed.data_split import (
 from auvnn.training.distributed.distributed_problem import DistributedProblem
 from auvnn.training.distributed.grouped_sums import GROUP
 from auvnn.training.distributed.target_cache import Source
-from auvnn.training.fit_damping import build_scheme, fit_damping
+from auvnn.training.fit_damping import build_scheme, fit_damping, most_iterations
 from auvnn.training.held_out import score
 from auvnn.training.history import Record
 from auvnn.training.objectives.base import build_objective
@@ -65,6 +67,7 @@ def spreads(
     return build_scheme(scheme).parted and build_objective(objective).name == "one_step"
 
 
+@on_one_thread
 def train_files(
     model: GreyBox,
     log: str | Path | Sequence[str | Path],
@@ -153,8 +156,11 @@ def train_files(
             some.quality().refuse_errors(force)
         problem, held = _problem(pool, Source.of(model, how, plan, Path(folder)), shares, group, say)
 
+        most = most_iterations(scheme)
+
         def told(record: Record) -> None:
-            say(f"iteration {record.iteration}: worst relative error {record.worst:.3g}")
+            words = f"iteration {record.iteration}: worst relative error {record.worst:.3g}"
+            say(Progress(words, record.iteration, max(most, record.iteration), rough=True))
 
         own = copy.deepcopy(bank)
         fit = fit_damping(

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import os
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -119,3 +122,87 @@ def test_redirected_progress_is_a_line_now_and_then(capsys):
 def test_json_alone_is_silent(capsys):
     Speaker(only_json=True, verbose=True).progress("working")
     assert capsys.readouterr() == ("", "")
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self):
+        return True
+
+
+def last_line(stream: Terminal) -> str:
+    return stream.getvalue().rsplit("\r\x1b[K", 1)[-1]
+
+
+def test_at_a_terminal_one_line_tells_what_is_done_and_to_come_and_the_time_left(monkeypatch):
+    clock, terminal = Clock(), Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    say = Speaker(clock=clock)
+    for done in range(3):
+        say.progress(Progress("dive", done, 6))
+        clock.now += 20.0
+    assert last_line(terminal) == "dive (2 of 6 done, 40 s, about 1 min 20 s left)"
+    assert "\n" not in terminal.getvalue()
+    # Ten seconds of work inside the same step: what has passed of it is no longer to come.
+    clock.now -= 10.0
+    say.progress(Progress("dive", 2, 6))
+    assert last_line(terminal) == "dive (2 of 6 done, 50 s, about 1 min 10 s left)"
+    # The next work begins a count of its own, without a guess from the one before.
+    say.progress(Progress("weights", 0, 4, rough=True))
+    assert last_line(terminal) == "weights (0 of about 4 done, 50 s)"
+
+
+def test_more_steps_than_foreseen_keep_the_estimate(monkeypatch):
+    clock, terminal = Clock(), Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    say = Speaker(clock=clock)
+    for done, total in ((0, 4), (1, 4), (2, 4), (3, 6)):
+        say.progress(Progress("search", done, total, rough=True))
+        clock.now += 10.0
+    assert last_line(terminal) == "search (3 of about 6 done, 30 s, about 30 s left)"
+
+
+def test_silent_work_at_a_terminal_shows_that_it_goes_on(monkeypatch):
+    clock, terminal = Clock(), Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    say = Speaker(clock=clock)
+    say.sign()
+    assert terminal.getvalue() == "", "short work needs no sign"
+    clock.now += 3.0
+    say.sign()
+    assert last_line(terminal) == "working (3 s)"
+    say.progress("fitting")
+    clock.now += 1.5
+    say.sign()
+    assert last_line(terminal) == "fitting (4 s)"
+
+
+def test_silent_work_that_is_redirected_says_a_line_now_and_then(capsys):
+    clock = Clock()
+    say = Speaker(clock=clock)
+    say.progress(Progress("fitting", 1, 3))
+    for _ in range(65):
+        clock.now += 1.0
+        say.sign()
+    assert capsys.readouterr().err.splitlines() == [
+        "progress  fitting (1 of 3 done, 30 s)",
+        "progress  fitting (1 of 3 done, 1 min 00 s)",
+    ]
+
+
+def test_ticking_gives_signs_and_clears_its_line(monkeypatch):
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setattr("auvnn.cli.speech.SIGN", 0.01)
+    monkeypatch.setattr("auvnn.cli.speech.SILENT", 0.02)
+    say = Speaker()
+    with say.ticking("comparing"):
+        for _ in range(200):
+            if "comparing" in terminal.getvalue():
+                break
+            time.sleep(0.02)
+    shown = terminal.getvalue()
+    assert "comparing (0 s)" in shown or "comparing (1 s)" in shown
+    assert shown.endswith("\r\x1b[K")
+    assert not any(t.name == "auvnn-progress" and t.is_alive() for t in threading.enumerate())

@@ -177,7 +177,8 @@ def _run(verb: Verb, composer: Composer, config: DictConfig, out: Path) -> None:
         say.answer(verb.run(Job(options, out, out, say)).to_dict())
         return
     with written(out, overwrite=options["overwrite"]) as folder:
-        answer = verb.run(Job(options, out, folder, say))
+        with say.ticking("working"):
+            answer = verb.run(Job(options, out, folder, say))
         write_text(folder / ".hydra" / "config.yaml", OmegaConf.to_yaml(config))
         write_text(folder / ".hydra" / "overrides.yaml", OmegaConf.to_yaml(HydraConfig.get().overrides.task))
     say(f"written   {', '.join(verb.writes)} in {out}")

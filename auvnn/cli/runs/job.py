@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from auvnn.cli.notes import noted
 from auvnn.cli.runs.folder import WORK
 from auvnn.cli.speech import Speaker
 from auvnn.errors import ConfigError, InputError
@@ -57,12 +58,14 @@ class Job:
         out: the folder that the user will find.
         folder: where to write now; it becomes `out` when all is there.
         say: speaks to the user.
+        said: what it was warned of.
     """
 
     options: dict[str, Any]
     out: Path
     folder: Path
     say: Speaker = field(default_factory=Speaker)
+    said: set[str] = field(default_factory=set)
 
     def __getitem__(self, key: str) -> Any:
         """Return an option."""
@@ -102,7 +105,7 @@ class Job:
         name = source if source == model.vehicle.name else f"{source}: {model.vehicle.name}"
         self.say(f"model     {name}; effects: {effects}; learned damping: {learned}")
         for warning in model.vehicle.warnings:
-            self.say(f"assumed   {warning}", style="yellow")
+            self._once("assumed", warning)
         return model
 
     def log(self, key: str = "log", *, repairs: bool = True, partial: bool = False) -> Log:
@@ -130,8 +133,8 @@ class Job:
         self.say(f"{key:<9} {names}: {extent}")
         if "force" in self.options:  # whoever fits refuses what `check` calls an error
             log.quality().refuse_errors(bool(self["force"]))
-        for repair in log.repairs if repairs else ():
-            self.say(f"{repair.level:<9} {repair}", style="yellow")
+        for level, words in noted(log.repairs) if repairs else ():
+            self.say(f"{level:<9} {words}", style="yellow" if level != "info" else None)
         if not partial:
             log.refuse_unmeasured()
         return log
@@ -146,9 +149,14 @@ class Job:
         return None if self.options.get("test") is None else self.log("test", partial=partial)
 
     def warn(self, warnings: list[str]) -> None:
-        """Say what the answer warns of."""
+        """Say what the answer warns of, unless it has been said before."""
         for warning in warnings:
-            self.say(f"warning   {warning}", style="yellow")
+            self._once("warning", warning)
+
+    def _once(self, kind: str, words: str) -> None:
+        if words not in self.said:
+            self.say(f"{kind:<9} {words}", style="yellow")
+        self.said.add(words)
 
     @property
     def checkpoint(self) -> Path:

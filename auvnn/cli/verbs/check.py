@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from auvnn.cli.notes import once
 from auvnn.cli.runs.dry import foreseen
 from auvnn.cli.runs.job import Answering, Job, Verb, files
 
@@ -59,11 +60,10 @@ def _run(job: Job) -> Answering:
     if job["model"] is not None and not log.unmeasured:
         quality = quality.with_actuators(check_actuators(job.model(log), log))
     quality.write(job.folder)
-    findings = quality.to_dict()["findings"]
-    for finding in findings:
-        level = finding["level"]
-        cure = f"; {finding['cure']}" if finding["cure"] else ""
-        job.say(f"{level:<9} {finding['where']}: {finding['what']}{cure}", style=_STYLE.get(level))
+    findings = quality.findings
+    for first, words in once(findings):
+        cure = f"; {first.cure}" if first.cure else ""
+        job.say(f"{first.level:<9} {words}{cure}", style=_STYLE.get(first.level))
     if not findings:
         job.say("result    nothing to complain of")
     if quality.actuators is not None:

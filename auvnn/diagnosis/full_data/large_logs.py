@@ -45,11 +45,14 @@ from auvnn.logs import Log
 from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.portions import log_files
 from auvnn.models import GreyBox
+from auvnn.progress import Progress
+from auvnn.threads import on_one_thread
 
 # Windows for the search, and for the look and the fit; effects of the catalogue that are looked at beside those found.
 SEARCH, WINDOWS, LEADING = 240, 1000, 8
 
 
+@on_one_thread
 def diagnose_files(
     model: GreyBox,
     log: str | Path | Sequence[str | Path],
@@ -159,8 +162,9 @@ def _plan_one(cut: WindowCut, path: Path) -> Plan | InputError:
 
 def _planned(pool: Executor, paths: Sequence[Path], cut: WindowCut, say: Callable[[str], None]) -> Plan:
     good, bad = [], []
-    for path, found in zip(paths, pool.run(_plan_one, cut, list(paths)), strict=True):
-        say(f"looking through {path}")
+    answers = zip(paths, pool.run(_plan_one, cut, list(paths)), strict=True)
+    for k, (path, found) in enumerate(answers, 1):
+        say(Progress(f"looking through {path}", k, len(paths)))
         (bad if isinstance(found, InputError) else good).append(found)
     # One file alone that cannot be read is the user's; one of many is left out and told.
     if not good:

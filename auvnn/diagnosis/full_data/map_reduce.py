@@ -30,6 +30,7 @@ from auvnn.estimation.sufficient_statistics import (
 from auvnn.executors import Executor
 from auvnn.log_chunks.scan import Part, WindowCut
 from auvnn.log_chunks.windows import windows_of
+from auvnn.progress import Progress
 
 Array = NDArray[np.float64]
 
@@ -159,5 +160,5 @@ class MapReduce:
         self, function: Callable[[Any, Any], Any], point: LinearisationPoint, words: str
     ) -> Iterator[Any]:
         for k, answer in enumerate(self.executor.run(function, point, self.tasks), 1):
-            self.say(f"{words}: part {k} of {len(self.tasks)}")
+            self.say(Progress(f"{words}: part {k} of {len(self.tasks)}", k, len(self.tasks)))
             yield answer

@@ -20,7 +20,8 @@ class InputForces(Effect):
     """tau_i <- tau_i + sum_xk theta_ixk f_k(x), over measured inputs x and simple functions f of each.
 
     Of an angle f are sine and cosine of it and of its double; of anything else, as z in standard deviations about
-    its mean, z, z^2 and |z| z. A probe of the diagnosis and of nothing else.
+    its mean, z, z^2 and |z| z. A fin's force grows with the square of the speed: in the place of z^2 there is
+    (u^2 + v^2 + w^2) delta, in units of its own size. A probe of the diagnosis and of nothing else.
     """
 
     name = "input_forces"
@@ -76,7 +77,10 @@ class InputForces(Effect):
         self.inputs = inputs
         self.keep("mean", mean.numpy())
         self.keep("spread", np.where(still.numpy(), 1.0, size.numpy()))
+        pressed = _pressed(values[:, :3], values)
+        self.keep("pressure", np.maximum(pressed.std(0).numpy(), 1e-9))
         self._moving = moving
+        self._fins = [names[k].startswith("fin_") for k in moving]
         self._angle = [names[k] in ANGLES for k in moving]
 
     def columns(self, axis: int, name: str | None = None) -> NDArray[np.int64]:
@@ -100,16 +104,26 @@ class InputForces(Effect):
             moment.time, moment.position, euler, moment.nu, moment.command,
             moment.fins, moment.voltage, moment.altitude,
         ).detach()  # fmt: skip
+        features = self.features(raw)
+        return features @ self.theta.to(features).unflatten(0, (6, -1)).mT
+
+    def features(self, raw: Tensor) -> Tensor:
+        """Return the functions of all inputs (..., I) side by side."""
         parts = []
-        for k, angle in zip(self._moving, self._angle, strict=True):
+        pressed = _pressed(raw[..., :3], raw) / torch.as_tensor(self.kept("pressure")).to(raw)
+        for k, angle, fin in zip(self._moving, self._angle, self._fins, strict=True):
             x = raw[..., k]
             if angle:
                 parts += [torch.sin(x), torch.cos(x), torch.sin(2 * x), torch.cos(2 * x)]
             else:
                 z = (x - self.kept("mean")[k]) / self.kept("spread")[k]
-                parts += [z, z * z, z.abs() * z]
-        features = torch.stack(parts, dim=-1)
-        return features @ self.theta.to(features).unflatten(0, (6, -1)).mT
+                parts += [z, pressed[..., k] if fin else z * z, z.abs() * z]
+        return torch.stack(parts, dim=-1)
+
+
+def _pressed(velocity: Tensor, raw: Tensor) -> Tensor:
+    """Return inputs times the square of the speed, (..., I): what goes with a fin's dynamic pressure."""
+    return (velocity**2).sum(-1, keepdim=True) * raw
 
 
 def _euler(quaternion: Tensor) -> Tensor:

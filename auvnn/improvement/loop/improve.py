@@ -14,7 +14,7 @@ from typing import Any
 
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.errors import ConfigError
-from auvnn.improvement.loop import learned
+from auvnn.improvement.loop import learned, networks
 from auvnn.improvement.loop.answer import LEARNED, PREDICTS, REFITTED, Improved
 from auvnn.improvement.loop.budget import budget
 from auvnn.improvement.loop.causes import Causes
@@ -57,7 +57,8 @@ def improve(
         test: what the budget is judged on, once, at the end; by default the last run of `log`, or the last 30 % of a
             single one, which is then not fitted.
         effects: names that may be added; the whole catalogue by default.
-        learn: what may be learned where names end: "polynomial" (drag of every coupling), "residual_force".
+        learn: what may be learned where names end: "polynomial" (drag of every coupling), "mlp" (damping
+            subnetworks), "residual_force".
         max_effects: add at most this many names.
         seconds: start nothing new after this time; what has been accepted by then is kept.
         diagnosing: ask the diagnosis for causes; without it names are looked for by prediction alone.
@@ -135,6 +136,7 @@ class Walk(Causes):
             if not shortlist:
                 return
             begin = self._before()
+            self.say("looking through the catalogue for what foresees better")
             promised = promises(self.model, self.judge, begin or self.state, shortlist, self.say)
             # Later rounds look again only at what promised anything.
             shortlist = [p.effect for p in promised if p.fall > PROMISE] or shortlist[:0]
@@ -166,6 +168,9 @@ class Walk(Causes):
         """Learn what has no name, if it pays."""
         if self.late():
             return
+        if kind == networks.FORM:
+            self._networks()
+            return
         begin = self._before() or self.state
         self.say(f"looking at {kind.replace('_', ' ')}")
         try:
@@ -194,6 +199,25 @@ class Walk(Causes):
                 )
         held = choice.recipe.ridge[name]
         self._take(best, name, LEARNED, f"of {choice.words}, held within {held:g} of its scale")
+
+    def _networks(self) -> None:
+        """Train damping subnetworks, with the coefficients as they are and fitted anew beside them, if that pays."""
+        if self.model.damping is not None or len(self.judge.folds.numbers) < 3:
+            return
+        begin = self._before() or self.state
+        state = self._try(
+            lambda: networks.trained(self.model, self.judge, begin, self.how), "training damping subnetworks"
+        )
+        if state is None:
+            return
+        again = None
+        if not self.late():
+            again = self._try(
+                lambda: fitted(self.model, self.judge, state.recipe, state, steps=4),
+                "fitting the coefficients beside the subnetworks",
+            )
+        best = min((s for s in (state, again) if s is not None), key=lambda s: s.left.total)
+        self._take(best, networks.FORM, LEARNED, "damping subnetworks, trained one step ahead")
 
     def polish(self) -> None:
         """Fit what has been taken over other lengths of windows, and keep what foresees best."""

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.hypotheses.layout import Layout
 from auvnn.effects import Effect, effect_class
 from auvnn.effects.residual_force import INPUTS, ResidualForce
-from auvnn.estimation.nuisance import NormalEquations
-from auvnn.estimation.priors import set_parameters
-from auvnn.improvement.free_run import FreeRunFit, normal_equations
+from auvnn.estimation.priors import limits, set_parameters
+from auvnn.improvement.free_run import FreeRunFit, newton_step, normal_equations
 from auvnn.improvement.loop.judge import Judge
 from auvnn.improvement.loop.screen import PROMISE, WINDOWS
 from auvnn.improvement.loop.state import Recipe, State, held_by, laid_out, starting
@@ -40,7 +39,7 @@ SUBSETS = (
 )
 # Of terms that promise at least this share of what the best one does, the one with the fewest weights is fitted too.
 NEARLY = 0.8
-KINDS = ("polynomial", "residual_force")
+KINDS = ("polynomial", "mlp", "residual_force")
 EFFECT = {"polynomial": "learned_drag", "residual_force": "residual_force"}
 
 
@@ -150,6 +149,7 @@ def _foreseen(
     held = held_by(layout, names, recipe)
     total = 0.0
     precision, mean = held.precision[index], held.mean[index]
+    low, high = limits(layout.model, names, held)
     fit = FreeRunFit(
         tuple(names),
         begin[index],
@@ -166,9 +166,10 @@ def _foreseen(
             continue
         theta = fit.theta
         if keep.any():
-            hessian_of, slope_of = fit.hessian[keep].sum(0), fit.slope[keep].sum(0)
-            known = NormalEquations.with_priors(hessian_of, slope_of, weight * precision, theta - mean)
-            theta = theta + known.solve()
+            square = fit.hessian[keep].sum(0) + weight * np.diag(precision)
+            downhill = fit.slope[keep].sum(0) - weight * precision * (theta - mean)
+            # Within the bounds, as the fit itself will be: what is promised beyond them cannot be had.
+            theta = theta + newton_step(square, downhill, theta, low[index], high[index], 0.0)
         total += max(fit.foreseen(theta, mine), 0.0)
     return total
 

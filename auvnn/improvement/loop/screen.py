@@ -16,6 +16,7 @@ from auvnn.improvement.free_run import FreeRunFit, normal_equations
 from auvnn.improvement.loop.judge import Judge
 from auvnn.improvement.loop.state import Recipe, State, held_by, laid_out, starting
 from auvnn.models import GreyBox
+from auvnn.progress import Progress
 
 Array = NDArray[np.float64]
 # Windows that candidates are looked at on, at most.
@@ -82,9 +83,8 @@ def promises(
     found: list[Promise] = []
     groups = [plain, *([n] for n in shaped)] if plain else [[n] for n in shaped]
     for k, group in enumerate(groups):
-        say(
-            f"looking at {group[0] if len(group) == 1 else f'{len(group)} effects'} ({k + 1} of {len(groups)})"
-        )
+        what = group[0] if len(group) == 1 else f"{len(group)} effects"
+        say(Progress(f"looking at {what}", k, len(groups)))
         try:
             found += _group(base, judge, state, group)
         except (FloatingPointError, np.linalg.LinAlgError, RuntimeError, ValueError):

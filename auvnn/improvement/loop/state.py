@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.damping.bank import DampingBank
 from auvnn.diagnosis.fitters import newton
 from auvnn.diagnosis.hypotheses.bake import holding
 from auvnn.diagnosis.hypotheses.layout import Layout, lay_out, priors, scales
@@ -22,6 +24,8 @@ from auvnn.metrics.derivative import Derivative
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
+# The networks that were trained on all folds, among those trained without each.
+ALL = -1
 # Length of the stretches whose sums a fit one step ahead keeps apart, s.
 STRETCH = 5.0
 
@@ -37,6 +41,7 @@ class Recipe:
         ridge: effect to how many of its scales its parameters may be away from their nulls: what has no name is held
             closer than what has one.
         built: effects that were built in another way than by name, such as of chosen inputs.
+        banks: damping subnetworks, by the fold that they have not seen, and `ALL`; none where there are no subnetworks.
     """
 
     effects: tuple[str, ...] = ()
@@ -44,6 +49,7 @@ class Recipe:
     seconds: float = 5.0
     ridge: Mapping[str, float] = field(default_factory=dict)
     built: Mapping[str, Effect] = field(default_factory=dict)
+    banks: Mapping[int, DampingBank] = field(default_factory=dict)
 
     def words(self) -> str:
         """Return the objective in words."""
@@ -73,8 +79,16 @@ class State:
     left: LeftOut
 
 
+def banked(base: GreyBox, recipe: Recipe, fold: int = ALL) -> GreyBox:
+    """Return a model with the subnetworks of a recipe, those that have not seen a fold; itself where there are none."""
+    if not recipe.banks:
+        return base
+    return GreyBox(base.vehicle, base.copied_effects(), copy.deepcopy(recipe.banks[fold]), base.actuation)
+
+
 def laid_out(base: GreyBox, recipe: Recipe) -> tuple[Layout, tuple[str, ...], Priors]:
     """Return the layout of a recipe, the effects that are free in it, and their priors."""
+    base = banked(base, recipe)
     built = [e for n, e in recipe.built.items() if n not in base.effect_names]
     known = base.rebuilt([*base.copied_effects(), *built]) if built else base
     layout = lay_out(known, [n for n in recipe.effects if n not in recipe.built])
@@ -144,16 +158,24 @@ def fitted(
         steps: of the fit, at most.
     """
     layout, names, held = laid_out(base, recipe)
-    task, _, free = judge.task(recipe.seconds)
+    task, _, _ = judge.task(recipe.seconds)
     begin = starting(layout, names, held, before, probes=True) if start is None else start
     fit = fit_free_run(layout.model, task, names, held, start=begin, steps=steps)
+    model = holding(banked(base, recipe), layout, names, fit.theta, recipe.effects)
+    left = judge.left_out(fold_models(base, judge, recipe, layout, fit), recipe.effects, NEWTON)
+    return State(recipe, layout, fit, names, fit.theta, model, left)
+
+
+def fold_models(
+    base: GreyBox, judge: Judge, recipe: Recipe, layout: Layout, fit: FreeRunFit
+) -> dict[int, GreyBox]:
+    """Return the model of a recipe for each fold, fitted without it: one Newton step from the fit to everything."""
+    _, _, free = judge.task(recipe.seconds)
     models = {}
     for k, fold in enumerate(judge.folds.numbers):
         theta = fit.newton(layout.model, free[:, k]) if free[:, k].any() and len(fit.theta) else fit.theta
-        models[fold] = holding(base, layout, names, theta, recipe.effects)
-    left = judge.left_out(models, recipe.effects, NEWTON)
-    model = holding(base, layout, names, fit.theta, recipe.effects)
-    return State(recipe, layout, fit, names, fit.theta, model, left)
+        models[fold] = holding(banked(base, recipe, fold), layout, fit.names, theta, recipe.effects)
+    return models
 
 
 def fitted_one_step(

@@ -26,9 +26,13 @@ from auvnn.improvement.loop.state import (
 from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
+from auvnn.progress import Counted
 
 # Numerical failures of one step: the step is told and left out, the loop goes on.
 FAILURES = (FloatingPointError, np.linalg.LinAlgError, RuntimeError, ValueError, ArithmeticError, AuvnnError)
+# Steps that are told of: a comparison, three refits, a diagnosis, four rounds of a look at the catalogue and three fits,
+# twice a learned term with two fits, other windows, and the judgement.
+FORESEEN = 30
 
 
 class Trials:
@@ -55,7 +59,7 @@ class Trials:
     ) -> None:
         """Cut the log and look at the model as given."""
         self.began, self.limit = time.monotonic(), seconds
-        self.say, self.tell = progress or (lambda words: None), tell or (lambda words: None)
+        self.say, self.tell = Counted(progress, FORESEEN, rough=True), tell or (lambda words: None)
         self.model, self.log = model, log
         self.how = choose_derivative(log, derivative)
         self.judge = Judge.of(log, model.actuation)

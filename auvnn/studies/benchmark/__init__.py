@@ -14,6 +14,7 @@ from typing import Any
 
 from auvnn.answers import plain
 from auvnn.errors import InputError
+from auvnn.progress import Progress
 from auvnn.studies.benchmark.cases import NOTHING, Case, cases
 from auvnn.studies.benchmark.counts.counting import false_names, in_group, named_first
 from auvnn.studies.benchmark.counts.summary import Benchmark, summarise
@@ -69,7 +70,7 @@ def benchmark(
             if case not in rows:
                 rows[case] = row if kept is None else kept.append(row)
     if rows:
-        say(f"going on: {len(rows)} of {len(todo)} logs are done")
+        say(Progress(f"going on: {len(rows)} of {len(todo)} logs are done", len(rows), len(todo)))
     left = [case for case in todo if case not in rows]
     if only_done:
         if not rows:
@@ -84,8 +85,8 @@ def benchmark(
     for row in run_all(left, workers, run_case):
         case = Case.of_row(row)
         rows[case] = plain(row) if kept is None else kept.append(row)
-        say(
-            f"{len(rows)} of {len(todo)}: {row['hidden']} {row['size']} seed {row['seed']}: {row['verdict']} "
-            f"{'+'.join(row['missing'])}"
+        words = (
+            f"{row['hidden']} {row['size']} seed {row['seed']}: {row['verdict']} {'+'.join(row['missing'])}"
         )
+        say(Progress(words, len(rows), len(todo)))
     return summarise([rows[case] for case in todo], options)

@@ -28,6 +28,7 @@ from auvnn.logs.leakage import refuse_shared, rows_of
 from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.portions import log_files
 from auvnn.metrics.derivative import Derivative, chosen_derivative
+from auvnn.progress import Progress
 from auvnn.training.train import STOPPING
 
 # Samples of the test that are looked for in the log that is fitted.
@@ -88,8 +89,9 @@ def plan_files(pool: Executor, paths: Sequence[Path], reading: Reading, say: Say
     """
     good: list[Pieces] = []
     bad: list[InputError] = []
-    for path, found in zip(paths, pool.run(_plan_one, reading, list(paths)), strict=True):
-        say(f"looking through {path}")
+    answers = zip(paths, pool.run(_plan_one, reading, list(paths)), strict=True)
+    for k, (path, found) in enumerate(answers, 1):
+        say(Progress(f"looking through {path}", k, len(paths)))
         (bad if isinstance(found, InputError) else good).append(found)  # type: ignore[arg-type]
     # One file alone that cannot be read is the user's; one of many is left out and told.
     if not good:

@@ -19,6 +19,7 @@ from auvnn.metrics.free_run import moved
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 from auvnn.models.free_running.torchdiffeq_solver import FIXED, solve
+from auvnn.progress import Progress
 from auvnn.training.objectives.base import Objective, Refined, Tell
 from auvnn.training.objectives.starting import best_start, sound_shots, start_option
 from auvnn.training.objectives.weights import get_weights, set_weights
@@ -201,7 +202,8 @@ class _Descent:
             if epoch % EVERY == EVERY - 1:
                 self._write()
                 judged.append(self.judge.judge(self.model, self.scale))
-                self.tell(f"rollout epoch {epoch + 1}: error on windows left out {judged[-1]:.4g}")
+                words = f"rollout epoch {epoch + 1}: error on windows left out {judged[-1]:.4g}"
+                self.tell(Progress(words, epoch + 1, options.epochs, rough=True))
                 if judged[-1] < min(judged[:-1]):
                     since, best = 0, self._state()
             if since >= options.patience:

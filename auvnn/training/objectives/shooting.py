@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from auvnn.logs import Log
 from auvnn.metrics.free_run import moved
 from auvnn.models import GreyBox
+from auvnn.progress import Progress
 from auvnn.training.objectives.base import Objective, Refined, Tell
 from auvnn.training.objectives.starting import best_start, sound_shots, start_option
 from auvnn.training.objectives.weights import get_weights, set_weights
@@ -120,7 +121,8 @@ class _Descent:
             sums = self.shots.sums(self.model, self.sigma, weights=True)
             train.append(_error(sums))
             judged.append(self.judge.judge(self.model, self.scale))
-            self.tell(f"rollout step {number}: error on windows left out {judged[-1]:.4g}")
+            words = f"rollout step {number}: error on windows left out {judged[-1]:.4g}"
+            self.tell(Progress(words, number, options.iterations, rough=True))
             if judged[-1] < min(judged[:-1]):
                 since = 0 if judged[-1] < 0.999 * min(judged[:-1]) else since + 1
                 self.best = weights

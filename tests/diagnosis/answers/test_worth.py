@@ -44,14 +44,16 @@ def test_each_force_is_the_one_that_was_hidden(two):
 def test_each_cost_is_that_of_the_name_beside_the_other(two):
     pushed, lifted = two.matters["constant_force"], two.matters["net_buoyancy"]
     assert pushed["worst"]["velocity"] == "u"
-    assert lifted["worst"]["cost"] >= lifted["cost"]
+    # Without it the constant force takes the mean of its heave force over: what cannot be taken over is the part that
+    # turns into surge and sway with the tilt.
+    assert lifted["worst"]["velocity"] in ("u", "v") and lifted["worst"]["cost"] >= lifted["cost"]
     assert pushed["worst"]["cost"] >= pushed["cost"] > 1.0
     by_name = {c["effect"]: c for c in two.candidates}
     for name in NAMES:
         own = by_name[name]
         assert own["cv_before"] > own["cv_after"] and 0.0 < own["explained"] < 1.0
     # One candidate's figures are its own: the shares of two that act apart do not each claim the whole.
-    assert sum(by_name[n]["explained"] for n in NAMES) < 1.2
+    assert sum(by_name[n]["explained"] for n in NAMES) <= 1.0
     assert by_name["constant_force"]["cv_before"] != pytest.approx(
         by_name["net_buoyancy"]["cv_before"], rel=1e-3
     )

@@ -194,6 +194,10 @@ def test_a_long_log_is_searched_on_a_sample_and_fitted_whole(paths, monkeypatch)
     assert whole is not None and found.missing == ["ocean_current"]
     assert whole["searched"]["windows"] == 12 < whole["windows"] == plan.windows == whole["looked_at"]
     assert any("12 of 24 windows" in w for w in found.warnings)
+    line = found.to_dict()["baseline"]
+    assert line and line["total"] > 0 and line["persistence"]["total"] > 0 and line["model"]["total"] > 0, (
+        line
+    )
     for name, true in CURRENT["ocean_current"].items():
         row = whole["parameters"]["ocean_current"][name]
         assert abs(row["value"] - true) < 4 * row["std"]
