@@ -89,7 +89,7 @@ def test_an_axis_turned_round_is_said_of_the_axis():
     """Horizontal thrusters in the plane of the origin, aft instead of forward, mirrored so that they yaw as before."""
     level, turned = [], []
     for u in VEHICLE.to_dict()["thrusters"]:
-        (x, y, z), (a, b, c) = u["position"], u["direction"]
+        (x, y, _), (a, b, c) = u["position"], u["direction"]
         level.append({**u, "position": [x, y, 0.0]})
         turned.append(
             {**u, "position": [x, -y, 0.0], "direction": [-a, b, c]} if a else {**u, "position": [x, y, 0.0]}

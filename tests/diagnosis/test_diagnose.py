@@ -303,7 +303,7 @@ def test_a_group_that_had_stood_in_is_withdrawn_with_all_its_members(level, monk
         "auvnn.diagnosis.stages.what_is_left.additive_force_test", lambda *_: AdditiveForce("X", "u", 1.0, ())
     )
     names = ["net_buoyancy", "heave_push", "heading_force"]
-    found = diagnose(model, log, names, advice=False, whiteness=False)
+    found = diagnose(model, log, names, advice=False, whiteness=False, stochastic=False)
     assert [s["verdict"] for s in found.steps][:3] == ["ambiguous", "named", "withdrawn"]
     assert set(found.steps[2]["effects"]) == {"net_buoyancy", "heave_push"}
     assert (found.verdict, found.missing) == ("named", ["heading_force"])

@@ -60,7 +60,7 @@ def test_a_share_mixes_each_sample_with_the_next(model):
 
 
 def test_the_cubic_through_four_samples_has_the_mean_of_any_cubic():
-    """Integrated in closed form; the interval itself has the weights of Adams and Moulton's kind, -1, 13, 13, -1 over 24."""
+    """By the closed form of the integral of a power; over the interval itself -1, 13, 13, -1 over 24."""
     assert np.allclose(cubic_weights(0.5), np.array([-1.0, 13.0, 13.0, -1.0]) / 24.0)
     at = np.array([-1.0, 0.0, 1.0, 2.0])
     for share in (0.0, 0.3, 0.41, 1.0):

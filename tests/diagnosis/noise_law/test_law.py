@@ -98,3 +98,24 @@ def test_the_likelihood_is_that_of_the_full_covariance():
 def test_at_the_boundary_half_of_the_chances_are_none():
     assert boundary_p_value(-1.0) == 1.0 and boundary_p_value(0.0) == 1.0
     assert boundary_p_value(9.21) == pytest.approx(0.005, rel=0.01)
+
+
+def test_windows_one_by_one_add_up_to_the_likelihood():
+    """Against the covariance of each window's errors, worked out whole."""
+    sums = linear_windows(np.full(6, 1.0), np.ones(6), windows=4, cells=3, known=2)
+    likelihood = Likelihood(sums)
+    law = likelihood.law([1, 4], np.array([0.7, 1.1]), np.array([0.9, 2.0]))
+    found, (value, step, information, _, _) = likelihood.by_window(law), likelihood.of(law)
+    assert found.hessian.sum(0) == pytest.approx(information, rel=1e-9)
+    pull = found.slope.sum(0) - sums.precision * (sums.theta - sums.mean)
+    assert found.cost.sum() - pull @ step == pytest.approx(value, rel=1e-9)
+    # Of one window: forces integrated out of minus twice the log density, by the inverse of the force's own precision.
+    own = np.concatenate([np.arange(3) + 3 * i for i in (1, 4)]) + 2
+    h, g = sums.statistics.hessian[0], sums.statistics.slope[0]
+    covariance = np.zeros((6, 6))
+    covariance[:3, :3] = 0.7**2 * correlation(3, CELL, 0.9)
+    covariance[3:, 3:] = 1.1**2 * correlation(3, CELL, 2.0)
+    inner = np.linalg.inv(np.linalg.inv(covariance) + h[np.ix_(own, own)])
+    cost = sums.statistics.cost[0] - g[own] @ inner @ g[own] - np.linalg.slogdet(inner)[1]
+    assert found.cost[0] == pytest.approx(cost + np.linalg.slogdet(covariance)[1], rel=1e-6)
+    assert found.slope[0] == pytest.approx(g[:2] - h[:2, own] @ inner @ g[own], rel=1e-6)

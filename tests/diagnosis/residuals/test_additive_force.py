@@ -92,9 +92,11 @@ def test_one_of_two_names_that_is_needless_is_withdrawn_and_the_other_stands(mod
     truth = model.with_effects({"net_buoyancy": {"force": 8.0}, "constant_force": {"X": 6.0}})
     log = make_log(truth, runs=2, duration=15.0, noise=1.0)
     names = ["net_buoyancy", "constant_force"]
-    assert set(diagnose(model, log, names, advice=False, whiteness=False).missing) == set(names)
+    assert set(diagnose(model, log, names, advice=False, whiteness=False, stochastic=False).missing) == set(
+        names
+    )
     told(monkeypatch, AdditiveForce("X", "u", 1e-4, ("constant_force",)))
-    found = diagnose(model, log, names, advice=False, whiteness=False)
+    found = diagnose(model, log, names, advice=False, whiteness=False, stochastic=False)
     assert found.missing == ["net_buoyancy"] and found.steps[-1]["verdict"] == "unknown"
     assert {"verdict": "withdrawn", "effects": ["constant_force"], "p_value": 1e-4} in found.steps
     (one,) = [c for c in found.candidates if c["effect"] == "net_buoyancy"]

@@ -124,7 +124,7 @@ def test_a_name_is_refuted_on_weaker_grounds_than_adequacy(model, monkeypatch, p
         return Unnamed(np.zeros(6), p_values, np.array([energy, 0, 0, 0, 0, 0]), {"X": 1.0})
 
     monkeypatch.setattr("auvnn.diagnosis.stages.what_is_left.variance_component_test", half_left)
-    found = diagnose(model, log, ["net_buoyancy"], advice=False, whiteness=False)
+    found = diagnose(model, log, ["net_buoyancy"], advice=False, whiteness=False, stochastic=False)
     assert found.verdict == verdict
     # Where what is left cannot be told from noise, no share of it is unexplained.
     assert (found.unexplained > 0.0) == (verdict == "partial")
@@ -135,7 +135,9 @@ def test_a_withdrawn_name_is_not_among_the_nearest(model, monkeypatch):
     """A name that was taken first and withdrawn does not stand, whatever is left."""
     truth = pushed(model, 12.0).with_effects({"constant_force": {"X": 8.0}, "net_buoyancy": {"force": 6.0}})
     log = make_log(truth, runs=2, duration=15.0, noise=1.0)
-    both = diagnose(model, log, ["constant_force", "net_buoyancy"], advice=False, whiteness=False).nearest
+    both = diagnose(
+        model, log, ["constant_force", "net_buoyancy"], advice=False, whiteness=False, stochastic=False
+    ).nearest
     assert set(both) == {"constant_force", "net_buoyancy"}
 
     def gone(self, taken, base):
@@ -143,7 +145,9 @@ def test_a_withdrawn_name_is_not_among_the_nearest(model, monkeypatch):
 
     monkeypatch.setattr(Chooser, "withdrawn", gone)
     assert (
-        diagnose(model, log, ["constant_force", "net_buoyancy"], advice=False, whiteness=False).nearest
+        diagnose(
+            model, log, ["constant_force", "net_buoyancy"], advice=False, whiteness=False, stochastic=False
+        ).nearest
         == both[1:]
     )
 
@@ -157,7 +161,9 @@ def test_a_further_effect_takes_a_clearer_test_than_the_first(model, monkeypatch
         return asked_for[0] if len(asked_for) == 1 else 0.03
 
     monkeypatch.setattr("auvnn.diagnosis.score_tests.null_tests.bonferroni", doubtful)
-    found = diagnose(model, log, ["net_buoyancy", "constant_force"], advice=False, whiteness=False)
+    found = diagnose(
+        model, log, ["net_buoyancy", "constant_force"], advice=False, whiteness=False, stochastic=False
+    )
     assert [s["verdict"] for s in found.steps] == ["named", "adequate"] and len(asked_for) == 2
     assert found.steps[1]["p_value"] == 0.03
     # The first is asked at 0.05.
@@ -165,7 +171,7 @@ def test_a_further_effect_takes_a_clearer_test_than_the_first(model, monkeypatch
     tried: list[int] = []
     choose = Chooser.choose
     monkeypatch.setattr(Chooser, "choose", lambda *a, **k: tried.append(1) or choose(*a, **k))
-    diagnose(model, log, ["net_buoyancy", "constant_force"], advice=False, whiteness=False)
+    diagnose(model, log, ["net_buoyancy", "constant_force"], advice=False, whiteness=False, stochastic=False)
     assert len(tried) == 1
 
 

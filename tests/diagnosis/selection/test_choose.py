@@ -54,7 +54,7 @@ def test_two_effects_that_are_there_both_stay(model, two):
 
 
 def test_a_withdrawn_effect_is_told_and_not_counted_as_missing(model, two, monkeypatch):
-    plain = diagnose(model, two, NAMES)
+    plain = diagnose(model, two, NAMES, stochastic=False)
     assert set(plain.missing) == set(NAMES)
 
     def all_gone(self, taken, base):
@@ -63,7 +63,7 @@ def test_a_withdrawn_effect_is_told_and_not_counted_as_missing(model, two, monke
     monkeypatch.setattr(Chooser, "withdrawn", all_gone)
     # What is left without the one that was taken away is no stand-in here, but the purpose.
     monkeypatch.setattr("auvnn.diagnosis.stages.what_is_left.PARTIAL", 2.0)
-    found = diagnose(model, two, NAMES)
+    found = diagnose(model, two, NAMES, stochastic=False)
     assert found.missing == [plain.missing[1]]
     assert [s["verdict"] for s in found.steps][:3] == ["named", "named", "withdrawn"]
     assert any(line.startswith(f"Withdrawn: {plain.missing[0]}") for line in found.story)
@@ -71,7 +71,7 @@ def test_a_withdrawn_effect_is_told_and_not_counted_as_missing(model, two, monke
 
 
 def test_the_values_told_are_those_of_the_fit_with_all_that_was_found(model, two):
-    found = diagnose(model, two, NAMES)
+    found = diagnose(model, two, NAMES, stochastic=False)
     assert [s["verdict"] for s in found.steps][:2] == ["named", "named"], (
         "one after the other, or this says nothing"
     )
@@ -87,7 +87,7 @@ def test_the_values_told_are_those_of_the_fit_with_all_that_was_found(model, two
 def test_two_effects_that_do_as_badly_alone_are_named_together(model, two, monkeypatch):
     """As if neither were ahead of the other; alone they leave what both together explain."""
     monkeypatch.setattr(ModelComparison, "told_apart", lambda self, best, other: False)
-    found = diagnose(model, two, NAMES)
+    found = diagnose(model, two, NAMES, stochastic=False)
     assert found.steps[0]["verdict"] == "named" and set(found.steps[0]["effects"]) == set(NAMES)
     assert set(found.missing) == set(NAMES)
 
