@@ -43,6 +43,21 @@ def as_tensor(value: Any, like: Tensor, name: str) -> Any:
         ) from None
 
 
+def as_times(value: Any, like: Tensor) -> Tensor:
+    """Return times as a tensor; double ones stay so beside a model of single precision, which would round unix seconds.
+
+    Args:
+        value: a tensor, a numpy array or a list, s.
+        like: one of the model's own tensors.
+
+    Raises:
+        ConfigError: it holds no numbers.
+    """
+    if isinstance(value, Tensor) and value.dtype == torch.float64:
+        return value
+    return as_tensor(value, like, "times")
+
+
 def as_inputs(value: Any, like: Tensor) -> Inputs:
     """Return commands, or all inputs, as tensors of a model's precision."""
     given = value if isinstance(value, Inputs) else Inputs(value)

@@ -15,7 +15,10 @@ from auvnn.config import config_dir
 
 # Verbs with a call of the same name.
 CALLS = {
-    v: getattr(auvnn, "import_model" if v == "import" else v) for v in VERBS.names() if hasattr(auvnn, v)
+    # The package of the page is no call, though another test may have made it an attribute.
+    v: getattr(auvnn, "import_model" if v == "import" else v)
+    for v in VERBS.names()
+    if v != "app" and hasattr(auvnn, v)
 }
 # What is said otherwise in a config and means the same.
 SAME: dict[tuple[str, str], tuple[Any, Any]] = {

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from auvnn.effects import Effect
 from auvnn.errors import ConfigError
-from auvnn.models.accepting import as_inputs, as_tensor, own
+from auvnn.models.accepting import as_inputs, as_tensor, as_times, own
 from auvnn.models.actuation.actuators import Drive
 from auvnn.models.engine import compiled_run
 from auvnn.models.free_running.excursions import extrapolated
@@ -100,7 +100,7 @@ def rollout(
     eta0, nu0, times = (
         as_tensor(eta0, like, "eta0"),
         as_tensor(nu0, like, "nu0"),
-        as_tensor(times, like, "times"),
+        as_times(times, like),
     )
     batch = _leading_shape(model, eta0, nu0, inputs, times, warmup)
     if eta0.shape[-1] == 6:

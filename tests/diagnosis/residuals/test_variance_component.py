@@ -98,7 +98,7 @@ def test_a_name_that_explains_a_part_predicts_and_is_not_the_cause(model):
     """A steady push besides: a constant force explains that, and is not what comes and goes."""
     truth = pushed(model, 12.0).with_effects({"constant_force": {"X": 8.0}})
     log = make_log(truth, runs=2, duration=15.0, noise=1.0)
-    found = diagnose(model, log, ["constant_force"], whiteness=False)
+    found = diagnose(model, log, ["constant_force"], whiteness=False, stochastic=False)
     assert (found.verdict, found.missing, found.nearest) == ("partial", [], ["constant_force"])
     assert found.steps == [{"verdict": "partial", "effects": [], "p_value": found.steps[0]["p_value"]}]
     # What the nearest leaves is what nothing in the catalogue explains.
