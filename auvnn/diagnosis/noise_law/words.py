@@ -20,8 +20,10 @@ def stochastic_words(stochastic: Mapping[str, Any]) -> list[str]:
     commands = stochastic.get("commands")
     if commands and commands["between_samples"] != "held":
         next_one = commands["share_of_next"]
-        lines.append(
-            f"Commands change between the log's samples: the mean of an interval was taken as {1 - next_one:.0%} of its "
-            f"own sample's and {next_one:.0%} of the next one's."
+        along = (
+            f"along the cubic through four samples, {next_one - 0.5:+.2f} of an interval from its own"
+            if commands["between_samples"] == "smooth"
+            else f"as {1 - next_one:.0%} of its own sample's and {next_one:.0%} of the next one's"
         )
+        lines.append(f"Commands change between the log's samples: the mean of an interval was taken {along}.")
     return lines
