@@ -91,7 +91,13 @@ def figure(value: Any, digits: int = 3) -> str:
 
 
 def measured(value: Any, std: Any, unit: str = "") -> tuple[str, str]:
-    """Return a value with its standard deviation and unit, and its 95 % interval, as text."""
+    """Return a value with its standard deviation and unit, and its 95 % interval, as text.
+
+    Args:
+        value: in `unit`; None or not finite where it is unknown.
+        std: standard deviation in `unit`; None where none is known.
+        unit: written after both; none for numbers without.
+    """
     shown = "" if unit in ("", "1") else f" {unit}"
     if value is None or not math.isfinite(value):
         return f"unknown{shown}", ""

@@ -46,7 +46,7 @@ def thin(
         pairs = {name: _extremes(values, edges)[keep] for name, values in series.items()}
         times = times[keep]
     # Judged in the full record: neighbouring points of a thinned one lie a bucket apart.
-    longest = default_gap(t) if gap is None and len(t) > 1 else gap
+    longest = default_gap(t) if gap is None else gap
     gaps = np.flatnonzero(np.diff(t) > longest) if len(t) > 1 else np.zeros(0, dtype=np.intp)
     at = np.unique(np.searchsorted(times, t[gaps], side="right"))
     at = at[(at > 0) & (at < len(times))]

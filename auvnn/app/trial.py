@@ -11,7 +11,7 @@ import torch
 
 from auvnn.app.logview import run_of
 from auvnn.app.traces import POINTS, part, thin
-from auvnn.comparison.compare import stitch
+from auvnn.comparison.predictions import stitch
 from auvnn.effects import EFFECTS, effect_class
 from auvnn.errors import InputError
 from auvnn.logs import Log

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from auvnn.logs import Log, Run
 from auvnn.logs.signals.derivatives import LocalPolynomial
 from auvnn.logs.signals.rotation import conjugate, rotate
-from auvnn.metrics.derivative import Derivative, choose_derivative
-from auvnn.metrics.one_step import accelerations, integrated
+from auvnn.metrics.derivative import Derivative, choose_derivative, integrated
+from auvnn.metrics.one_step import accelerations
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]

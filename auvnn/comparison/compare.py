@@ -16,12 +16,13 @@ from auvnn.checks.blind import blind
 from auvnn.checks.doubts import doubts
 from auvnn.comparison.beside import beside, standing
 from auvnn.comparison.locate import AXES, failures, locate
+from auvnn.comparison.predictions import stitch, write_predictions
 from auvnn.errors import ConfigError
 from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.one_step import OneStep, one_step, scores
-from auvnn.metrics.rollouts import HORIZONS, NAMES, Rolled, Scale, rollout_table, scale_of
+from auvnn.metrics.rollouts import HORIZONS, Rolled, Scale, rollout_table, scale_of
 from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
 from auvnn.models.free_running.excursions import region_of, words_of
@@ -172,7 +173,14 @@ def _mean(x: Array) -> float:
 
 
 def floor_of(model: GreyBox, rolled: Rolled, log: Log, scale: Scale) -> float:
-    """Return the error that a perfect model would show over the same windows; NaN for very long ones."""
+    """Return the error that a perfect model would show over the same windows; NaN for very long ones.
+
+    Args:
+        model: that is compared.
+        rolled: its free runs over the windows of one horizon.
+        log: measurements, whose noise counts.
+        scale: by which errors of different units are added.
+    """
     if rolled.windows.times.shape[1] > FLOOR_SAMPLES:
         return float("nan")
     return noise_floor(model, rolled, log, scale, engine="auto")
@@ -180,7 +188,7 @@ def floor_of(model: GreyBox, rolled: Rolled, log: Log, scale: Scale) -> float:
 
 def _horizon(value: str | float) -> str:
     if value == "full":
-        return value
+        return "full"
     try:
         number = float(value)
     except ValueError:
@@ -210,59 +218,6 @@ def _series(number: int, nu: Array, part: OneStep, rolled: Rolled | None) -> dic
         "model_acc": part.model,
         "residual": part.wrench,
     }
-
-
-def stitch(rolled: Rolled, number: int, nu: Array) -> Array:
-    """Return the predictions of every other window (they overlap by half) as one trace of a run, (N, 6).
-
-    Args:
-        rolled: free runs over the windows of one horizon.
-        number: of the run whose trace is asked for.
-        nu: measured velocity of that run, (N, 6), m/s and rad/s; gives the trace its shape alone.
-    """
-    trace = np.full_like(nu, np.nan)
-    upto = -1
-    for b in np.flatnonzero(rolled.windows.run == number):
-        first, length = int(rolled.windows.first[b]), int(rolled.windows.length[b])
-        if first < upto:
-            continue
-        trace[first : first + length] = rolled.predicted[b, :length]
-        upto = first + length - 1
-    return trace
-
-
-def write_predictions(series: list[dict[str, Any]] | Mapping[str, list[dict[str, Any]]], path: Path) -> Path:
-    """Write measured and predicted velocities and accelerations and the residual wrench as one Parquet table.
-
-    Args:
-        series: of one model, or of several by their labels, which become a first column `model`.
-        path: of the table.
-    """
-    import os
-
-    import polars as pl
-
-    frames = []
-    for label, runs in series.items() if isinstance(series, Mapping) else ((None, series),):
-        for s in runs:
-            columns: dict[str, Any] = {} if label is None else {"model": [label] * len(s["t"])}
-            columns |= {"run": np.full(len(s["t"]), s["run"]), "t": s["t"]}
-            for key, names, suffix in (
-                ("measured", NAMES, ""),
-                ("model", NAMES, "_model"),
-                ("measured_acc", [f"d{n}" for n in NAMES], ""),
-                ("model_acc", [f"d{n}" for n in NAMES], "_model"),
-                ("residual", AXES, "_residual"),
-            ):
-                columns.update({f"{n}{suffix}": s[key][:, k] for k, n in enumerate(names)})
-            frames.append(pl.DataFrame(columns))
-    if not frames:
-        return path
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}.part")
-    pl.concat(frames).fill_nan(None).write_parquet(beside)
-    os.replace(beside, path)
-    return path
 
 
 def _warnings(model: GreyBox, log: Log, rolled: dict[str, Rolled]) -> list[str]:

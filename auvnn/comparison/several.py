@@ -11,8 +11,9 @@ from typing import Any, overload
 from auvnn.answers import DRAWERS, PLOTTED, Answer, plain, write_text
 from auvnn.cards import Card, figure
 from auvnn.comparison.beside import HORIZONS as MAIN
-from auvnn.comparison.compare import Comparison, write_predictions
+from auvnn.comparison.compare import Comparison
 from auvnn.comparison.compare import compare as compare_one
+from auvnn.comparison.predictions import write_predictions
 from auvnn.errors import ConfigError, InputError
 from auvnn.metrics.rollouts import HORIZONS
 from auvnn.models import GreyBox

@@ -85,9 +85,10 @@ class DampingBank(nn.Module):
         own = self.free(nu)
         if not self.passive:
             return own
-        if known is None:
-            known = torch.zeros_like(own) if self.stated is None else self.stated(nu)
-        return passive(own, known, nu, self.output_scale / self.input_scale)
+        other = (
+            known if known is not None else torch.zeros_like(own) if self.stated is None else self.stated(nu)
+        )
+        return passive(own, other, nu, self.output_scale / self.input_scale)
 
     def free(self, nu: Tensor) -> Tensor:
         """Return what the forms alone say at velocities (..., 6): d(nu) before `passive` limits it, (..., 6)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, overload
 
 from auvnn.effects import EFFECTS, effect_class
@@ -71,7 +71,7 @@ def name_of(effect: Any) -> str:
 @overload
 def names_of(effects: None) -> None: ...
 @overload
-def names_of(effects: Any) -> str | list[str]: ...
+def names_of(effects: str | Effect | type[Effect] | Iterable[Any]) -> str | list[str]: ...
 def names_of(effects: Any) -> str | list[str] | None:
     """Return names in the place of classes and instances; a list keeps its kind, one effect stays one.
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from auvnn.catalogue import unknown_name
 from auvnn.comparison.beside import beside
-from auvnn.comparison.compare import stitch
+from auvnn.comparison.predictions import stitch
 from auvnn.diagnosis.answers.answer import OneOf
 from auvnn.diagnosis.answers.table import values
 from auvnn.diagnosis.fitters import OBJECTIVES

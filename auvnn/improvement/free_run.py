@@ -109,7 +109,16 @@ class FreeRunFit:
 
 
 def newton_step(hessian: Array, slope: Array, theta: Array, low: Array, high: Array, damping: float) -> Array:
-    """Return a damped Gauss-Newton step within bounds, (P,); none where the sums are not finite."""
+    """Return a damped Gauss-Newton step within bounds, (P,); none where the sums are not finite.
+
+    Args:
+        hessian: (P, P).
+        slope: (P,).
+        theta: parameters from which the step goes, (P,).
+        low: lower bounds of the parameters, (P,).
+        high: upper bounds, (P,).
+        damping: of the step; 0 is a plain Gauss-Newton step.
+    """
     if not (np.isfinite(hessian).all() and np.isfinite(slope).all()):
         return np.zeros(len(theta))
     return NormalEquations(hessian, slope).bounded(low - theta, high - theta, damping=damping)

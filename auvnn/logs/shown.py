@@ -19,11 +19,27 @@ class ShownLog(Shown):
 
     name: str
     runs: tuple[Run, ...]
-    samples: int
-    duration: float
-    kind: str
-    columns: list[str]
     repairs: tuple[Any, ...]
+
+    @property
+    def samples(self) -> int:
+        """Number of samples of all runs."""
+        ...
+
+    @property
+    def duration(self) -> float:
+        """Sum of the runs' durations, s."""
+        ...
+
+    @property
+    def kind(self) -> str:
+        """What actuates the vehicle."""
+        ...
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of the columns."""
+        ...
 
     def __contains__(self, item: object) -> bool:
         """Say whether the log has a column of this name, or this run."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from auvnn.catalogue import unknown_name
 from auvnn.errors import ConfigError, InputError
@@ -89,3 +90,19 @@ def chosen_derivative(
         raise InputError(f"{name} has no columns du ... dr: use derivative.method=local_polynomial")
     width = int(given.get("half_width", max(4, round(0.2 / dt))))
     return Derivative(method, width, int(given.get("order", 2)))
+
+
+def integrated(
+    t: NDArray[np.float64], begin: NDArray[np.float64], end: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
+    """Return the trapezoidal integral of a signal, (N, k), zero at the start and NaN where the signal is.
+
+    Args:
+        t: s, (N,).
+        begin: (N, k), the signal as each interval begins.
+        end: (N, k), the signal as the interval before each sample ends; `begin` where it does not jump.
+    """
+    end = begin if end is None else end
+    steps = 0.5 * np.diff(t)[:, None] * (begin[:-1] + end[1:])
+    total = np.concatenate([np.zeros((1, begin.shape[1])), np.cumsum(np.nan_to_num(steps), axis=0)])
+    return np.where(np.isfinite(begin), total, np.nan)

@@ -30,6 +30,12 @@ def likely_states(
     Of the channels that were estimated and not measured alone, the initial values are those that minimise the squared
     error of the window's measured channels, each in units of its own root mean square, with a wide prior about the
     estimate: Gauss and Newton's method, the free runs differentiated by differences.
+
+    Args:
+        model: that runs freely.
+        windows: B windows of the log.
+        max_step: longest step of the integrator, s; None leaves it to the engine.
+        engine: that makes the free runs.
     """
     initial = initial_states(model, windows)
     moving = [CHANNELS.index(n) for n in windows.estimated if n in WIDE]

@@ -14,7 +14,7 @@ from auvnn.errors import InputError
 from auvnn.logs import Log, Run
 from auvnn.logs.channels import VELOCITY
 from auvnn.logs.signals.derivatives import LocalPolynomial
-from auvnn.metrics.derivative import REPEATS, Derivative
+from auvnn.metrics.derivative import REPEATS, Derivative, integrated
 from auvnn.metrics.noise import with_more_noise
 from auvnn.models import GreyBox, Inputs
 from auvnn.physics.attitude import quat_to_matrix
@@ -43,20 +43,6 @@ class OneStep:
     wrench: Array
     noise: Array
     wrench_noise: Array
-
-
-def integrated(t: Array, begin: Array, end: Array | None = None) -> Array:
-    """Return the trapezoidal integral of a signal, (N, k), zero at the start and NaN where the signal is.
-
-    Args:
-        t: s, (N,).
-        begin: (N, k), the signal as each interval begins.
-        end: (N, k), the signal as the interval before each sample ends; `begin` where it does not jump.
-    """
-    end = begin if end is None else end
-    steps = 0.5 * np.diff(t)[:, None] * (begin[:-1] + end[1:])
-    total = np.concatenate([np.zeros((1, begin.shape[1])), np.cumsum(np.nan_to_num(steps), axis=0)])
-    return np.where(np.isfinite(begin), total, np.nan)
 
 
 class OneStepReplay:

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from auvnn.logs import Log, Run
 from auvnn.logs.signals.derivatives import LocalPolynomial
 from auvnn.logs.signals.rotation import conjugate, rotate
-from auvnn.metrics.derivative import Derivative
+from auvnn.metrics.derivative import Derivative, integrated
 from auvnn.metrics.folds import Folds
-from auvnn.metrics.one_step import integrated
 from auvnn.metrics.rollouts import NAMES, Rolled, Scale, scored
 from auvnn.metrics.windows import Windows, commands
 

@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
-from auvnn.effects import Body, Effect, Moment, Sensed
+from auvnn.effects import Body, Moment
 from auvnn.errors import ConfigError
 from auvnn.models.accepting import as_tensor, own
 from auvnn.models.actuation.actuators import Actuators
 from auvnn.models.inputs import Inputs
+from auvnn.models.sensors import Sensors
 from auvnn.physics.attitude import quat_to_matrix
 from auvnn.physics.coriolis import coriolis_force
 from auvnn.physics.current import water_velocity
@@ -42,7 +43,7 @@ class Prepared:
     inverse: Tensor
 
 
-class EquationsOfMotion(nn.Module):
+class EquationsOfMotion(Sensors):
     """What follows from a vehicle's numbers, its damping and its effects: forces, accelerations, what sensors report.
 
     Attributes:
@@ -60,7 +61,6 @@ class EquationsOfMotion(nn.Module):
     damping: DampingBank | None
     bottom: float | None
     time_varying: bool
-    _by_hook: dict[str, list[Effect]]
 
     def _known(self, name: str) -> Any:
         return getattr(self, f"known_{name}")
@@ -69,10 +69,6 @@ class EquationsOfMotion(nn.Module):
     def passive(self) -> bool:
         """Whether the subnetworks are kept from making the drag as a whole give energy."""
         return bool(getattr(self.damping, "passive", False))
-
-    def using(self, hook: str) -> list[Effect]:
-        """Return the effects that override a hook, in order of action."""
-        return self._by_hook[hook]
 
     def prepare(self, moment: Moment | None = None) -> Prepared:
         """Work out body and inertia matrices; `moment` is needed only where an effect varies in time."""
@@ -288,32 +284,3 @@ class EquationsOfMotion(nn.Module):
         for effect in self.using("wrench"):
             terms[str(effect.name)] = effect.wrench(moment, body)
         return terms, prepared
-
-    def sense(self, sensed: Sensed) -> Sensed:
-        """Return what the sensors report of a state."""
-        for effect in self.using("sense"):
-            sensed = effect.sense(sensed)
-        return sensed
-
-    def unsense(self, sensed: Sensed, rounds: int = 4) -> Sensed:
-        """Return the state that the sensors' report stands for, by fixed-point iteration.
-
-        Sensor effects are small corrections, so each round gains about as many digits as they are small.
-        """
-        if not self.using("sense"):
-            return sensed
-        state = sensed
-        for _ in range(rounds):
-            seen = self.sense(state)
-            rate = None
-            if sensed.nu_dot is not None and state.nu_dot is not None and seen.nu_dot is not None:
-                rate = state.nu_dot + sensed.nu_dot - seen.nu_dot
-            quaternion = state.quaternion + sensed.quaternion - seen.quaternion
-            quaternion = quaternion / torch.linalg.norm(quaternion, dim=-1, keepdim=True)
-            state = Sensed(
-                state.position + sensed.position - seen.position,
-                quaternion,
-                state.nu + sensed.nu - seen.nu,
-                rate,
-            )
-        return state

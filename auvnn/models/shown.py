@@ -17,9 +17,17 @@ class ShownModel(Shown):
 
     vehicle: Vehicle
     actuation: str
-    members: list[Effect]
-    effect_names: list[str]
     damping: Any
+
+    @property
+    def members(self) -> list[Effect]:
+        """The effects, in order of action."""
+        ...
+
+    @property
+    def effect_names(self) -> list[str]:
+        """Names of the effects, in order of action."""
+        ...
 
     def values(self) -> dict[str, dict[str, dict[str, Any]]]:
         """Return the effects' values, standard deviations (None where none is known) and units, by parameter."""

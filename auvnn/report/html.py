@@ -6,7 +6,7 @@ import base64
 import functools
 import re
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
@@ -207,3 +207,22 @@ def _attribute(name: str, value: str, prefix: str) -> str | None:
 
 def _local(tag: Any) -> str:
     return tag.rpartition("}")[2] if isinstance(tag, str) else ""
+
+
+def folded(pictures: list[Picture], shown: int) -> list[Picture]:
+    """Return the pictures, all but the first ones folded away."""
+    left, out = shown, []
+    for item in pictures:
+        out.append(item if left > 0 else replace(item, folded=True))
+        left -= not item.folded and not item.missing
+    return out
+
+
+def closed(tables: list[HtmlTable], shown: int) -> list[HtmlTable]:
+    """Return the tables that have rows, folded away beyond the first ones unless they say otherwise."""
+    left, out = shown, []
+    for item in tables:
+        if item.rows:
+            out.append(replace(item, folded=True) if item.folded is None and left <= 0 else item)
+            left -= not item.closed
+    return out

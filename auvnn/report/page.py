@@ -7,7 +7,7 @@ import os
 import tempfile
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from auvnn.answers import write_text
 from auvnn.report import style
-from auvnn.report.html import HtmlTable, Part, Picture, figure_markup, render
+from auvnn.report.html import HtmlTable, Part, Picture, closed, figure_markup, folded, render
 from auvnn.report.panels import NoData
 from auvnn.report.view import View
 
@@ -163,10 +163,10 @@ class Page:
             brief=safely("the verdict", lambda: self.brief(view)[:MOST_SENTENCES], [])
             or ["There is no verdict in this answer."],
             warnings=safely("the warnings", lambda: self.warnings(view), []),
-            pictures=_folded(
+            pictures=folded(
                 [_picture(plot, drawn, prefix, notes) for plot in plots], 1 if prefix else self.shown
             ),
-            tables=_closed(
+            tables=closed(
                 safely("the tables", lambda: self.tables(view), []), 0 if prefix else self.open_tables
             ),
             assumed=[(k, v) for k, v in safely("what was assumed", lambda: self.assumed(view), []) if v],
@@ -174,25 +174,6 @@ class Page:
             story=safely("the story", lambda: self.story(view), []),
             parts=parts,
         )
-
-
-def _folded(pictures: list[Picture], shown: int) -> list[Picture]:
-    """Return the pictures, all but the first ones folded away."""
-    left, out = shown, []
-    for item in pictures:
-        out.append(item if left > 0 else replace(item, folded=True))
-        left -= not item.folded and not item.missing
-    return out
-
-
-def _closed(tables: list[HtmlTable], shown: int) -> list[HtmlTable]:
-    """Return the tables that have rows, folded away beyond the first ones unless they say otherwise."""
-    left, out = shown, []
-    for item in tables:
-        if item.rows:
-            out.append(replace(item, folded=True) if item.folded is None and left <= 0 else item)
-            left -= not item.closed
-    return out
 
 
 def _missing(reason: str) -> Figure:

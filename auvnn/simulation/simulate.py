@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from auvnn.effects import EFFECTS
 from auvnn.effects.sizes import radius
 from auvnn.errors import ConfigError
-from auvnn.logs import Log, Run
+from auvnn.logs import Log
 from auvnn.models import GreyBox
 from auvnn.models.taking import GivenModel, as_model
 from auvnn.plants import PLANTS, Motion, PlantTask
@@ -23,6 +23,7 @@ from auvnn.plants.strangers import STRANGERS
 from auvnn.simulation.excitations import EXCITATIONS, make_excitation
 from auvnn.simulation.noise import make_noise
 from auvnn.simulation.plant import as_hidden, drawn_factors, make_plant, typical_values
+from auvnn.simulation.recording import _battery, _runs
 from auvnn.simulation.requests import _can_be_hidden, _check, _told
 from auvnn.simulation.worlds import World, make_world
 from auvnn.simulation.worlds.law import disturbed, drawn_laws
@@ -264,44 +265,3 @@ def _actuated(model: GreyBox, actuation: str | None) -> GreyBox:
         return model
     effects = [type(e).build(model.vehicle, actuation, e.values()) for e in model.copied_effects()]
     return model.rebuilt(effects, actuation=actuation)
-
-
-def _battery(model: GreyBox, t: Array, generators: Sequence[np.random.Generator]) -> Array | None:
-    """Return the voltage of a battery that falls by a tenth in ten minutes, (R, T), or None."""
-    reference = model.vehicle.reference_voltage
-    if reference is None:
-        return None
-    first = np.array([g.uniform(0.94, 1.04) for g in generators])
-    return reference * (first[:, None] - 0.1 * t / 600.0)
-
-
-def _runs(
-    t: Array,
-    motion: Motion,
-    battery: Array | None,
-    sensing: Sensing,
-    actuation: str,
-    altitude: Array | None,
-    rates: bool,
-    every: int,
-) -> list[Run]:
-    draws, thin = sensing.recorded, slice(None, None, every)
-    position, quaternion, nu = (
-        x[:, thin] for x in sensing.record(motion.position, motion.quaternion, motion.velocity)
-    )
-    rate = draws.added("du", motion.rate)[:, thin] if rates else None
-    voltage = None
-    if battery is not None:
-        voltage = draws.added("voltage", battery[..., None])[:, thin, 0]
-    command, stamps = motion.command[:, thin], sensing.stamps(t)[:, thin]
-    return [
-        Run(
-            number=i, t=stamps[i], quaternion=quaternion[i], nu=nu[i], nu_dot=None if rate is None else rate[i],
-            position=position[i], fins=None if motion.fins is None else motion.fins[i, thin],
-            wrench=command[i] if actuation == "wrench" else None,
-            thrusters=command[i] if actuation == "thrusters" else None,
-            voltage=None if voltage is None else voltage[i],
-            altitude=None if altitude is None else altitude[i, thin],
-        )
-        for i in range(len(nu))
-    ]  # fmt: skip

@@ -12,8 +12,8 @@ from torch import Tensor, nn
 from auvnn.damping.bank import DampingBank
 from auvnn.logs import Log, Run
 from auvnn.logs.signals.derivatives import LocalPolynomial
-from auvnn.metrics.derivative import Derivative
-from auvnn.metrics.one_step import accelerations, inertia_of, integrated
+from auvnn.metrics.derivative import Derivative, integrated
+from auvnn.metrics.one_step import accelerations, inertia_of
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]

@@ -27,6 +27,7 @@ from auvnn.progress import Progress
 from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
 from auvnn.training.confounding.confounding import Confounding
+from auvnn.training.figures import history_of, metrics_of
 from auvnn.training.fit_damping import Fit, fit_damping, most_iterations
 from auvnn.training.history import Record
 from auvnn.training.objectives.base import build_objective
@@ -34,7 +35,6 @@ from auvnn.training.problem import DampingProblem
 from auvnn.training.targets import targets
 
 Array = NDArray[np.float64]
-AXES = ("X", "Y", "Z", "K", "M", "N")
 # Share of a single run that decides when to stop; of several runs it is the last.
 STOPPING = 0.2
 
@@ -255,51 +255,6 @@ def _free_running(models: Mapping[str, GreyBox], test: Log) -> dict[str, Any]:
         rolled = roll(model, test, "5", scale)
         found[f"held_out_rollout_5_s_total_{name}"] = None if rolled is None else rolled.total(scale)
     return found
-
-
-def metrics_of(fit: Fit, before: dict, after: dict, samples: int, held: int) -> dict[str, Any]:
-    """Return `metrics` of the answer.
-
-    Args:
-        fit: what came of it.
-        before: comparison before training.
-        after: comparison after training.
-        samples: that were fitted.
-        held: samples that decided when to stop.
-    """
-    units = ("N", "N", "N", "N_m", "N_m", "N_m")
-    found: dict[str, Any] = {
-        "samples_fitted": samples,
-        "samples_for_stopping": held,
-        "iterations": fit.iterations,
-        "seconds": fit.seconds,
-    }
-    for k, (axis, unit) in enumerate(zip(AXES, units, strict=True)):
-        found[f"rmse_{axis}_{unit}"] = fit.rmse[k]
-        found[f"relative_rmse_{axis}"] = fit.relative_rmse[k]
-        if fit.held_out_rmse is not None:
-            found[f"stopping_rmse_{axis}_{unit}"] = fit.held_out_rmse[k]
-    for name in after:
-        found[f"held_out_r2_{name}_before"] = before[name]["r2"]
-        found[f"held_out_r2_{name}_after"] = after[name]["r2"]
-    return found
-
-
-def history_of(fit: Fit) -> dict[str, Any]:
-    """Return the root mean square over the learned degrees of freedom, one number an iteration."""
-
-    def joined(rows: list) -> list[float]:
-        return [float(np.sqrt(np.nanmean(np.square(row)))) for row in rows]
-
-    data = fit.history.to_dict()
-    return {
-        "iteration": data["iteration"],
-        "train": joined(data["train"]),
-        "held_out": joined(data["held_out"]),
-        "by_axis": data,
-        "step": "iteration",
-        "error": "error over the target's spread (1)",
-    }
 
 
 __all__ = ["OneStep", "Training", "targets", "train"]

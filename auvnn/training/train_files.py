@@ -46,11 +46,12 @@ from auvnn.training.distributed.data_split import (
 from auvnn.training.distributed.distributed_problem import DistributedProblem
 from auvnn.training.distributed.grouped_sums import GROUP
 from auvnn.training.distributed.target_cache import Source
+from auvnn.training.figures import history_of, metrics_of
 from auvnn.training.fit_damping import build_scheme, fit_damping, most_iterations
 from auvnn.training.held_out import score
 from auvnn.training.history import Record
 from auvnn.training.objectives.base import build_objective
-from auvnn.training.train import Training, history_of, metrics_of
+from auvnn.training.train import Training
 
 # Samples that are looked at in one place.
 LOOKED_AT = 20_000

@@ -73,6 +73,11 @@ def rigid_body(mass: float, inertia: Array, r: Array) -> Array:
     """Return M_RB about the body origin, (6, 6): [m I, -m S(r); m S(r), I_g + m (r^T r I - r r^T)], r = r_g.
 
     Reference: Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, ch. 3.
+
+    Args:
+        mass: kg.
+        inertia: I_g about the centre of gravity, (3, 3), kg m2.
+        r: centre of gravity in the body frame, (3,), m.
     """
     x, y, z = r
     s = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -33,6 +33,11 @@ class Public(NamedTuple):
         return "Args:" in (ast.get_docstring(self.node) or "")
 
 
+def overload(node: ast.FunctionDef) -> bool:
+    """Whether this is a signature alone, which must not carry a docstring: the implementation below it does."""
+    return any(isinstance(d, ast.Name) and d.id == "overload" for d in node.decorator_list)
+
+
 def functions(trees: dict[str, ast.Module]) -> Iterator[Public]:
     """Yield public functions and methods."""
     for where, tree in trees.items():
@@ -40,7 +45,11 @@ def functions(trees: dict[str, ast.Module]) -> Iterator[Public]:
             inside = node.body if isinstance(node, ast.ClassDef) and not node.name.startswith("_") else []
             owner = node.name if isinstance(node, ast.ClassDef) else None
             for found in [node, *inside]:
-                if isinstance(found, ast.FunctionDef) and not found.name.startswith("_"):
+                if (
+                    isinstance(found, ast.FunctionDef)
+                    and not found.name.startswith("_")
+                    and not overload(found)
+                ):
                     name = f"{owner}.{found.name}" if owner else found.name
                     yield Public(f"{where}: {name}", owner, found)
 

@@ -11,8 +11,8 @@ import pytest
 import torch
 
 from auvnn.comparison import compare
-from auvnn.comparison.compare import stitch
 from auvnn.comparison.locate import UNITS, failures, locate, regimes
+from auvnn.comparison.predictions import stitch
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run
 from auvnn.metrics.one_step import OneStep

@@ -14,7 +14,7 @@ import torch
 from auvnn.answers import Answer, plain, write_text
 from auvnn.app.source import split
 from auvnn.comparison import compare
-from auvnn.comparison.compare import write_predictions
+from auvnn.comparison.predictions import write_predictions
 from auvnn.diagnosis import diagnose
 from auvnn.errors import AuvnnError
 from auvnn.improvement import add, improve

@@ -135,7 +135,13 @@ def _state(asked: Setting, state: State, result: BesideForce, *, chance: bool) -
 
 
 def negligible(asked: Setting, state: State, law: ForceLaw | None) -> bool:
-    """Whether a stochastic force is within the tolerance, by its upper limit as a share of the actuators' force."""
+    """Whether a stochastic force is within the tolerance, by its upper limit as a share of the actuators' force.
+
+    Args:
+        asked: tolerance and layout.
+        state: windows over which the force was sought.
+        law: root mean square, N and N m, and correlation time, s, of the force; None where none was found.
+    """
     if asked.tolerance.strict:
         return False
     if law is None:

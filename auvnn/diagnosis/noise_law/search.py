@@ -262,6 +262,12 @@ class ForceSearch:
 
 
 def foresees(after: Hypothesis, before: Hypothesis, least: float) -> bool:
-    """Whether runs left out are foreseen better, by so many standard errors of the gain."""
+    """Whether runs left out are foreseen better, by so many standard errors of the gain.
+
+    Args:
+        after: hypothesis that is to foresee better.
+        before: hypothesis that it is compared with.
+        least: standard errors that the gain must exceed.
+    """
     gain = cross_validated_log_density(before.weighed) - cross_validated_log_density(after.weighed)
     return float(gain.sum()) > least * float(np.sqrt(len(gain)) * gain.std(ddof=1))

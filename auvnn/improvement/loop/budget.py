@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from auvnn.comparison.compare import stitch
+from auvnn.comparison.predictions import stitch
 from auvnn.logs import Log
 from auvnn.metrics.derivative import Derivative
 from auvnn.metrics.noise_floor import noise_floor

@@ -19,10 +19,7 @@ from auvnn.improvement.loop.answer import LEARNED, PREDICTS, REFITTED, Improved
 from auvnn.improvement.loop.budget import budget
 from auvnn.improvement.loop.causes import Causes
 from auvnn.improvement.loop.screen import PROMISE, Promise, promises, wanted
-from auvnn.improvement.loop.state import (
-    State,
-    fitted,
-)
+from auvnn.improvement.loop.state import State, fitted
 from auvnn.improvement.loop.trials import FAILURES
 from auvnn.logs import Log
 from auvnn.logs.leakage import leakage

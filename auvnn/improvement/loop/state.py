@@ -80,7 +80,13 @@ class State:
 
 
 def banked(base: GreyBox, recipe: Recipe, fold: int = ALL) -> GreyBox:
-    """Return a model with the subnetworks of a recipe, those that have not seen a fold; itself where there are none."""
+    """Return a model with the subnetworks of a recipe, those that have not seen a fold; itself where there are none.
+
+    Args:
+        base: the model as given.
+        recipe: with the subnetworks by fold.
+        fold: number of the fold; by default those that have seen everything.
+    """
     if not recipe.banks:
         return base
     return GreyBox(base.vehicle, base.copied_effects(), copy.deepcopy(recipe.banks[fold]), base.actuation)
@@ -169,7 +175,15 @@ def fitted(
 def fold_models(
     base: GreyBox, judge: Judge, recipe: Recipe, layout: Layout, fit: FreeRunFit
 ) -> dict[int, GreyBox]:
-    """Return the model of a recipe for each fold, fitted without it: one Newton step from the fit to everything."""
+    """Return the model of a recipe for each fold, fitted without it: one Newton step from the fit to everything.
+
+    Args:
+        base: the model as given.
+        judge: of the log, with its folds.
+        recipe: what is fitted.
+        layout: of the recipe's parameters.
+        fit: to the whole log.
+    """
     _, _, free = judge.task(recipe.seconds)
     models = {}
     for k, fold in enumerate(judge.folds.numbers):

@@ -73,7 +73,7 @@ def assess(log: Log, noise: dict[str, float]) -> tuple[dict[str, Excitation], fl
     """
     nu = np.concatenate([run.nu for run in log.runs])
     # What has no sensor at all says nothing, and does not silence the others.
-    told = np.isfinite(nu).any(axis=0)
+    told = np.asarray(np.isfinite(nu).any(axis=0), dtype=bool)
     nu = nu[np.isfinite(nu[:, told]).all(axis=1)]
     result = {}
     for i, name in enumerate(VELOCITY):

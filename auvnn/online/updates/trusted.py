@@ -30,7 +30,13 @@ class Trusted:
         return newest is None or t - newest >= EVERY
 
     def keep(self, t: float, weights: Tensor, scheme: Mapping[str, Tensor]) -> None:
-        """Keep a state beside the newest one; the oldest goes."""
+        """Keep a state beside the newest one; the oldest goes.
+
+        Args:
+            t: time of the state, s.
+            weights: (6, P).
+            scheme: what the scheme remembers.
+        """
         self._kept = [self._kept[-1], (t, weights.clone(), dict(scheme))]
 
     def restart(self) -> None:
