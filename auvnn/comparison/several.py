@@ -18,6 +18,7 @@ from auvnn.errors import ConfigError, InputError
 from auvnn.metrics.rollouts import HORIZONS
 from auvnn.models import GreyBox
 from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
+from auvnn.threads import on_one_thread
 
 Models = Sequence[GivenModel] | Mapping[str, GivenModel]
 
@@ -128,6 +129,7 @@ def compare(
     horizons: Sequence[str | float] = HORIZONS,
     derivative: Mapping[str, Any] | None = None,
 ) -> Comparisons: ...
+@on_one_thread
 def compare(
     model: Any,
     log: GivenLog,
@@ -150,6 +152,13 @@ def compare(
     Raises:
         InputError: the log lacks the commands that drive a model.
         ConfigError: a horizon that is no positive number, or no model.
+
+    Example:
+        ```python
+        log = auvnn.simulate("rov95", runs=1, duration=10.0, noise="none").log
+        found = auvnn.compare("rov95", log, horizons=("1",))
+        found.rollout["1"]["total"]
+        ```
     """
     log = as_log(log)
     if not isinstance(model, (list, tuple, Mapping)):

@@ -25,6 +25,13 @@ def register_effect(kind: type[Effect]) -> type[Effect]:
 
     Raises:
         ConfigError: it is no effect, lacks its name or cause, overrides no hook, or another effect has the name.
+
+    Example:
+        ```python
+        from auvnn.effects import EFFECTS
+
+        auvnn.register_effect(EFFECTS.get("payload"))  # or a class of your own; what is there already stays
+        ```
     """
     if not isinstance(kind, type) or not issubclass(kind, Effect):
         raise ConfigError(f"{_called(kind)} is no effect: give a subclass of auvnn.effects.Effect")

@@ -16,6 +16,7 @@ from auvnn.plants.independent.plant import SUPPORTED
 from auvnn.simulation import simulate
 from auvnn.vehicle import DampingElement, load_vehicle
 from tests.plants.plant_tasks import apart, move, plausible, task
+from tests.unchecked import unchecked
 
 # As a share of the largest motion. Left over by the model's own RK4 at 5 ms; at 2.5 ms it is a tenth of it.
 CLOSE = 2e-6
@@ -203,7 +204,7 @@ def test_what_it_does_not_know_is_refused():
 
 
 def test_divergence_says_when_and_by_what():
-    known = dataclasses.replace(load_vehicle("rov95"), quadratic_damping=-2e3 * np.eye(6))
+    known = unchecked(load_vehicle("rov95"), quadratic_damping=-2e3 * np.eye(6))
     what = task(known, actuation="wrench", rows=200)
     with pytest.raises(AuvnnError, match=r"rov95: run \d diverged after .* s; the largest term was drag"):
         move("numpy", what)

@@ -1,7 +1,5 @@
 """The made logs against an independent plant, and what their rows mean."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 import torch
@@ -11,12 +9,13 @@ from auvnn.errors import AuvnnError, ConfigError
 from auvnn.models import GreyBox, Inputs
 from auvnn.simulation import simulate
 from auvnn.vehicle import load_vehicle
+from tests.unchecked import unchecked
 
 COARSE = {"rate": 10.0, "max_step": 0.05}
 
 
 def model_of(name: str, actuation: str | None = None, **changes) -> GreyBox:
-    return GreyBox(dataclasses.replace(load_vehicle(name), **changes), actuation=actuation)
+    return GreyBox(unchecked(load_vehicle(name), **changes), actuation=actuation)
 
 
 def plain_rate(y, tau, current):

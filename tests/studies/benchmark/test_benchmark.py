@@ -229,7 +229,7 @@ def test_rows_keep_the_order_of_the_cases_whichever_ends_first(monkeypatch):
     answer = benchmark({**OPTIONS, "effects": ["cg_offset", "ocean_current"], "workers": 2}, told.append)
     found = [(r["hidden"], r["size"], r["seed"]) for r in answer.rows]
     assert found == [(c.hidden, c.size, c.seed) for c in todo]
-    assert len(told) == len(todo) and told[-1].startswith(f"{len(todo)} of {len(todo)}: ")
+    assert len(told) == len(todo) and told[-1].done == len(todo) == told[-1].total
 
 
 @pytest.fixture(scope="module")
