@@ -20,9 +20,9 @@ def model() -> GreyBox:
     return load("remus100")
 
 
-def logged(model: GreyBox, hidden, runs: int, duration: float):
+def logged(model: GreyBox, hidden, runs: int, duration: float, excitation: str = "multisine"):
     return simulate(
-        model, "multisine", "realistic", hidden=hidden, runs=runs, duration=duration, rate=10.0, seed=1
+        model, excitation, "realistic", hidden=hidden, runs=runs, duration=duration, rate=10.0, seed=1
     ).log
 
 
@@ -40,8 +40,9 @@ def test_the_force_of_a_fin_in_the_probe_grows_with_the_square_of_the_speed(mode
 
 
 @pytest.mark.long
+@pytest.mark.xfail(strict=True, reason="on trial: a survey's rudder moves with u, and u is what is found")
 def test_what_a_weak_rudder_leaves_is_traced_to_its_angle(model):
-    log = logged(model, {"fin_gain": WEAK}, 3, 30.0)
+    log = logged(model, {"fin_gain": WEAK}, 3, 40.0, "survey")
     found = diagnose(
         model, log, ["net_buoyancy", "constant_force"], advice=False, costs=False, whiteness=False
     )
