@@ -14,7 +14,7 @@ import numpy as np
 
 from auvnn.cards import Card, Shown
 from auvnn.catalogue import Catalogue
-from auvnn.errors import InputError, one_line
+from auvnn.errors import InputError, one_line, refuse_device
 
 # Names, not imports: an answer stands below the floor that draws it.
 DRAWERS = Catalogue(
@@ -99,6 +99,7 @@ def read_start(path: Path, most: int, folder: str) -> bytes:
 
 def write_text(path: Path, text: str) -> Path:
     """Write a file beside its place and move it there, so that a kill never leaves half a file."""
+    refuse_device(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:

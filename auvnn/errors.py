@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 # Characters of a message: what a file holds may be quoted in it, whatever its length.
 MOST = 2900
 
@@ -39,3 +41,13 @@ class MissingExtra(AuvnnError):
     def __init__(self, package: str, extra: str, purpose: str) -> None:
         """Say which package is missing for what, and how to get it."""
         super().__init__(f"{purpose} needs the package '{package}': pip install 'auvnn[{extra}]'")
+
+
+def refuse_device(path: Path) -> None:
+    """Refuse a place that is a pipe or a device: a file that is moved there would take it away.
+
+    Raises:
+        InputError: it is one.
+    """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise InputError(f"{path} is a pipe or a device, which no file may replace: name a file")

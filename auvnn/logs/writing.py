@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from auvnn.errors import ConfigError, InputError, one_line
+from auvnn.errors import ConfigError, InputError, one_line, refuse_device
 from auvnn.logs.seal import file_hash, seal_of, write_seal
 
 if TYPE_CHECKING:
@@ -90,6 +90,7 @@ def write_commands(log: Log, path: Path) -> Path:
 
 
 def _placed(frame: pl.DataFrame, path: Path) -> Path:
+    refuse_device(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")

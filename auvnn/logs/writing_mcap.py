@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from auvnn.errors import InputError, MissingExtra
+from auvnn.errors import InputError, MissingExtra, refuse_device
 from auvnn.logs.channels import POSITION, QUATERNION, VELOCITY
 from auvnn.logs.signals.rotation import multiply
 
@@ -42,6 +42,7 @@ def write_mcap(log: Log, path: Path) -> Path:
     except ImportError:
         raise MissingExtra("rosbags", "ros", "writing MCAP") from None
     store = get_typestore(Stores.ROS2_HUMBLE)
+    refuse_device(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         # rosbags writes a folder with the bag and a description of it; a single MCAP file needs none.
