@@ -96,7 +96,7 @@ def test_fish_completes_the_same(folder):
 @pytest.mark.skipif(ZSH is None, reason="there is no zsh")
 def test_zsh_reads_the_script_and_its_lists():
     made, asked = completion(["zsh"]), "_auvnn_values noise; echo $_comps[auvnn]"
-    script = f"autoload -U compinit; compinit -u -d /dev/null\n{made}\n{asked}"
+    script = f"autoload -U compinit; compinit -u -D\n{made}\n{asked}"
     done = subprocess.run([str(ZSH), "-f", "-c", script], capture_output=True, text=True, timeout=60)
     assert done.stdout.split() == ["none", "paper", "realistic", "_auvnn"], done.stderr
 
