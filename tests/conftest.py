@@ -22,6 +22,7 @@ import torch
 
 torch.set_num_threads(1)
 
+from auvnn.effects import EFFECTS  # noqa: E402
 from auvnn.report import page, style  # noqa: E402
 
 # Hundreds of figures are written to files that no test looks at closely: those that do draw their own. Where parts of a
@@ -55,3 +56,12 @@ def laid_out_figures():
 
 
 style.settle = unsettled
+
+
+@pytest.fixture
+def catalogue_as_before():
+    """Forget afterwards what a test adds to the catalogue of effects, which all tests of a process share."""
+    before = dict(EFFECTS._added)
+    yield
+    EFFECTS._added.clear()
+    EFFECTS._added.update(before)

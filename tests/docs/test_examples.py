@@ -12,14 +12,14 @@ import pytest
 import auvnn
 from auvnn import GreyBox, Log
 
+pytestmark = pytest.mark.usefixtures("catalogue_as_before")
+
 SUBJECTS: dict[str, Any] = {name: getattr(auvnn, name) for name in auvnn.__all__} | {
     "GreyBox.rollout": GreyBox.rollout,
     "Log.read": Log.read,
 }
 # What takes minutes, or files of many dives, runs in the tests of its own room.
 LONG = {"adapt", "add", "diagnose", "diagnose_files", "fleet", "improve", "train", "train_files"}
-# What changes the catalogue of this process would change it for all tests that follow.
-LASTING = {"register_effect"}
 
 
 def example(name: str) -> str:
@@ -45,7 +45,7 @@ def test_there_is_an_example_that_fits_the_signatures(name):
         inspect.signature(subject).bind(*call.args, **{str(k.arg): k.value for k in call.keywords})
 
 
-@pytest.mark.parametrize("name", sorted(set(SUBJECTS) - LONG - LASTING))
+@pytest.mark.parametrize("name", sorted(set(SUBJECTS) - LONG))
 def test_short_examples_run(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     exec(compile(example(name), name, "exec"), {"auvnn": auvnn})

@@ -22,6 +22,7 @@ from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.online.adapter_parts import with_subnetworks
 from auvnn.vehicle import Vehicle
 
+pytestmark = pytest.mark.usefixtures("catalogue_as_before")
 # Launchers that need a package of their own: their lines are only looked at.
 FOREIGN = "hydra/launcher="
 

@@ -10,6 +10,8 @@ from auvnn.effects import EFFECTS, Effect, Parameter
 from auvnn.effects.registering import name_of, names_of, values_of
 from auvnn.errors import ConfigError
 
+pytestmark = pytest.mark.usefixtures("catalogue_as_before")
+
 
 def net_drag(name: str = "net_drag") -> type[Effect]:
     """Return a class of its own each time, as a notebook's cell does that runs again."""
@@ -29,14 +31,6 @@ def net_drag(name: str = "net_drag") -> type[Effect]:
 
     NetDrag.name = name
     return NetDrag
-
-
-@pytest.fixture(autouse=True)
-def forget():
-    before = dict(EFFECTS._added)
-    yield
-    EFFECTS._added.clear()
-    EFFECTS._added.update(before)
 
 
 def test_a_class_goes_wherever_a_name_goes(tmp_path):

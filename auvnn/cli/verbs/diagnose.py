@@ -34,7 +34,14 @@ def _in_memory(job: Job) -> Diagnosis:
     from auvnn.diagnosis import diagnose
 
     log = job.log(partial=True)
-    return diagnose(job.model(log), log, _effects(job), progress=job.say.progress, **_options(job))
+    return diagnose(
+        job.model(log),
+        log,
+        _effects(job),
+        stochastic=bool(job["stochastic"]),
+        progress=job.say.progress,
+        **_options(job),
+    )
 
 
 def _in_parts(job: Job) -> Diagnosis:

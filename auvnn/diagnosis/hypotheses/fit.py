@@ -35,6 +35,8 @@ class FittedHypothesis:
         left_out_count: (B,) samples of each window.
         misfit: the part of minus twice the evidence that is fit: squared error and departure from what was stated.
         judged: what is assumed of the parameters where something is left out; as in the fit by default.
+        under_law: the fit with sums under the law of a stochastic force, in the sensors' white noise; standard errors
+            follow from these. None without a force.
     """
 
     effects: tuple[str, ...]
@@ -45,6 +47,7 @@ class FittedHypothesis:
     left_out_count: Array
     misfit: float = 0.0
     judged: Priors | None = None
+    under_law: Fitted | None = None
 
     @property
     def cv(self) -> float:
@@ -191,7 +194,7 @@ def determined(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> NDA
         explanation: a fit.
         columns: positions within its own parameter vector.
     """
-    fitted = explanation.fitted
+    fitted = explanation.under_law or explanation.fitted
     variance = np.diag(fitted.covariance())[columns]
     return variance * fitted.priors.precision[columns] < DETERMINED**2
 
@@ -205,7 +208,8 @@ def standard_errors(explanation: FittedHypothesis, columns: NDArray[np.int64]) -
         explanation: a fit.
         columns: positions within its own parameter vector.
     """
-    statistics, fitted = explanation.fitted.statistics, explanation.fitted
+    fitted = explanation.under_law or explanation.fitted
+    statistics = fitted.statistics
     covariance = fitted.covariance()
     others = np.setdiff1d(np.arange(len(fitted.theta)), columns)
     whole = NormalEquations(statistics.total + np.diag(fitted.priors.precision), statistics.slope.sum(0))

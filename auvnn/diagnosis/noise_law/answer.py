@@ -15,7 +15,7 @@ from auvnn.diagnosis.answers.answering import answer
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.noise_law.command_holding import Holding, holding, squared_error
 from auvnn.diagnosis.noise_law.foretold import Foretold, foretold
-from auvnn.diagnosis.noise_law.hypothesis import BesideForce
+from auvnn.diagnosis.noise_law.hypothesis import BesideForce, under_its_law
 from auvnn.diagnosis.noise_law.law import ALPHA_BOUNDARY, left
 from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.diagnosis.residuals.forces import actuators_of, share_of
@@ -90,7 +90,7 @@ def _beside_force(
         return None
     result = beside.run(null, [e for e in state.tried if len(e.effects) == 1], asked.most)
     asked.say("asking how much of the force measured inputs foretell")
-    told = foretold(result.last, result.windows)
+    told = foretold(under_its_law(result.last), result.windows)
     if told is not None and told.least <= FORETOLD:
         told = None
     return _state(asked, state, result, chance=told is None), result.estimate.law, told
@@ -120,7 +120,7 @@ def _state(asked: Setting, state: State, result: BesideForce, *, chance: bool) -
         windows=windows,
         current=result.last if named else state.first,
         chosen=result.last.effects if named else (),
-        groups=tuple(tuple(group) for group in result.groups),
+        groups=tuple(tuple(group) for group in result.groups) if named else (),
         withdrawn=(),
         steps=tuple(steps),
         table=table,

@@ -29,18 +29,21 @@ class Hypothesis:
     """An explanation with the law of the force that is most likely with it.
 
     Attributes:
-        explanation: fitted under the law of the explanation before it.
+        explanation: fitted without a force, with its sums under its own law beside.
         estimate: its own law, and its likelihood there.
         misfit: minus twice the log marginal likelihood, departure of the parameters in it, their volume aside.
         evidence: logarithm of the marginal likelihood, up to what all hypotheses of a log share.
-        weighed: the explanation with its windows' sums under its own law.
     """
 
     explanation: FittedHypothesis
     estimate: Estimate
     misfit: float
     evidence: float
-    weighed: FittedHypothesis
+
+    @property
+    def weighed(self) -> FittedHypothesis:
+        """The explanation in the sensors' white noise, with its windows' sums under its own law."""
+        return under_its_law(self.explanation)
 
     @property
     def name(self) -> str:
@@ -55,13 +58,12 @@ class BesideForce:
     Attributes:
         steps: of the search.
         groups: explanations between which the log cannot decide.
-        last: the fit with what was found, under the law of the force.
+        last: the fit with what was found.
         windows: with that law.
         estimate: the law.
         tried: all that were fitted at first, the best first.
         p_value: of there being nothing with a name.
-        first: the fit without any name, under the law of the force.
-        first_law: that law.
+        first_law: the law without any name.
     """
 
     steps: list[dict[str, Any]]
@@ -71,17 +73,26 @@ class BesideForce:
     estimate: Estimate
     tried: list[FittedHypothesis]
     p_value: float
-    first: FittedHypothesis
     first_law: ForceLaw | None
 
 
-def judged(layout: Layout, explanation: FittedHypothesis, sums: ForceSums, law: ForceLaw) -> Hypothesis:
+def under_its_law(explanation: FittedHypothesis) -> FittedHypothesis:
+    """Return an explanation whose fit is the one with sums under its law."""
+    return (
+        explanation if explanation.under_law is None else replace(explanation, fitted=explanation.under_law)
+    )
+
+
+def judged(
+    layout: Layout, explanation: FittedHypothesis, sums: ForceSums, sigma: Array, law: ForceLaw
+) -> Hypothesis:
     """Return an explanation with the law that is most likely with it, and what they are worth.
 
     Args:
         layout: stated values.
         explanation: fitted under some law.
         sums: of its windows.
+        sigma: (18,) the sensors' white noise that they were weighed by.
         law: to begin from; a degree of freedom without a force in it has none here.
     """
     found = estimate(sums, law, law.axes)
@@ -109,9 +120,8 @@ def judged(layout: Layout, explanation: FittedHypothesis, sums: ForceSums, law: 
     information = found.information * sizes[:, None] * sizes
     volume = float(np.linalg.slogdet(information + np.eye(len(sizes)))[1])
     misfit = data + float(away @ away)
-    own = replace(explanation.fitted, statistics=Likelihood(sums).by_window(found.law))
-    weighed = replace(explanation, fitted=own)
-    return Hypothesis(explanation, found, misfit, -0.5 * (misfit + volume), weighed)
+    own = replace(explanation.fitted, statistics=Likelihood(sums).by_window(found.law), sigma=sigma)
+    return Hypothesis(replace(explanation, under_law=own), found, misfit, -0.5 * (misfit + volume))
 
 
 def p_value_of(layout: Layout, after: Hypothesis, before: Hypothesis) -> float:

@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from torch import Tensor
 
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, folds, left_out
 from auvnn.diagnosis.hypotheses.layout import Layout, initial_guess, shapes
 from auvnn.diagnosis.noise_law.hypothesis import BesideForce, Hypothesis, judged, p_value_of, tied
 from auvnn.diagnosis.noise_law.law import estimate
@@ -29,12 +30,14 @@ from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.diagnosis.selection.predictive_density import cross_validated_log_density
 from auvnn.diagnosis.stages.state import Setting
+from auvnn.estimation.normal_equations import linearise, normal_equations
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.estimation.sufficient_statistics import fit_initial_states
 from auvnn.metrics.force_law import ForceLaw, cell_for
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.metrics.windows import Windows
+from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
 # A name is given where chance would seldom do as well among all effects that were asked for; a further one on
@@ -96,9 +99,8 @@ class ForceSearch:
 
     def judged(self, explanation: FittedHypothesis, law: ForceLaw) -> Hypothesis:
         """Return an explanation with the law that is most likely with it, and what they are worth."""
-        return judged(
-            self.layout, explanation, force_sums(explanation, self.windows, self.sigma, self.cell), law
-        )
+        sums = force_sums(explanation, self.windows, self.sigma, self.cell)
+        return judged(self.layout, explanation, sums, self.sigma, law)
 
     def run(self, null: Hypothesis, fitted: Sequence[FittedHypothesis], most: int) -> BesideForce:
         """Search for one effect after the other.
@@ -123,7 +125,7 @@ class ForceSearch:
             self.say(f"testing {len(remaining)} effects beside the force")
             base = [*self.base, *[c for c in chosen if c not in self.base]]
             tested = NullTests(self.layout, replace(self.windows, law=law), self.say)(
-                current.explanation, remaining, base, chosen
+                current.weighed, remaining, base, chosen
             )
             # Beside what was found the variance is no longer inflated by it: the tests say whether to go on.
             if chosen and tested.p_value >= ALPHA:
@@ -156,19 +158,18 @@ class ForceSearch:
             steps.append({"verdict": verdict, "effects": names, "p_value": sure[group[0].name]})
             current = self._taken(group[0])
             if len(group) > 1:
-                groups.append([current.weighed, *(h.weighed for h in group[1:])])
+                groups.append([current.explanation, *(h.explanation for h in group[1:])])
             chosen.append(group[0].name)
         law = current.estimate.law
         assert law is not None
         return BesideForce(
             steps,
             groups,
-            current.weighed,
+            current.explanation,
             replace(self.windows, law=law),
             current.estimate,
-            [h.weighed for h in tried],
+            [h.explanation for h in tried],
             whole,
-            null.weighed,
             null.estimate.law,
         )
 
@@ -251,14 +252,26 @@ class ForceSearch:
                 initial = fit_initial_states(
                     model.without_absent(found.names), self.windows, self.weights, found.fitted.initial
                 )
-                moved = replace(found.fitted, model=model, theta=theta, initial=initial)
-                again = self.judged(replace(found, fitted=moved), law)
+                again = self.judged(self._at(found, model, theta, initial), law)
             except (FitError, np.linalg.LinAlgError, RuntimeError):
                 continue
             # Where the windows are far from linear, a whole step leads away.
             if again.evidence > best.evidence - ODDS:
                 return again
         return best
+
+    def _at(self, found: FittedHypothesis, model: GreyBox, theta: Array, initial: Tensor) -> FittedHypothesis:
+        """Return an explanation at other values, its sums without a force made anew there."""
+        fitted, judged_by = found.fitted, found.judged or found.fitted.priors
+        sums, _, _ = normal_equations(
+            self.windows, linearise(model, self.windows, initial, found.names), fitted.sigma
+        )
+        away = theta - fitted.priors.mean
+        cost = float(sums.cost.sum() + fitted.priors.precision @ away**2)
+        moved = replace(fitted, model=model, theta=theta, initial=initial, statistics=sums, cost=cost)
+        return replace(
+            found, fitted=moved, left_out=left_out(sums, theta, judged_by, folds(self.windows.run))
+        )
 
 
 def foresees(after: Hypothesis, before: Hypothesis, least: float) -> bool:
