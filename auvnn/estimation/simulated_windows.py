@@ -81,7 +81,7 @@ def window_error(model: GreyBox, windows: Windows, eta: Tensor, nu: Tensor) -> T
         else windows.nu_dot - seen.nu_dot
     )
     error = torch.cat(parts, dim=-1)
-    return torch.where(windows.mask > 0, error, torch.zeros_like(error))
+    return windows.whitened(torch.where(windows.mask > 0, error, torch.zeros_like(error)))
 
 
 def substeps_of(windows: Windows) -> int:

@@ -13,11 +13,13 @@ import numpy as np
 from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.answers.answering import answer
 from auvnn.diagnosis.answers.table import fill_candidate
-from auvnn.diagnosis.noise_law.command_holding import Holding, holding, squared_error
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.noise_law.command_holding import holding, squared_error
 from auvnn.diagnosis.noise_law.foretold import Foretold, foretold
 from auvnn.diagnosis.noise_law.hypothesis import BesideForce, under_its_law
 from auvnn.diagnosis.noise_law.law import ALPHA_BOUNDARY, left
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
+from auvnn.diagnosis.noise_law.noise_colour import noise_colour
 from auvnn.diagnosis.noise_law.search import UNSOLVED, ForceSearch
 from auvnn.diagnosis.residuals.forces import actuators_of, share_of
 from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
@@ -49,11 +51,17 @@ def beside_what_is_left(found: Diagnosis, under_way: Searched) -> tuple[Diagnosi
     if not _leaves_something(found):
         return found, under_way
     asked = under_way.setting
-    held = _held(under_way)
-    if held.odds > 0.0:
-        asked.say(f"commands change between samples ({held.name}): searching again")
-        found, under_way = search(asked, held.applied(under_way.state.windows))
-    told: dict[str, Any] = {"commands": held.to_dict()}
+    least = _leaves_least(under_way.state)
+    held = holding(least, under_way.state.windows)
+    windows = held.applied(under_way.state.windows)
+    asked.say("asking whether the sensors' noise is white")
+    colour = noise_colour(least, windows, under_way.floor)
+    if held.odds > 0.0 or colour.noise is not None:
+        why = [f"commands change between samples ({held.name})"] if held.odds > 0.0 else []
+        why += [] if colour.noise is None else ["the sensors' noise is not white"]
+        asked.say(f"{' and '.join(why)}: searching again")
+        found, under_way = search(asked, colour.applied(windows))
+    told: dict[str, Any] = {"commands": held.to_dict(), "noise": colour.to_dict()}
     if not _leaves_something(found):
         return replace(found, stochastic=told), under_way
     try:
@@ -75,12 +83,10 @@ def _leaves_something(found: Diagnosis) -> bool:
     return found.verdict in ("unknown", "partial") or found.steps[-1]["verdict"] == "unknown"
 
 
-def _held(under_way: Searched) -> Holding:
-    """Return how commands go between samples, by the explanation that leaves least, whatever the search made of it."""
-    state = under_way.state
-    ends = [state.first, *state.tried, state.current]
+def _leaves_least(state: State) -> FittedHypothesis:
+    """Return the explanation that leaves least, whatever the search made of it."""
     sigma = state.first.fitted.sigma
-    return holding(min(ends, key=lambda e: squared_error(e, sigma)), state.windows)
+    return min([state.first, *state.tried, state.current], key=lambda e: squared_error(e, sigma))
 
 
 def _beside_force(
@@ -99,12 +105,23 @@ def _beside_force(
     null = beside.begin(first, white(first, floor))
     if null is None:
         return None
-    result = beside.run(null, fitted_alone(asked, state), asked.most)
+    alone = fitted_alone(asked, state)
+    result = beside.run(null, alone, asked.most)
+    told = _foretold(asked, result)
+    if told is not None and not asked.tolerance.strict:
+        # What inputs foretell has a cause: one that costs little is taken where nothing is foretold beside it.
+        beside.whatever_it_costs = True
+        again = beside.run(null, alone, asked.most)
+        if _foretold(asked, again) is None:
+            result, told = again, None
+    return _state(asked, state, result, chance=told is None), result.estimate.law, told
+
+
+def _foretold(asked: Setting, result: BesideForce) -> Foretold | None:
+    """Return what measured inputs foretell of the force, None where that is little."""
     asked.say("asking how much of the force measured inputs foretell")
     told = foretold(under_its_law(result.last), result.windows)
-    if told is not None and told.least <= FORETOLD:
-        told = None
-    return _state(asked, state, result, chance=told is None), result.estimate.law, told
+    return None if told is None or told.least <= FORETOLD else told
 
 
 def _state(asked: Setting, state: State, result: BesideForce, *, chance: bool) -> State:
