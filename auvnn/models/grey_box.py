@@ -134,8 +134,8 @@ class GreyBox(ShownModel, EquationsOfMotion):
 
     @property
     def before_thrust(self) -> list[Effect]:
-        """The effects that decide how thrust follows from commands over time, in order of action."""
-        return [e for hook in ("command", "delay", "respond") for e in self.using(hook)]
+        """The effects that decide how thrust and fins follow their commands over time, in order of action."""
+        return [e for hook in ("command", "delay", "respond", "steer") for e in self.using(hook)]
 
     @property
     def members(self) -> list[Effect]:

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from auvnn.effects import Moment, Sensed
 from auvnn.models import GreyBox, Inputs, Trajectory
+from auvnn.models.actuation.actuators import answer_of
 from auvnn.models.actuation.thrust_signal import ThrustSignal
 from auvnn.models.free_running.rollout import LIMIT, steps_per_interval
 from auvnn.physics.attitude import quat_derivative, quat_to_matrix
@@ -78,7 +79,7 @@ class OwnPlant(Plant):
                 run, inputs = closed_loop(model, task, task.controller, seen, voltage, t, task.max_step)
             position, quaternion = run.eta[..., :3], run.eta[..., 3:]
             times = run.times.expand(run.nu.shape[:-1])
-            rate = model.nu_dot(position, quat_to_matrix(quaternion), run.nu, run.thrust, inputs, times)
+            rate = model.nu_dot(position, quat_to_matrix(quaternion), run.nu, run.acting, inputs, times)
             sensed = model.sense(Sensed(position, quaternion, run.nu, rate))
         assert sensed.nu_dot is not None
         fins = None if inputs.fins is None else inputs.fins.numpy()
@@ -170,7 +171,9 @@ class Stepper:
         self.thrusts: list[Tensor] = []
         self.etas: list[Tensor] = []
         self.nus: list[Tensor] = []
-        self.lag = next(iter(model.using("respond")), None)
+        self.lag, self.steer = (answer_of(model.members, hook) for hook in ("respond", "steer"))
+        self.angles: Tensor | None = None
+        self.turned: list[Tensor] = []
         self.delay = max((float(e.delay()) for e in model.using("delay")), default=0.0)
         self.demands: list[Tensor] = []
         self.states: list[Tensor] = []
@@ -195,7 +198,7 @@ class Stepper:
         for part in range(self.substeps):
             mean, slope = demand, None
             if self.lag is not None:
-                answer = self.lag.respond(self.actual, demand, torch.full((1,), h, dtype=demand.dtype))
+                answer = self.lag(self.actual, demand, torch.full((1,), h, dtype=demand.dtype))
                 mean, slope, start = answer.mean, answer.slope, answer.start
             else:
                 start = demand
@@ -203,6 +206,14 @@ class Stepper:
                 mean, slope, start = self._delayed(k, part, h)
             if part == 0:
                 self.thrusts.append(start)
+            if self.steer is not None and fins is not None:
+                at = fins if self.angles is None else self.angles
+                turned = self.steer(at, fins, torch.full((1,), h, dtype=demand.dtype))
+                if part == 0:
+                    self.turned.append(turned.start)
+                self.angles = turned.end
+                slope = torch.zeros_like(mean) if slope is None else slope
+                mean, slope = torch.cat([mean, turned.mean], -1), torch.cat([slope, turned.slope], -1)
             if last:
                 return
             if self.lag is not None:
@@ -274,7 +285,9 @@ class Stepper:
     def trajectory(self) -> Trajectory:
         """Return the motion so far."""
         eta, nu, thrust = (torch.stack(x, dim=-2) for x in (self.etas, self.nus, self.thrusts))
-        return Trajectory(self.t, eta, nu, thrust)
+        return Trajectory(
+            self.t, eta, nu, thrust, fins=torch.stack(self.turned, dim=-2) if self.turned else None
+        )
 
 
 def _first_velocity(plant: GreyBox, plan: Start) -> Tensor:
