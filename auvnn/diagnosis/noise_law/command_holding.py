@@ -155,8 +155,7 @@ def _cost(first: FittedHypothesis, windows: Windows) -> float:
         windows, linearise(fitted.model, windows, fitted.initial, first.names), fitted.sigma
     )
     inside = fitted.priors.inside(fitted.theta)
-    precision = fitted.priors.precision[inside]
-    pull = sums.slope.sum(0)[inside] - precision * (fitted.theta - fitted.priors.mean)[inside]
-    square = sums.total[np.ix_(inside, inside)] + np.diag(precision)
+    pull = (sums.slope.sum(0) - fitted.priors.pull(fitted.theta))[inside]
+    square = (sums.total + fitted.priors.square)[np.ix_(inside, inside)]
     step = np.linalg.lstsq(square, pull, rcond=1e-12)[0] if inside.any() else np.zeros(0)
     return float(sums.cost.sum() - (pull @ step if inside.any() else 0.0))
