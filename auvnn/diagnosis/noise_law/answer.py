@@ -17,7 +17,7 @@ from auvnn.diagnosis.noise_law.command_holding import Holding, holding, squared_
 from auvnn.diagnosis.noise_law.foretold import Foretold, foretold
 from auvnn.diagnosis.noise_law.hypothesis import BesideForce, under_its_law
 from auvnn.diagnosis.noise_law.law import ALPHA_BOUNDARY, left
-from auvnn.diagnosis.noise_law.search import ForceSearch
+from auvnn.diagnosis.noise_law.search import UNSOLVED, ForceSearch
 from auvnn.diagnosis.residuals.forces import actuators_of, share_of
 from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
 from auvnn.diagnosis.search import search
@@ -28,6 +28,10 @@ from auvnn.metrics.force_law import ForceLaw
 FORETOLD = 0.1
 # Share of the force beyond which a name has left most of it.
 MOST = 0.5
+UNDECIDED = (
+    "names were not compared beside a stochastic force: with one, free running grows without bound; "
+    "choose shorter windows with window="
+)
 # Standard errors of a one-sided limit that holds in 19 of 20 logs.
 ONE_SIDED = 1.645
 
@@ -49,7 +53,11 @@ def beside_what_is_left(found: Diagnosis, under_way: Searched) -> tuple[Diagnosi
     told: dict[str, Any] = {"commands": held.to_dict()}
     if not _leaves_something(found):
         return replace(found, stochastic=told), under_way
-    beside = _beside_force(asked, under_way)
+    try:
+        beside = _beside_force(asked, under_way)
+    except UNSOLVED:
+        # The first answer stands: it did not need what could not be solved here.
+        return replace(found, stochastic=told, warnings=[*found.warnings, UNDECIDED]), under_way
     if beside is None:
         return replace(found, stochastic=told), under_way
     state, law, foreknown = beside
