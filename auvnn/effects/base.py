@@ -28,8 +28,7 @@ class Effect(nn.Module):
     Hooks, along the signal path:
         `command`: the commands of a whole stretch, before the thruster curves (dead band).
         `delay`: by how much the thrust comes late; at most one effect has it.
-        `respond`: dynamics between the demanded and the actual thrust (lag); at most one effect has it.
-        `steer`: dynamics between the commanded and the actual fin angles; at most one effect has it.
+        `respond`, `steer`: dynamics between demanded and actual thrust (lag), or fin angles; at most one effect each.
         `thrust`: the thrust of each actuator (gain, voltage, loss by inflow).
         `water`: velocity and acceleration of the water, NED.
         `body`: mass, centres, inertia, added mass, buoyancy, damping coefficients.
@@ -264,15 +263,7 @@ class Effect(nn.Module):
         return Response(demand, demand, torch.zeros_like(demand), demand)
 
     def steer(self, state: Tensor, command: Tensor, step: Tensor) -> Response:
-        """Return how fin angles go from `state` under constant commands over `step` seconds, (..., m).
-
-        What `respond` says of the answer holds here too, rad in the place of N.
-
-        Args:
-            state: angles at the start, rad, (..., m).
-            command: angles that are commanded, rad, (..., m).
-            step: for how long, s, broadcast against both.
-        """
+        """Return how fin angles go from `state` under constant commands, rad, (..., m); all else as in `respond`."""
         return Response(command, command, torch.zeros_like(command), command)
 
     def thrust(self, thrust: Tensor, moment: Moment) -> Tensor:

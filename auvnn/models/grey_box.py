@@ -18,7 +18,7 @@ from auvnn.errors import ConfigError
 from auvnn.models.actuation.actuators import Actuators
 from auvnn.models.equations_of_motion import EquationsOfMotion
 from auvnn.models.inputs import Inputs
-from auvnn.models.joint_covariance import JointCovariance
+from auvnn.models.joint_covariance import JointCovariance, with_joint
 from auvnn.models.saving import PASSIVE, REGION, SUBNETWORKS, save
 from auvnn.models.shown import ShownModel
 from auvnn.models.stated_drag import StatedDrag
@@ -98,8 +98,7 @@ class GreyBox(ShownModel, EquationsOfMotion):
         self._by_hook = {h: [e for e in members if h in e.hooks()] for h in HOOKS}
         # Depth of a flat bottom, m: gives the altitude to a simulated vehicle that has no altimeter to go by.
         self.bottom: float | None = None
-        # How uncertain the effects' parameters are together, where a fit has said so.
-        self.joint: JointCovariance | None = None
+        self.joint: JointCovariance | None = None  # of the effects' parameters, where a fit has said it
         self.time_varying = any(e.time_varying for e in self._by_hook["body"])
         self._constants(vehicle)
 
@@ -187,16 +186,11 @@ class GreyBox(ShownModel, EquationsOfMotion):
             actuation: "thrusters" or "wrench", or None for the same.
         """
         made = self._like(effects, vehicle or self.vehicle, actuation or self.actuation, shared=False)
-        return self._as_uncertain(made)
+        return with_joint(made, self.joint)
 
     def sharing(self, effects: Iterable[Effect]) -> GreyBox:
         """Return a model with other effects that shares its learned parts with this one: nothing is copied."""
-        return self._as_uncertain(self._like(effects, self.vehicle, self.actuation, shared=True))
-
-    def _as_uncertain(self, made: GreyBox) -> GreyBox:
-        """Return a model with what is known of the joint uncertainty of the effects that it shares with this one."""
-        made.joint = None if self.joint is None else self.joint.of(made.effect_names)
-        return made
+        return with_joint(self._like(effects, self.vehicle, self.actuation, shared=True), self.joint)
 
     def beside(self, *effects: Effect) -> GreyBox:
         """Return the model with further effects, probes among them: its own are copied, learned parts shared."""

@@ -12,11 +12,11 @@ from torch import Tensor
 
 from auvnn.effects import Moment, Sensed
 from auvnn.models import GreyBox, Inputs, Trajectory
-from auvnn.models.actuation.actuators import answer_of
 from auvnn.models.actuation.thrust_signal import ThrustSignal
 from auvnn.models.free_running.rollout import LIMIT, steps_per_interval
 from auvnn.physics.attitude import quat_derivative, quat_to_matrix
 from auvnn.plants.base import Controller, Look, Motion, Plant, PlantTask, diverged, refuse, refuse_laws
+from auvnn.plants.followed_fins import FollowedFins
 
 Array = NDArray[np.float64]
 
@@ -171,9 +171,7 @@ class Stepper:
         self.thrusts: list[Tensor] = []
         self.etas: list[Tensor] = []
         self.nus: list[Tensor] = []
-        self.lag, self.steer = (answer_of(model.members, hook) for hook in ("respond", "steer"))
-        self.angles: Tensor | None = None
-        self.turned: list[Tensor] = []
+        self.lag, self.followed = next(iter(model.using("respond")), None), FollowedFins(model)
         self.delay = max((float(e.delay()) for e in model.using("delay")), default=0.0)
         self.demands: list[Tensor] = []
         self.states: list[Tensor] = []
@@ -196,24 +194,15 @@ class Stepper:
         last = k == len(self.t) - 1
         h = float(self.t[min(k + 1, len(self.t) - 1)] - self.t[min(k, len(self.t) - 2)]) / self.substeps
         for part in range(self.substeps):
-            mean, slope = demand, None
+            mean, slope, start = demand, None, demand
             if self.lag is not None:
-                answer = self.lag(self.actual, demand, torch.full((1,), h, dtype=demand.dtype))
+                answer = self.lag.respond(self.actual, demand, torch.full((1,), h, dtype=demand.dtype))
                 mean, slope, start = answer.mean, answer.slope, answer.start
-            else:
-                start = demand
             if self.delay > 0:
                 mean, slope, start = self._delayed(k, part, h)
             if part == 0:
                 self.thrusts.append(start)
-            if self.steer is not None and fins is not None:
-                at = fins if self.angles is None else self.angles
-                turned = self.steer(at, fins, torch.full((1,), h, dtype=demand.dtype))
-                if part == 0:
-                    self.turned.append(turned.start)
-                self.angles = turned.end
-                slope = torch.zeros_like(mean) if slope is None else slope
-                mean, slope = torch.cat([mean, turned.mean], -1), torch.cat([slope, turned.slope], -1)
+            mean, slope = self.followed.beside(mean, slope, fins, h, part == 0)
             if last:
                 return
             if self.lag is not None:
@@ -226,7 +215,7 @@ class Stepper:
         times = self.t[: k + 1]
         first = max(int(torch.searchsorted(times, times[k] - self.delay - h)) - 1, 0)
         demand, state = (torch.stack(x[first:], dim=-2) for x in (self.demands, self.states))
-        signal = ThrustSignal(demand, state, times[first:], self.lag)
+        signal = ThrustSignal(demand, state, times[first:], self.lag and self.lag.respond)
         when = (times[k] + part * h - self.delay).expand(*demand.shape[:-2], 1)
         mean, slope = signal.over(when, torch.full_like(when, h), h)
         return mean.squeeze(-2), slope.squeeze(-2), signal.at(when).squeeze(-2)
@@ -285,9 +274,7 @@ class Stepper:
     def trajectory(self) -> Trajectory:
         """Return the motion so far."""
         eta, nu, thrust = (torch.stack(x, dim=-2) for x in (self.etas, self.nus, self.thrusts))
-        return Trajectory(
-            self.t, eta, nu, thrust, fins=torch.stack(self.turned, dim=-2) if self.turned else None
-        )
+        return Trajectory(self.t, eta, nu, thrust, fins=self.followed.angles())
 
 
 def _first_velocity(plant: GreyBox, plan: Start) -> Tensor:

@@ -165,7 +165,7 @@ def priors(layout: Layout, names: Sequence[str], free: Sequence[str] = ()) -> Pr
     joint, whole = None, np.concatenate(precision)
     if (correlations := correlation_of(layout, names, free)) is not None:
         unit = np.sqrt(whole)
-        joint = np.linalg.inv(correlations) * unit[:, None] * unit
+        joint = np.asarray(np.linalg.inv(correlations) * unit[:, None] * unit, dtype=np.float64)
     return Priors(np.concatenate(mean), whole, np.concatenate(reach), joint)
 
 
@@ -196,7 +196,7 @@ def correlation_of(layout: Layout, names: Sequence[str], free: Sequence[str] = (
 def correlation_root(layout: Layout, names: Sequence[str], free: Sequence[str] = ()) -> Array | None:
     """Return L, (P, P), with L L^T = `correlation_of`; None where there are no correlations."""
     found = correlation_of(layout, names, free)
-    return None if found is None else np.linalg.cholesky(found)
+    return None if found is None else np.asarray(np.linalg.cholesky(found), dtype=np.float64)
 
 
 def shapes(layout: Layout, name: str) -> NDArray[np.bool_]:

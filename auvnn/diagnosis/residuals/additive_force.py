@@ -220,7 +220,7 @@ def _need(sums: _ForceSums, layout: Layout, own: NDArray[np.int64], scale: Array
     wanted, null = wanted[kept], null[kept]
     free = np.concatenate([inside, own])
     # Of the force as little is assumed as keeps what the log does not see at nought.
-    precision = block_diag(sums.precision, np.diag(1e-4 * scale**-2.0))
+    precision = np.asarray(block_diag(sums.precision, np.diag(1e-4 * scale**-2.0)))
     pull = np.concatenate([sums.pull, np.zeros(len(own))])
     known = sums.held(free, precision, pull).part(free)
     covariance = known.covariance()
