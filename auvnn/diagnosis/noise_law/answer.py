@@ -174,8 +174,10 @@ def overwhelming(asked: Setting, state: State, law: ForceLaw | None) -> bool:
         return False
     # What changes faster than the vehicle answers moves it little: the mean over a second counts.
     mean = law.rms * np.sqrt(np.minimum(1.0, 2.0 * law.time / SECOND))
-    share = share_of(mean, actuators_of(asked.layout.model, state.windows))[law.rms > 0.0]
-    return bool((share[np.isfinite(share)] > LARGEST).any())
+    drive = actuators_of(asked.layout.model, state.windows)
+    # Fins and a vehicle's own balance hold what thrusters do not: the largest of forces, and of moments, is the measure.
+    most = np.repeat([drive[:3].max(), drive[3:].max()], 3)
+    return bool((mean[most > 0.0] > LARGEST * most[most > 0.0]).any())
 
 
 def negligible(asked: Setting, state: State, law: ForceLaw | None) -> bool:

@@ -163,10 +163,8 @@ def cost_at_best(first: FittedHypothesis, windows: Windows, sigma: Array | None 
         fitted.sigma if sigma is None else sigma,
     )
     inside = fitted.priors.inside(fitted.theta)
-    away = fitted.theta - fitted.priors.mean
-    precision = fitted.priors.precision[inside]
-    pull = sums.slope.sum(0)[inside] - precision * away[inside]
-    square = sums.total[np.ix_(inside, inside)] + np.diag(precision)
+    pull = (sums.slope.sum(0) - fitted.priors.pull(fitted.theta))[inside]
+    square = (sums.total + fitted.priors.square)[np.ix_(inside, inside)]
     step = np.linalg.lstsq(square, pull, rcond=1e-12)[0] if inside.any() else np.zeros(0)
     best = float(sums.cost.sum() - (pull @ step if inside.any() else 0.0))
-    return best + (float(fitted.priors.precision @ away**2) if len(away) else 0.0)
+    return best + (fitted.priors.cost(fitted.theta) if len(fitted.theta) else 0.0)

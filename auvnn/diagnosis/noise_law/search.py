@@ -277,8 +277,7 @@ class ForceSearch:
         sums, _, _ = normal_equations(
             self.windows, linearise(model, self.windows, initial, found.names), fitted.sigma
         )
-        away = theta - fitted.priors.mean
-        cost = float(sums.cost.sum() + fitted.priors.precision @ away**2)
+        cost = float(sums.cost.sum()) + fitted.priors.penalty(theta)
         moved = replace(fitted, model=model, theta=theta, initial=initial, statistics=sums, cost=cost)
         return replace(
             found, fitted=moved, left_out=left_out(sums, theta, judged_by, folds(self.windows.run))
