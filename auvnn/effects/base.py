@@ -263,7 +263,13 @@ class Effect(nn.Module):
         return Response(demand, demand, torch.zeros_like(demand), demand)
 
     def steer(self, state: Tensor, command: Tensor, step: Tensor) -> Response:
-        """Return how fin angles go from `state` under constant commands, rad, (..., m); all else as in `respond`."""
+        """Return how fin angles go from `state` under constant commands; what must be linear is as in `respond`.
+
+        Args:
+            state: angles at the start, rad, (..., m).
+            command: angles that are asked for, rad, (..., m).
+            step: for how long, s, broadcast against both.
+        """
         return Response(command, command, torch.zeros_like(command), command)
 
     def thrust(self, thrust: Tensor, moment: Moment) -> Tensor:

@@ -37,5 +37,11 @@ class FinLag(FinEffect):
         return (Parameter("time_constant", "s", 0.0, 0.15, 0.0, 5.0),)
 
     def steer(self, state: Tensor, command: Tensor, step: Tensor) -> Response:
-        """Return the lagged angles; at the null they are the commands themselves, exactly."""
+        """Return the lagged angles; at the null they are the commands themselves, exactly.
+
+        Args:
+            state: angles at the start, rad, (..., m).
+            command: angles that are asked for, rad, (..., m).
+            step: for how long, s, broadcast against both.
+        """
         return first_order(self.theta[0], state, command, step)

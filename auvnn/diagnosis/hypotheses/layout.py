@@ -194,7 +194,13 @@ def correlation_of(layout: Layout, names: Sequence[str], free: Sequence[str] = (
 
 
 def correlation_root(layout: Layout, names: Sequence[str], free: Sequence[str] = ()) -> Array | None:
-    """Return L, (P, P), with L L^T = `correlation_of`; None where there are no correlations."""
+    """Return L, (P, P), with L L^T = `correlation_of`; None where there are no correlations.
+
+    Args:
+        layout: stated values, and what is known of them together.
+        names: effects whose P parameters are asked for, in order.
+        free: effects of which nothing is taken as known.
+    """
     found = correlation_of(layout, names, free)
     return None if found is None else np.asarray(np.linalg.cholesky(found), dtype=np.float64)
 

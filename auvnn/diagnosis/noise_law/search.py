@@ -16,7 +16,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
@@ -32,7 +31,7 @@ from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.diagnosis.selection.predictive_density import cross_validated_log_density
 from auvnn.diagnosis.stages.state import Setting
 from auvnn.estimation.normal_equations import linearise, normal_equations
-from auvnn.estimation.prediction_error import FitError
+from auvnn.estimation.prediction_error import SINGULAR, FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.estimation.sufficient_statistics import fit_initial_states
 from auvnn.metrics.force_law import ForceLaw, cell_for
@@ -42,7 +41,7 @@ from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
 # What is raised where free running grows without bound, and sums of it cannot be solved.
-UNSOLVED = (FitError, np.linalg.LinAlgError, torch.linalg.LinAlgError)
+UNSOLVED = (FitError, np.linalg.LinAlgError, SINGULAR)
 # A name is given where chance would seldom do as well among all effects that were asked for; a further one on
 # stronger grounds, because each time chance gets another turn.
 ALPHA_NAME, ALPHA_FURTHER = 0.01, 0.001
