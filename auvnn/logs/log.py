@@ -29,8 +29,7 @@ class Log(ShownLog):
     `len(log)` is the number of runs, `log[0]` the first of them, `log[1:]` a log of the others, `log["u"]` a column.
 
     Args:
-        runs: the runs, with the same columns and different numbers; stamps that are dates (1e7 s and more) are counted
-            from the earliest one.
+        runs: the runs, with the same columns and different numbers; stamps of 1e7 s and more count from the earliest.
         name: what to call the log in words and file names.
         paths: the files it was read from; empty for a log made in memory.
         repairs: what was mended or noted while reading.
