@@ -65,11 +65,19 @@ def _leaves_something(found: Diagnosis) -> bool:
 
 
 def _held(under_way: Searched) -> Holding:
-    """Return how commands go between samples, by the explanation that leaves least, whatever the search made of it."""
+    """Return how commands go between samples, by the explanation that leaves least, whatever the search made of it.
+
+    One that was tried and is about to diverge says nothing of them: then the next best is asked.
+    """
     state = under_way.state
     ends = [state.first, *state.tried, state.current]
     sigma = state.first.fitted.sigma
-    return holding(min(ends, key=lambda e: squared_error(e, sigma)), state.windows)
+    for end in sorted(ends, key=lambda e: squared_error(e, sigma)):
+        try:
+            return holding(end, state.windows)
+        except np.linalg.LinAlgError:
+            continue
+    return Holding("held", 0.0, 0.0, 0.0)
 
 
 def _beside_force(

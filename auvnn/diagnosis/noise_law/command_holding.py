@@ -107,6 +107,9 @@ def holding(first: FittedHypothesis, windows: Windows) -> Holding:
     Args:
         first: a fit of commands that are held.
         windows: those it was fitted to.
+
+    Raises:
+        numpy.linalg.LinAlgError: free running with the fit grows without bound.
     """
     held = Holding("held", 0.0, 0.0, 0.0)
     # An acceleration is measured at an instant: the mean over an interval says nothing of it.
@@ -155,6 +158,8 @@ def _cost(first: FittedHypothesis, windows: Windows) -> float:
         windows, linearise(fitted.model, windows, fitted.initial, first.names), fitted.sigma
     )
     inside = fitted.priors.inside(fitted.theta)
+    if not (np.isfinite(sums.cost).all() and np.isfinite(sums.total[np.ix_(inside, inside)]).all()):
+        raise np.linalg.LinAlgError("free running grows without bound")
     precision = fitted.priors.precision[inside]
     pull = sums.slope.sum(0)[inside] - precision * (fitted.theta - fitted.priors.mean)[inside]
     square = sums.total[np.ix_(inside, inside)] + np.diag(precision)
