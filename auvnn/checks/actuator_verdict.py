@@ -78,7 +78,7 @@ def judged(problem: _ActuatorRegression) -> Judged:
     )
     own = float(np.exp(-0.5 * (costs[best] - cost.min())))
     ties = [(i, j) for i, j in problem.ties(best, costs) if told[i] and told[j]]
-    return Judged(best, costs[best], own / (own + rivals), gains, told, dead, ties)
+    return Judged(best, problem.cost(best), own / (own + rivals), gains, told, dead, ties)
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,8 @@ class ByAxis:
 
     Attributes:
         gains: over what is stated, signed, by axis.
-        findings: which are turned round.
+        findings: which are turned round, in words.
+        turned: the same, 0 to 5.
         confidence: of the findings.
         cost: chi-square.
         misfit: root mean square distance, in standard errors.
@@ -95,6 +96,7 @@ class ByAxis:
 
     gains: dict[str, float]
     findings: list[str]
+    turned: list[int]
     confidence: float
     cost: float
     misfit: float
@@ -143,11 +145,11 @@ def by_axis(
     found = judged(problem)
     gains = {AXES[k]: float(found.gains[j] * found.best.sign[j]) for j, k in enumerate(axes) if found.told[j]}
     turned = [
-        AXES[k] for j, k in enumerate(axes) if found.told[j] and found.best.sign[j] < 0 and not found.dead[j]
+        int(k) for j, k in enumerate(axes) if found.told[j] and found.best.sign[j] < 0 and not found.dead[j]
     ]
-    findings = [f"all that drives {a} is turned round" for a in turned]
+    findings = [f"all that drives {AXES[k]} is turned round" for k in turned]
     misfit = float(np.sqrt(problem.distance(found.best)))
-    return ByAxis(gains, findings, found.confidence, found.cost, misfit)
+    return ByAxis(gains, findings, turned, found.confidence, found.cost, misfit)
 
 
 def cures(findings: Sequence[str]) -> list[str]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from auvnn.answers import plain
 from auvnn.checks import regression
+from auvnn.checks.actuator_prediction import foretells_better
 from auvnn.checks.actuator_regression import (
     EXCITED,
     SOUND,
@@ -51,6 +52,7 @@ class ActuatorCheck:
         misfit: root mean square distance of the estimated columns from the stated ones, in standard errors.
         cures: what to do about the findings.
         axes: force or moment of all actuators together over what is stated, by axis, where they are driven together.
+        withdrawn: findings of the regression with which free running foretells the log no better.
     """
 
     names: list[str]
@@ -64,6 +66,7 @@ class ActuatorCheck:
     misfit: float = 0.0
     cures: list[str] = field(default_factory=list)
     axes: dict[str, float] = field(default_factory=dict)
+    withdrawn: list[str] = field(default_factory=list)
 
     @property
     def sure(self) -> bool:
@@ -97,6 +100,11 @@ class ActuatorCheck:
             out[0] = (
                 f"{', '.join(n for n in self.names if n not in self.untold)}: the log fits neither the model file nor "
                 "reversed, exchanged or dead actuators: something else is missing, nothing is said of them"
+            )
+        if self.withdrawn:
+            out[0] = (
+                f"nothing is said of the actuators: the regression finds that {'; '.join(self.withdrawn)}, but with that "
+                "free running predicts the log no better; a controller that answers the sensors' noise does this"
             )
         if self.untold:
             out.append(
@@ -177,8 +185,13 @@ def check_actuators(model: GreyBox, log: Log) -> ActuatorCheck:
         f"{names[i]} gives {100 * gains[i]:.0f} % of the stated thrust, whatever it is told" for i in dead
     ]
     confidence, misfit = found.confidence, float(np.sqrt(problem.distance(found.best)))
+    changed = allocation[:, place] * np.array(sign) * np.where(np.isin(np.arange(len(place)), dead), 0.0, 1.0)
     if axes is not None and axes.explains_more(found):
         words, confidence, misfit = axes.findings, axes.confidence, axes.misfit
+        changed = np.where(np.isin(np.arange(6), axes.turned), -1.0, 1.0)[:, None] * allocation
+    withdrawn: list[str] = []
+    if words and confidence >= SURE and misfit < SOUND and not foretells_better(model, log, changed):
+        words, withdrawn = [], words
     return ActuatorCheck(
         names,
         not words,
@@ -191,6 +204,7 @@ def check_actuators(model: GreyBox, log: Log) -> ActuatorCheck:
         misfit,
         cures(words),
         {} if axes is None else axes.to_dict(),
+        withdrawn,
     )
 
 

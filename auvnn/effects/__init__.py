@@ -29,6 +29,7 @@ EFFECTS = Catalogue(
         "cross_flow_drag": "auvnn.effects.cross_flow_drag:CrossFlowDrag",
         "body_lift": "auvnn.effects.body_lift:BodyLift",
         "munk_moment": "auvnn.effects.munk_moment:MunkMoment",
+        "added_mass_coriolis": "auvnn.effects.added_mass_coriolis:AddedMassCoriolis",
         "biofouling": "auvnn.effects.biofouling:Biofouling",
         "cg_offset": "auvnn.effects.cg_offset:CgOffset",
         "net_buoyancy": "auvnn.effects.net_buoyancy:NetBuoyancy",

@@ -25,7 +25,7 @@ class BodyLift(Effect):
     cause = "the hull gives lift at an angle to the flow"
     symbol = "Y_uv"
     reference = "Prestero (2001), body lift; Hoerner and Borst (1985), Fluid-Dynamic Lift"
-    confused_with = ("munk_moment", "coupled_damping")
+    confused_with = ("munk_moment", "coupled_damping", "added_mass_coriolis")
     manoeuvre = "oblique"
     told_apart_by = "steady speed at several angles of drift and attack"
 

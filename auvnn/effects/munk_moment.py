@@ -23,7 +23,7 @@ class MunkMoment(Effect):
     cause = "the Munk moment is not the ideal one"
     symbol = "k_M"
     reference = "Munk (1924), NACA 184; Newman (1977), section 4.13"
-    confused_with = ("body_lift", "added_mass")
+    confused_with = ("body_lift", "added_mass", "added_mass_coriolis")
     manoeuvre = "rotation"
     told_apart_by = "turning at zero speed, then runs at an angle of drift"
     plainer = ("added_mass",)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Extent, Moment, Parameter
-from auvnn.effects.sizes import full_wrench, usual_speeds
+from auvnn.effects.base import Extent, Moment, Parameter
+from auvnn.effects.inflow import InflowEffect
+from auvnn.effects.sizes import usual_speeds
 
 
-class ThrustAdvance(Effect):
+class ThrustAdvance(InflowEffect):
     """T_i <- T_i (1 - loss J_i / (1 + |J_i|)) with the advance ratio J_i = V_i / (c_i V_1), V_i = b_i . nu_r.
 
     The thrust coefficient K_T falls with J; here it falls steeply at first and then less, so that a propeller in fast
@@ -46,22 +46,9 @@ class ThrustAdvance(Effect):
         speed = parameters[1].null
         return [{"speed": 0.5 * speed}, {"speed": 2.0 * speed}]
 
-    def settle(self, vehicle: Any, actuation: str) -> None:
-        """Keep the actuators' geometry and what a full command is."""
-        if actuation == "wrench":
-            columns, full = np.diag([1.0, 1, 1, 0, 0, 0]), full_wrench(vehicle)
-        else:
-            columns = np.array(
-                [[*u.direction, *np.cross(u.position, u.direction)] for u in vehicle.thrusters]
-            )
-            full = np.ones(len(columns))
-        self.keep("columns", columns)
-        self.keep("full", full)
-
     def thrust(self, thrust: Tensor, moment: Moment) -> Tensor:
         """Take the loss off."""
-        inflow = moment.nu_r @ self.kept("columns").to(thrust).mT
-        share = moment.command.to(thrust) / self.kept("full").to(thrust)
+        inflow, share = self.inflow(moment).to(thrust), self.share(moment).to(thrust)
         loss, speed = self.theta.to(thrust).unbind(-1)
         # J / (1 + |J|) without dividing by a command that may be nought.
         ratio = inflow * torch.sign(share) / (share.abs() * speed + inflow.abs() + 1e-9 * speed)

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from torch import Tensor
 
-from auvnn.effects.base import Effect
 from auvnn.effects.hooks import Moment, Parameter
+from auvnn.effects.inflow import InflowEffect
 from auvnn.effects.sizes import full_wrench
 
 
-class ThrustInflowLoss(Effect):
+class ThrustInflowLoss(InflowEffect):
     """Loss by inflow: T_i <- T_i - k |c_i| V_i, V_i = d_i . (v_r + omega x r_i) = b_i . nu_r.
 
     From T = rho D^4 [K_0 n |n| - c |n| V_a / D] with revolutions n in proportion to the command c. It vanishes
@@ -39,20 +39,7 @@ class ThrustInflowLoss(Effect):
             full = float(np.mean([max(u.max_forward, u.max_reverse) for u in vehicle.thrusters]))
         return (Parameter("coefficient", "N s/m", 0.0, 0.3 * full, -5 * full, 20 * full),)
 
-    def settle(self, vehicle: Any, actuation: str) -> None:
-        """Keep the actuators' geometry and what a full command is."""
-        if actuation == "wrench":
-            columns, full = np.diag([1.0, 1, 1, 0, 0, 0]), full_wrench(vehicle)
-        else:
-            columns = np.array(
-                [[*u.direction, *np.cross(u.position, u.direction)] for u in vehicle.thrusters]
-            )
-            full = np.ones(len(columns))
-        self.keep("columns", columns)
-        self.keep("full", full)
-
     def thrust(self, thrust: Tensor, moment: Moment) -> Tensor:
         """Take the loss off."""
-        inflow = moment.nu_r @ self.kept("columns").to(thrust).mT
-        share = moment.command.to(thrust).abs() / self.kept("full").to(thrust)
-        return thrust - self.theta[0].to(thrust) * share * inflow
+        share = self.share(moment).to(thrust).abs()
+        return thrust - self.theta[0].to(thrust) * share * self.inflow(moment).to(thrust)

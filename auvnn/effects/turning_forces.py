@@ -40,7 +40,7 @@ class TurningForces(Effect):
     cause = "forces in a turn are not those of the added mass"
     symbol = "Y_ur"
     reference = "Gertler and Hagen (1967), DTMB report 2510"
-    confused_with = ("added_mass", "body_lift", "munk_moment")
+    confused_with = ("added_mass", "body_lift", "munk_moment", "added_mass_coriolis")
     manoeuvre = "rotation"
     told_apart_by = "turns at several speeds"
     plainer = ("coupled_damping",)

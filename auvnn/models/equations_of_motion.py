@@ -283,4 +283,10 @@ class EquationsOfMotion(Sensors):
             moment = replace(moment, thrust=thrust, drag=sum(drag, torch.zeros_like(nu)))
         for effect in self.using("wrench"):
             terms[str(effect.name)] = effect.wrench(moment, body)
-        return terms, prepared
+        return self._with_learned(terms, prepared, nu, rotation), prepared
+
+    def _with_learned(
+        self, terms: dict[str, Tensor], prepared: Prepared, nu: Tensor, rotation: Tensor
+    ) -> dict[str, Tensor]:
+        """Return the terms as they are; structures with learned parts put these beside or in the place of known ones."""
+        return terms

@@ -54,27 +54,50 @@ def test_bash_completes_verbs_keys_and_values(folder):
     assert bash("auvnn check model=nothing", folder) == []
 
 
-@pytest.mark.skipif(BASH is None, reason="there is no bash")
-def test_a_person_at_bash_presses_tab(folder):
-    """Not the function alone: what readline writes into the line."""
-    (folder / "rc").write_text(f"{completion(['bash'])}\nPS1='> '\nauvnn() {{ echo \"got: $*\"; }}\n")
-    (folder / "inputrc").write_text("set enable-bracketed-paste off\nset bell-style none\n")
+def typed(program: str, words: list[str], keys: bytes, folder) -> str:
+    """Return what a shell on a terminal shows, after somebody has typed `keys` there."""
     child, terminal = pty.fork()
     if child == 0:
         os.chdir(folder)
-        os.environ.update(INPUTRC="inputrc", TERM="dumb", HOME=str(folder))
-        os.execv(str(BASH), ["bash", "--noprofile", "--rcfile", "rc", "-i"])
+        os.environ.update(INPUTRC="inputrc", TERM="dumb", HOME=str(folder), ZDOTDIR=str(folder))
+        os.execv(program, [program, *words])
+    said, end = "", time.monotonic() + 60
     try:
-        os.write(terminal, b"auvnn simul\tdurat\t12 noi\treal\t model=bluerov2_\t\n")
-        said, end = "", time.monotonic() + 60
-        while "got: " not in said.split("\n", 1)[-1] and time.monotonic() < end:
+        # A line editor that starts throws away what was typed before it was there.
+        while "ready> " not in said and time.monotonic() < end:
+            if select.select([terminal], [], [], 1.0)[0]:
+                said += os.read(terminal, 4096).decode("utf-8", "replace")
+        os.write(terminal, keys)
+        while "got: " not in said and time.monotonic() < end:
             if select.select([terminal], [], [], 1.0)[0]:
                 said += os.read(terminal, 4096).decode("utf-8", "replace")
     finally:
         os.write(terminal, b"exit\n")
         os.close(terminal)
         os.waitpid(child, 0)
-    assert "got: simulate duration=12 noise=realistic model=bluerov2_heavy" in said
+    return said
+
+
+# Defined so that the line as it is typed does not hold what it prints.
+SAYS = "auvnn() { printf 'g%s: %s\\n' ot \"$*\"; }"
+KEYS = b"auvnn simul\tdurat\t12 noi\treal\t model=bluerov2_\t\n"
+MEANT = "got: simulate duration=12 noise=realistic model=bluerov2_heavy"
+
+
+@pytest.mark.skipif(BASH is None, reason="there is no bash")
+def test_a_person_at_bash_presses_tab(folder):
+    """Not the function alone: what readline writes into the line."""
+    (folder / "rc").write_text(f"{completion(['bash'])}\nPS1='ready> '\n{SAYS}\n")
+    (folder / "inputrc").write_text("set enable-bracketed-paste off\nset bell-style none\n")
+    assert MEANT in typed(str(BASH), ["--noprofile", "--rcfile", "rc", "-i"], KEYS, folder)
+
+
+@pytest.mark.skipif(ZSH is None, reason="there is no zsh")
+def test_a_person_at_zsh_presses_tab(folder):
+    (folder / ".zshrc").write_text(
+        f"autoload -U compinit; compinit -u -D\n{completion(['zsh'])}\nPS1='ready> '\n{SAYS}\n"
+    )
+    assert MEANT in typed(str(ZSH), ["-o", "no_global_rcs", "-i"], KEYS, folder)
 
 
 @pytest.mark.skipif(FISH is None, reason="there is no fish")

@@ -34,14 +34,8 @@ def _in_memory(job: Job) -> Diagnosis:
     from auvnn.diagnosis import diagnose
 
     log = job.log(partial=True)
-    return diagnose(
-        job.model(log),
-        log,
-        _effects(job),
-        stochastic=bool(job["stochastic"]),
-        progress=job.say.progress,
-        **_options(job),
-    )
+    options = {**_options(job), "stochastic": bool(job["stochastic"])}
+    return diagnose(job.model(log), log, _effects(job), progress=job.say.progress, **options)
 
 
 def _in_parts(job: Job) -> Diagnosis:

@@ -17,7 +17,8 @@ from auvnn.diagnosis.noise_law.command_holding import Holding, holding, squared_
 from auvnn.diagnosis.noise_law.foretold import Foretold, foretold
 from auvnn.diagnosis.noise_law.hypothesis import BesideForce, under_its_law
 from auvnn.diagnosis.noise_law.law import ALPHA_BOUNDARY, left
-from auvnn.diagnosis.noise_law.search import ForceSearch
+from auvnn.diagnosis.noise_law.leaders import fitted_alone
+from auvnn.diagnosis.noise_law.search import UNSOLVED, ForceSearch
 from auvnn.diagnosis.residuals.forces import actuators_of, share_of
 from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
 from auvnn.diagnosis.search import search
@@ -28,6 +29,12 @@ from auvnn.metrics.force_law import ForceLaw
 FORETOLD = 0.1
 # Share of the force beyond which a name has left most of it.
 MOST = 0.5
+# A stochastic force beyond this share of the actuators' is no disturbance: the model lacks what moves the vehicle.
+LARGEST, SECOND = 0.5, 1.0
+UNDECIDED = (
+    "names were not compared beside a stochastic force: with one, free running grows without bound; "
+    "choose shorter windows with window="
+)
 # Standard errors of a one-sided limit that holds in 19 of 20 logs.
 ONE_SIDED = 1.645
 
@@ -49,7 +56,11 @@ def beside_what_is_left(found: Diagnosis, under_way: Searched) -> tuple[Diagnosi
     told: dict[str, Any] = {"commands": held.to_dict()}
     if not _leaves_something(found):
         return replace(found, stochastic=told), under_way
-    beside = _beside_force(asked, under_way)
+    try:
+        beside = _beside_force(asked, under_way)
+    except UNSOLVED:
+        # The first answer stands: it did not need what could not be solved here.
+        return replace(found, stochastic=told, warnings=[*found.warnings, UNDECIDED]), under_way
     if beside is None:
         return replace(found, stochastic=told), under_way
     state, law, foreknown = beside
@@ -96,7 +107,7 @@ def _beside_force(
     null = beside.begin(first, white(first, floor))
     if null is None:
         return None
-    result = beside.run(null, [e for e in state.tried if len(e.effects) == 1], asked.most)
+    result = beside.run(null, fitted_alone(asked, state), asked.most)
     asked.say("asking how much of the force measured inputs foretell")
     told = foretold(under_its_law(result.last), result.windows)
     if told is not None and told.least <= FORETOLD:
@@ -113,7 +124,7 @@ def _state(asked: Setting, state: State, result: BesideForce, *, chance: bool) -
         table = fill_candidate(asked.layout, table, explanation, state.first)
     share = _share_left(result)
     # A force that follows from what is measured is no noise: a name beside which most of it stays is not its cause.
-    refuted = not chance and share > MOST
+    refuted = (not chance and share > MOST) or overwhelming(asked, state, law)
     named = [] if refuted else list(result.steps)
     tried = [e for s in result.steps for e in s["effects"]]
     end: dict[str, Any] = {
@@ -140,6 +151,22 @@ def _state(asked: Setting, state: State, result: BesideForce, *, chance: bool) -
         partial=False,
         unexplained=share if named else state.unexplained,
     )
+
+
+def overwhelming(asked: Setting, state: State, law: ForceLaw | None) -> bool:
+    """Whether the stochastic force is so large beside the actuators' that no cause can be told from the motion.
+
+    Args:
+        asked: layout.
+        state: windows over which the force was sought.
+        law: root mean square, N and N m, and correlation time, s, of the force; None where none was found.
+    """
+    if law is None:
+        return False
+    # What changes faster than the vehicle answers moves it little: the mean over a second counts.
+    mean = law.rms * np.sqrt(np.minimum(1.0, 2.0 * law.time / SECOND))
+    share = share_of(mean, actuators_of(asked.layout.model, state.windows))[law.rms > 0.0]
+    return bool((share[np.isfinite(share)] > LARGEST).any())
 
 
 def negligible(asked: Setting, state: State, law: ForceLaw | None) -> bool:

@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
@@ -40,6 +41,8 @@ from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
+# What is raised where free running grows without bound, and sums of it cannot be solved.
+UNSOLVED = (FitError, np.linalg.LinAlgError, torch.linalg.LinAlgError)
 # A name is given where chance would seldom do as well among all effects that were asked for; a further one on
 # stronger grounds, because each time chance gets another turn.
 ALPHA_NAME, ALPHA_FURTHER = 0.01, 0.001
@@ -102,6 +105,13 @@ class ForceSearch:
         sums = force_sums(explanation, self.windows, self.sigma, self.cell)
         return judged(self.layout, explanation, sums, self.sigma, law)
 
+    def _judged_or_none(self, explanation: FittedHypothesis, law: ForceLaw) -> Hypothesis | None:
+        """Return a judged explanation; None where its free running grows so that nothing can be said of it."""
+        try:
+            return self.judged(explanation, law)
+        except UNSOLVED:
+            return None
+
     def run(self, null: Hypothesis, fitted: Sequence[FittedHypothesis], most: int) -> BesideForce:
         """Search for one effect after the other.
 
@@ -132,7 +142,7 @@ class ForceSearch:
                 break
             odds = max(ODDS, FURTHER_SHARE * (current.evidence - null.evidence))
             leading = self._leading(tested, current, base, chosen, fitted, WORTH_A_FIT * odds)
-            found = [self.judged(e, law) for e in leading]
+            found = [h for h in (self._judged_or_none(e, law) for e in leading) if h is not None]
             found.sort(key=lambda h: -h.evidence)
             sure = {h.name: min(1.0, len(remaining) * p_value_of(self.layout, h, current)) for h in found}
             if not chosen:
@@ -253,7 +263,7 @@ class ForceSearch:
                     model.without_absent(found.names), self.windows, self.weights, found.fitted.initial
                 )
                 again = self.judged(self._at(found, model, theta, initial), law)
-            except (FitError, np.linalg.LinAlgError, RuntimeError):
+            except UNSOLVED:
                 continue
             # Where the windows are far from linear, a whole step leads away.
             if again.evidence > best.evidence - ODDS:

@@ -10,7 +10,6 @@ from torch import Tensor
 
 from auvnn.effects import Effect
 from auvnn.models.equations_of_motion import Prepared
-from auvnn.models.inputs import Inputs
 from auvnn.models.structures.base import Structure, without_damping
 from auvnn.models.structures.networks import Networks
 from auvnn.physics.products import matvec
@@ -64,21 +63,12 @@ class Parallel(Structure):
         lead = torch.broadcast_shapes(*(p.shape[:-1] for p in parts))
         return torch.cat([p.expand(*lead, p.shape[-1]) for p in parts], dim=-1)
 
-    def _terms(
-        self,
-        position: Tensor,
-        rotation: Tensor,
-        nu: Tensor,
-        thrust: Tensor,
-        inputs: Inputs,
-        time: Tensor,
-        prepared: Prepared | None,
-    ) -> tuple[dict[str, Tensor], Prepared]:
-        terms, prepared = super()._terms(position, rotation, nu, thrust, inputs, time, prepared)
+    def _with_learned(
+        self, terms: dict[str, Tensor], prepared: Prepared, nu: Tensor, rotation: Tensor
+    ) -> dict[str, Tensor]:
         # The network gives an acceleration; as a wrench it goes through M^-1 with the others and comes out again.
         added = self.learned["parallel"](self.features(nu, terms["thrust"], rotation))
-        terms["parallel network"] = matvec(prepared.total, added)
-        return terms, prepared
+        return {**terms, "parallel network": matvec(prepared.total, added)}
 
 
 # A class is a function of a vehicle too; the catalogue's members are all called the same way.

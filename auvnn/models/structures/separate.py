@@ -12,7 +12,6 @@ from torch import Tensor, nn
 from auvnn.effects import Effect, Moment
 from auvnn.errors import ConfigError
 from auvnn.models.equations_of_motion import Prepared
-from auvnn.models.inputs import Inputs
 from auvnn.models.structures.base import Structure
 from auvnn.models.structures.damping import velocity_features
 from auvnn.models.structures.networks import Networks
@@ -114,25 +113,16 @@ class Separate(Structure):
             return prepared
         return replace(prepared, inverse=cast(InverseInertia, self.learned["inverse_inertia"])())
 
-    def _terms(
-        self,
-        position: Tensor,
-        rotation: Tensor,
-        nu: Tensor,
-        thrust: Tensor,
-        inputs: Inputs,
-        time: Tensor,
-        prepared: Prepared | None,
-    ) -> tuple[dict[str, Tensor], Prepared]:
-        terms, prepared = super()._terms(position, rotation, nu, thrust, inputs, time, prepared)
+    def _with_learned(
+        self, terms: dict[str, Tensor], prepared: Prepared, nu: Tensor, rotation: Tensor
+    ) -> dict[str, Tensor]:
         if "velocity" in self.learned:
-            for name in _VELOCITY_TERMS:
-                terms.pop(name, None)
+            terms = {name: term for name, term in terms.items() if name not in _VELOCITY_TERMS}
             terms["Coriolis"] = -coriolis_force(prepared.rigid, nu)
             terms["network of C + D"] = -self.learned["velocity"](velocity_features(nu))
         if "gravity" in self.learned:
-            terms["restoring"] = -self.learned["gravity"](rotation[..., 2, :])
-        return terms, prepared
+            terms = {**terms, "restoring": -self.learned["gravity"](rotation[..., 2, :])}
+        return terms
 
 
 separate = Separate

@@ -75,6 +75,8 @@ class Equations(Forces):
                 vehicle, effects.get("fin_stall", {}).get("factor", 1.0), laws.separation, effects
             )
         self.moves = any(n in effects for n in ("ocean_current", "current_shear", "waves"))
+        # Share of the ideal forces of the water's inertia that acts on a body that moves steadily.
+        self.gyration = laws.added_coriolis * effects.get("added_mass_coriolis", {}).get("factor", 1.0)
         self.held = grasp(effects["payload"]["time"], vehicle) if "payload" in effects else None
         self.radius = sphere_radius(vehicle)
         self.walls = [n for n in ("bottom_proximity", "surface_proximity") if n in effects]
@@ -154,7 +156,7 @@ class Equations(Forces):
         p, m = impulse[:, :3], impulse[:, 3:]
         out = {
             "inertia of the body": np.concatenate([force, moment], axis=-1),
-            "inertia of the water": -self.laws.added_coriolis
+            "inertia of the water": -self.gyration
             * np.concatenate([cross(turn, p), cross(turn, m) + cross(near.flow, p)], axis=-1),
         }
         if near.gain is not None:

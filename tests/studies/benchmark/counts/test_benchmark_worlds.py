@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from auvnn.config import config_dir, read_yaml
 from auvnn.errors import ConfigError
 from auvnn.models import load
 from auvnn.simulation import simulate
@@ -16,17 +15,9 @@ from auvnn.studies.benchmark import cases, run_case
 from auvnn.studies.benchmark.cases import targets
 from auvnn.studies.benchmark.costs import cost_of, costly
 from auvnn.studies.benchmark.counts.rates import NUMBERS, RATES
+from tests.studies.benchmark.plans import OPTIONS, of_plan
 
-OPTIONS: dict[str, Any] = {
-    "effects": "all", "sizes": "medium", "noises": "realistic", "excitations": "multisine", "vehicles": "rov95",
-    "coefficients": "exact", "repeats": 1, "seed": 1, "runs": 2, "duration": 15.0, "rate": 20.0, "workers": 1,
-}  # fmt: skip
 WORLDS = ("between", "disturbed", "shaped", "sensors", "conventions", "everything")
-
-
-def of_plan(name: str) -> tuple[dict[str, Any], list[Any]]:
-    options = {**OPTIONS, "plan": read_yaml(config_dir() / "plan" / f"{name}.yaml")}
-    return options, cases(options)
 
 
 def test_the_blind_plan_has_every_effect_at_every_cost_in_every_world():
