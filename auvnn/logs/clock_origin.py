@@ -57,7 +57,9 @@ def note(origin: float, where: str, count: int) -> Repair:
         where: file, or name of the log.
         count: of the stamps.
     """
-    words = f"t counts from {origin:.0f} s, since the stamps are dates: it is s since the recording's beginning"
+    words = (
+        f"t counts from {origin:.0f} s, since the stamps are dates: it is s since the recording's beginning"
+    )
     return Repair(words, where, count, "info")
 
 

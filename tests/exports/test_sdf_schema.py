@@ -169,7 +169,9 @@ def test_every_link_has_a_mass_and_an_inertia_that_a_body_can_have(root):
         inertial = link.find("inertial")
         assert float(inertial.findtext("mass")) > 0.0
         i = {name: float(inertial.findtext(f"inertia/{name}")) for name in INERTIA}
-        tensor = np.array([[i["ixx"], i["ixy"], i["ixz"]], [i["ixy"], i["iyy"], i["iyz"]], [i["ixz"], i["iyz"], i["izz"]]])
+        tensor = np.array(
+            [[i["ixx"], i["ixy"], i["ixz"]], [i["ixy"], i["iyy"], i["iyz"]], [i["ixz"], i["iyz"], i["izz"]]]
+        )
         moments = np.linalg.eigvalsh(tensor)
         assert moments[0] > 0.0 and moments[2] <= (moments[0] + moments[1]) * (1 + 1e-6), link.get("name")
         added = inertial.find("fluid_added_mass")

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import InputError
+from auvnn.logs.clock_origin import counted_from
 from auvnn.logs.readers import READERS, choose
 from auvnn.logs.readers.ros2_folder import ros2_files
-from auvnn.logs.clock_origin import counted_from
 from auvnn.logs.reading.collect import FIRST_ROWS, Collector, FileClock, collect
 from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.run import Run

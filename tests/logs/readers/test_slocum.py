@@ -28,7 +28,9 @@ def test_it_is_known_by_its_content(file: Path) -> None:
     assert choose(file)[0].name == choose(other)[0].name == "slocum"
 
 
-def test_without_the_reader_one_line_says_what_to_install(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_reader_one_line_says_what_to_install(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     found = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name, *more: None if name == "dbdreader" else found(name, *more)
