@@ -155,7 +155,7 @@ def test_check_diagnose_and_add_give_the_same(together: Log):
     assert [str(f) for f in one] == [str(f) for f in other]
     answers = [auvnn.diagnose(model, log, asked, advice=False, whiteness=False).to_dict() for log in logs]
     assert answers[0]["missing"] == ["payload"]
-    _same(*answers)
+    _same(answers[0], answers[1])
     added = [auvnn.add(model, log, ["payload"]).to_dict() for log in logs]
     assert added[0]["accepted"]
-    _same(*added)
+    _same(added[0], added[1])

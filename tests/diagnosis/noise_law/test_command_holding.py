@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -88,7 +89,11 @@ def test_a_fit_that_grows_without_bound_is_passed_over(model):
     wild = replace(first, fitted=replace(first.fitted, initial=1e160 * first.fitted.initial, statistics=none))
     with pytest.raises(np.linalg.LinAlgError, match="without bound"):
         holding(wild, windows)
-    state = SimpleNamespace(first=first, tried=[wild], current=wild, windows=windows)
-    assert _held(SimpleNamespace(state=state)) == holding(first, windows)
-    state = SimpleNamespace(first=wild, tried=[], current=wild, windows=windows)
-    assert _held(SimpleNamespace(state=state)).name == "held"
+
+    def found(first, *tried):
+        where: Any = SimpleNamespace(first=first, tried=list(tried), current=wild, windows=windows)
+        ended: Any = SimpleNamespace(state=where)
+        return _held(ended)
+
+    assert found(first, wild) == holding(first, windows)
+    assert found(wild).name == "held"

@@ -1,4 +1,4 @@
-"""A Slocum glider's file where its reader is not installed, and where it is: a stand-in that gives what dbdreader does."""
+"""A Slocum glider's file without its reader, and with a stand-in that gives what dbdreader does."""
 
 from __future__ import annotations
 
