@@ -246,7 +246,7 @@ def newton(fitted: Fitted, held: Any, keep: NDArray[np.bool_]) -> NDArray[np.flo
     step = np.zeros(len(theta))
     if free.any():
         hessian, slope = sums.hessian[keep].sum(0), sums.slope[keep].sum(0)
-        whole = NormalEquations.with_priors(hessian, slope, held.precision, theta - held.mean)
+        whole = NormalEquations.with_priors(hessian, slope, held.square, theta - held.mean)
         step[free] = whole.part(free).solve()
     return np.clip(theta + step, low, high)
 

@@ -50,6 +50,7 @@ EFFECTS = Catalogue(
         "fin_gain": "auvnn.effects.fin_gain:FinGain",
         "fin_offset": "auvnn.effects.fin_offset:FinOffset",
         "fin_drag": "auvnn.effects.fin_drag:FinDrag",
+        "fin_lag": "auvnn.effects.fin_lag:FinLag",
         "tether": "auvnn.effects.tether:Tether",
         "constant_force": "auvnn.effects.constant_force:ConstantForce",
         "gyro_bias": "auvnn.effects.gyro_bias:GyroBias",

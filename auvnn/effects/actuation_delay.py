@@ -11,7 +11,7 @@ from auvnn.effects.hooks import Parameter
 
 
 class ActuationDelay(Effect):
-    """Pure delay of all actuators: T(t) = T_demand(t - delay).
+    """Pure delay of all thrust: T(t) = T_demand(t - delay); fins are where they are commanded.
 
     Commands are held between rows, so the delayed thrust jumps inside an interval unless the delay is a
     multiple of it; its average over each step is taken exactly, which also makes it differentiable.
@@ -22,7 +22,7 @@ class ActuationDelay(Effect):
     cause = "the thrust comes a fixed time after its command"
     symbol = "T_d"
     reference = "Ljung (1999), System Identification, section 4.2"
-    confused_with = ("thruster_lag", "added_mass")
+    confused_with = ("thruster_lag", "added_mass", "fin_lag")
     manoeuvre = "chirp"
     told_apart_by = "steps and swept sines"
     plainer = ("thruster_lag",)

@@ -17,7 +17,7 @@ class AddedMass(AxisFactors):
     cause = "the added mass is not the nominal one"
     symbol = "M_A"
     reference = "Fossen (2011), chapter 6"
-    confused_with = ("trapped_water", "thruster_lag", "actuation_delay", "thruster_gain")
+    confused_with = ("trapped_water", "thruster_lag", "actuation_delay", "thruster_gain", "fin_lag")
     manoeuvre = "chirp"
     told_apart_by = (
         "swept sines: inertia grows with the square of the frequency, a lag does not depend on the amplitude"

@@ -28,7 +28,7 @@ class Effect(nn.Module):
     Hooks, along the signal path:
         `command`: the commands of a whole stretch, before the thruster curves (dead band).
         `delay`: by how much the thrust comes late; at most one effect has it.
-        `respond`: dynamics between the demanded and the actual thrust (lag); at most one effect has it.
+        `respond`, `steer`: dynamics between demanded and actual thrust (lag), or fin angles; at most one effect each.
         `thrust`: the thrust of each actuator (gain, voltage, loss by inflow).
         `water`: velocity and acceleration of the water, NED.
         `body`: mass, centres, inertia, added mass, buoyancy, damping coefficients.
@@ -262,6 +262,10 @@ class Effect(nn.Module):
         """
         return Response(demand, demand, torch.zeros_like(demand), demand)
 
+    def steer(self, state: Tensor, command: Tensor, step: Tensor) -> Response:
+        """Return how fin angles go from `state` under constant commands, rad, (..., m); all else as in `respond`."""
+        return Response(command, command, torch.zeros_like(command), command)
+
     def thrust(self, thrust: Tensor, moment: Moment) -> Tensor:
         """Change the actuators' thrust, N (or the wrench, where it is commanded), (..., n)."""
         return thrust
@@ -284,7 +288,7 @@ class Effect(nn.Module):
         return sensed
 
 
-HOOKS = ("command", "delay", "respond", "thrust", "water", "body", "wrench", "sense")
+HOOKS = ("command", "delay", "respond", "steer", "thrust", "water", "body", "wrench", "sense")
 
 
 def axis_scale(factors: Tensor) -> Tensor:

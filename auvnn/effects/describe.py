@@ -14,6 +14,7 @@ HOOK_WORDS = {
     "command": "the commands",
     "delay": "the time at which thrust comes",
     "respond": "how thrust follows its demand",
+    "steer": "how fin angles follow their commands",
     "thrust": "the thrust",
     "water": "the motion of the water",
     "body": "mass, buoyancy, centres and damping",

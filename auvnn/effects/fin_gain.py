@@ -22,7 +22,7 @@ class FinGain(FinEffect):
     cause = "a fin gives more or less lift than it should"
     symbol = "k_delta"
     reference = "Prestero (2001), Verification of a six-degree of freedom simulation model, section 4.5"
-    confused_with = ("fin_offset", "body_lift", "fin_stall")
+    confused_with = ("fin_offset", "body_lift", "fin_stall", "fin_lag")
     manoeuvre = "survey"
     told_apart_by = (
         "turns and depth changes at several speeds: the fins' force grows with the square of the speed"

@@ -139,7 +139,7 @@ class Moment:
         nu_r: velocity through the water, (..., 6); equal to `nu` inside `water`.
         nu_c_dot: acceleration of the water in body axes, (..., 6); zero inside `water`.
         command: what was commanded over this interval, (..., n).
-        fins: fin angles, rad, (..., m), or None.
+        fins: fin angles, rad, (..., m), or None; where an effect has the fins follow their commands, the actual ones.
         voltage: V, (...), or None.
         altitude: m, (...), or None.
         thrust: what the actuators give, N (or the wrench, where it is commanded), (..., n); in `wrench` only.
@@ -173,7 +173,7 @@ class Sensed:
 
 @dataclass(frozen=True)
 class Response:
-    """An actuator's answer to a constant demand over one step, N, (..., n) each.
+    """An actuator's answer to a constant demand over one step, N (of a fin rad), (..., n) each.
 
     Attributes:
         end: thrust at the end of the step.

@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-import torch
 from torch import Tensor
 
 from auvnn.effects.base import Effect
+from auvnn.effects.first_order import first_order
 from auvnn.effects.hooks import Parameter, Response
-
-SMALL = 0.05
-"""Step over time constant below which the power series holds to the last digits."""
-
-SERIES = tuple(
-    12 * (-1) ** n * ((n + 1) / math.factorial(n + 2) - 0.5 / math.factorial(n + 1)) for n in range(1, 7)
-)
 
 
 class ThrusterLag(Effect):
@@ -42,26 +34,5 @@ class ThrusterLag(Effect):
         return (Parameter("time_constant", "s", 0.0, 0.15, 0.0, 5.0),)
 
     def respond(self, state: Tensor, demand: Tensor, step: Tensor) -> Response:
-        """Return the lagged thrust; at the null it is the demand itself, exactly.
-
-        With x = tau/h and E = exp(-1/x): mean T_d + (T_0 - T_d) x (1 - E), and a straight line's rise of
-        12 (T_0 - T_d) [x^2 (1 - E (1 + 1/x)) - x (1 - E)/2] for the first moment; where x is large these
-        differences would lose all digits, so the rise is taken from its power series in 1/x there.
-        """
-        tau = self.theta[0].to(demand)
-        ratio = tau / torch.clamp(step, min=1e-9)
-        # Below a thousandth of the step exp(-1/x) is zero to the last bit; its slope would be 0/0.
-        slow = ratio > 1e-3
-        inverse = 1.0 / torch.where(slow, ratio, torch.ones_like(ratio))
-        left = torch.where(slow, torch.exp(-inverse), torch.zeros_like(ratio))
-        inverse = torch.where(slow, inverse, torch.zeros_like(ratio))
-        mean = ratio * -torch.expm1(-inverse)
-        mean = torch.where(slow, mean, ratio)
-        moment = 12 * (ratio * ratio * (1 - left * (1 + inverse)) - 0.5 * mean)
-        small, series = torch.clamp(inverse, max=SMALL), 0.0
-        for coefficient in reversed(SERIES):
-            series = (series + coefficient) * small
-        moment = torch.where(slow & (inverse < SMALL), series, moment)
-        gap = state - demand
-        start = torch.where(tau > 0, state, demand)
-        return Response(demand + gap * left, demand + gap * mean, gap * moment, start)
+        """Return the lagged thrust; at the null it is the demand itself, exactly."""
+        return first_order(self.theta[0], state, demand, step)

@@ -19,6 +19,7 @@ from auvnn.estimation.force_columns import pushed
 from auvnn.estimation.force_sums import LOOSE, beside_force, cost_beside_force
 from auvnn.estimation.sensitivity import Response, respond_by
 from auvnn.estimation.simulated_windows import simulate_windows
+from auvnn.metrics.coloured_noise import previous
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 
@@ -158,6 +159,8 @@ def normal_equations(
     # Channels that were not measured would only be multiplied by nought.
     weighed = torch.nonzero(weight).flatten().tolist()
     parts: list[list[Array]] = []
+    adjacent = (windows.mask[:, 1:] * windows.mask[:, :-1]).sum((0, 1))
+    rare = adjacent < 0.5 * windows.mask.sum((0, 1))
     begin, hessian = 0, np.zeros((len(windows), 0, 0))
     spent: list[Array] = []
     volume: list[Array] = []
@@ -195,6 +198,9 @@ def normal_equations(
         remaining = torch.where(mask > 0, remaining, torch.zeros_like(remaining))
         pair = mask[:, 1:] * mask[:, :-1]
         step = (remaining[:, 1:] - remaining[:, :-1]) * pair
+        if rare.any():
+            # Of a sensor that is slower than the log two measurements never follow row on row.
+            pair, step = _since_the_last(remaining, mask, rare, pair, step)
         parts.append(
             [
                 x.numpy()
@@ -217,6 +223,16 @@ def normal_equations(
     of_force = of_force if leverage else (None, of_force[1])
     found = Statistics(hessian, slope, cost, channel, count, rough, pairs, run, first, *of_force)
     return found, change, follow
+
+
+def _since_the_last(
+    remaining: Tensor, mask: Tensor, rare: Tensor, pair: Tensor, step: Tensor
+) -> tuple[Tensor, Tensor]:
+    """Return pairs and differences with those of rarely measured channels taken to their last measurement."""
+    before = previous(mask)
+    seen = mask * (before >= 0)
+    gap = (remaining - torch.gather(remaining, 1, before.clamp(min=0))) * seen
+    return torch.where(rare, seen[:, 1:], pair), torch.where(rare, gap[:, 1:], step)
 
 
 def weights_of(sigma: Array) -> Tensor:

@@ -42,9 +42,11 @@ class NormalEquations:
         Args:
             square: J^T J, (P, P).
             slope: J^T e, (P,).
-            precision: of the priors, (P,).
+            precision: of the priors, (P,), or (P, P) where some go together.
             away: how far the parameters are from the priors' means, (P,).
         """
+        if precision.ndim == 2:
+            return cls(square + precision, slope - precision @ away)
         return cls(square + np.diag(precision), slope - precision * away)
 
     def part(self, columns: Columns) -> NormalEquations:

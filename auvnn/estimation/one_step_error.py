@@ -109,7 +109,7 @@ def fit_one_step(
         return out
 
     def penalty(at: Array) -> float:
-        return float(priors.precision @ (at - priors.mean) ** 2)
+        return priors.penalty(at)
 
     blocks, run, first = _blocks(log, block)
     converged, taken, damping = False, 0, 1e-4
@@ -117,9 +117,7 @@ def fit_one_step(
     for taken in range(1, iterations + 1):
         weighted = (slope / own[:, None]).reshape(-1, len(theta))
         pull = weighted.T @ (here / own).ravel()
-        known = NormalEquations.with_priors(
-            weighted.T @ weighted, pull, priors.precision, theta - priors.mean
-        )
+        known = NormalEquations.with_priors(weighted.T @ weighted, pull, priors.square, theta - priors.mean)
         if not np.isfinite(known.square).all():
             raise FitError(f"the accelerations of {model.vehicle.name} do not stay finite one step ahead")
         now = float(((here / own) ** 2).sum()) + penalty(theta)

@@ -74,7 +74,7 @@ class Fitted:
 
     def covariance(self) -> Array:
         """Return the covariance (P, P) of the parameters under white noise of `sigma`."""
-        whole = self.statistics.total + np.diag(self.priors.precision)
+        whole = self.statistics.total + self.priors.square
         known = NormalEquations(whole, self.statistics.slope.sum(0))
         covariance = known.covariance()
         # Of what the sums say nothing, no more is known than before.
@@ -136,7 +136,7 @@ def fit(
     converged, taken, damping = False, 0, 0.0
 
     def penalty(at: Array) -> float:
-        return float(priors.precision @ (at - priors.mean) ** 2)
+        return priors.penalty(at)
 
     before: tuple[Array, Tensor, Array] | None = None
 
@@ -157,7 +157,7 @@ def fit(
             theta, initial, sigma = before
             break
         slope = statistics.slope.sum(0)
-        known = NormalEquations.with_priors(statistics.total, slope, priors.precision, theta - priors.mean)
+        known = NormalEquations.with_priors(statistics.total, slope, priors.square, theta - priors.mean)
         now = cost_of(here, sigma) + penalty(theta)
         for _attempt in range(8):
             step = known.bounded(low - theta, high - theta, damping=damping)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from auvnn.models import GreyBox
 
@@ -16,17 +17,44 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Priors:
-    """Independent normal priors of the P free parameters: `mean` and `precision` (zero where free), (P,).
+    """Normal priors of the P free parameters: `mean` and `precision` (zero where free), (P,); independent by default.
 
     Attributes:
         mean: (P,).
-        precision: (P,).
+        precision: (P,), of each parameter by itself.
         reach: (P,) no parameter may leave its mean by more; infinite where there is no such limit.
+        joint: (P, P) precision of all together, where some go together; None where they are independent.
     """
 
     mean: Array
     precision: Array
     reach: Array | None = None
+    joint: Array | None = None
+
+    @property
+    def square(self) -> Array:
+        """The precision of all parameters together, (P, P)."""
+        return np.diag(self.precision) if self.joint is None else self.joint
+
+    def pull(self, theta: Array) -> Array:
+        """Return the slope of half the penalty at some values, (P,): the precision times how far they are off."""
+        away = theta - self.mean
+        return self.precision * away if self.joint is None else self.joint @ away
+
+    def penalty(self, theta: Array) -> float:
+        """Return what values (P,) cost: minus twice the logarithm of the prior, up to a constant."""
+        away = theta - self.mean
+        return float(self.precision @ away**2 if self.joint is None else away @ self.joint @ away)
+
+    def beside(self, precision: Array) -> Priors:
+        """Return the priors with further parameters of mean nought at the end, independent of these; without reach.
+
+        Args:
+            precision: of the further ones, (K,).
+        """
+        joint = None if self.joint is None else np.asarray(block_diag(self.joint, np.diag(precision)))
+        mean = np.concatenate([self.mean, np.zeros(len(precision))])
+        return Priors(mean, np.concatenate([self.precision, precision]), None, joint)
 
     def inside(self, theta: Array) -> NDArray[np.bool_]:
         """Return which parameters are within their reach rather than at its end, (P,)."""

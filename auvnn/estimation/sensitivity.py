@@ -146,6 +146,9 @@ def respond_by(
         )
         state, parameters = _outputs(seen, part, sensitivity)
         mask = windows.mask[part, :, : state.shape[-2]].unsqueeze(-1)
+        if windows.noise is not None:
+            some = windows.pick(part)
+            state, parameters = (some.whitened(x.mul_(mask)) for x in (state, parameters))
         state, parameters, force = state.mul_(mask), parameters.mul_(mask), None
         if cells is not None:
             parameters, force = cells.parted(parameters)

@@ -19,7 +19,10 @@ from auvnn.physics.attitude import quat_conjugate, quat_multiply, quat_to_matrix
 
 
 class Thrust(nn.Module):
-    """Mean thrust of every interval, and the thrust as it begins, as functions of the effects' parameters."""
+    """Mean thrust of every interval, and the thrust as it begins, as functions of the effects' parameters.
+
+    Where an effect has the fins follow their commands, their angles come after the thrust and count among the n.
+    """
 
     def __init__(self, model: GreyBox) -> None:
         super().__init__()
@@ -34,6 +37,7 @@ class Thrust(nn.Module):
             model.before_thrust,
             substeps,
             windows.warmup,
+            windows.inputs.fins,
         )
         mean = torch.stack([sum(parts[1:], parts[0]) / len(parts) for parts in drive.mean], dim=-2)
         return mean, torch.stack(drive.start, dim=-2)
@@ -81,7 +85,7 @@ def window_error(model: GreyBox, windows: Windows, eta: Tensor, nu: Tensor) -> T
         else windows.nu_dot - seen.nu_dot
     )
     error = torch.cat(parts, dim=-1)
-    return torch.where(windows.mask > 0, error, torch.zeros_like(error))
+    return windows.whitened(torch.where(windows.mask > 0, error, torch.zeros_like(error)))
 
 
 def substeps_of(windows: Windows) -> int:

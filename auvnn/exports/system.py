@@ -63,7 +63,7 @@ class System:
 
     @cached_property
     def motion(self) -> Graph:
-        """Rate (13) of y (13) under thrust (n), u (m) at time t."""
+        """Rate (13) of y (13) under thrust (n) and fin angles where they lag, u (m) at time t."""
         return traced(
             lambda y, thrust, u, t: self.flow.motion(y, thrust, u, t),
             {"y": self.sample("y"), "f": self.sample("f"), "u": self.sample("u"), "t": self.sample("t")},
@@ -73,7 +73,7 @@ class System:
     def actuator_rate(self) -> Graph:
         """Thrust (n), then the rate of the actuators' state a (k), of a and u."""
         return traced(
-            lambda a, u: torch.cat(self.flow.actuators.rate(a, u[: self.flow.actuators.size]), dim=-1),
+            lambda a, u: torch.cat(self.flow.actuators.rate(a, u[: self.flow.actuators.inputs]), dim=-1),
             {"a": self.sample("x")[SIZE:], "u": self.sample("u")},
         )
 
@@ -87,7 +87,7 @@ class System:
     @cached_property
     def settled(self) -> Graph:
         """The settled states of the actuators, in continuous time and in steps, of u."""
-        n = self.flow.actuators.size
+        n = self.flow.actuators.inputs
         return traced(
             lambda u: torch.cat([s.actuators.settled(u[:n]) for s in (self.flow, self.steps)], dim=-1),
             {"u": self.sample("u")},
@@ -110,7 +110,7 @@ class System:
 
     def _advanced(self, a: Tensor, u: Tensor, h: Tensor) -> Tensor:
         own = self.steps.actuators
-        [(mean, rise)], after = own.advance(a, u[: own.size], h.unsqueeze(-1))
+        [(mean, rise)], after = own.advance(a, u[: own.inputs], h.unsqueeze(-1))
         return torch.cat([mean, torch.zeros_like(mean) if rise is None else rise, after], dim=-1)
 
     def sample(self, name: str) -> Tensor:
@@ -133,8 +133,11 @@ class System:
         parts = [command, 0.2 * draw(space.fins)]
         parts += [15.0 + draw(1)] * space.voltage + [0.5 + 3.0 * draw(1).abs()] * space.altitude
         with torch.no_grad():
-            a, b = (s.actuators.settled(before) for s in (self.flow, self.steps))
             thrust = self.flow.actuators.static(before)
+            if self.flow.actuators.fins:
+                turned = 0.2 * draw(space.fins)
+                before, thrust = torch.cat([before, turned], dim=-1), torch.cat([thrust, turned], dim=-1)
+            a, b = (s.actuators.settled(before) for s in (self.flow, self.steps))
         # Away from where actuators are settled, by more than a little.
         a, b = (v + 0.3 * v * torch.randn(v.shape, generator=generator, dtype=torch.float64) for v in (a, b))
         h = 0.02 + 0.08 * torch.rand(count, generator=generator, dtype=torch.float64)

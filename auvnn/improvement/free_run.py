@@ -96,8 +96,8 @@ class FreeRunFit:
         """
         priors = priors or self.priors
         low, high = limits(model, self.names, priors)
-        hessian = self.hessian[keep].sum(0) + self.weight * np.diag(priors.precision)
-        slope = self.slope[keep].sum(0) - self.weight * priors.precision * (self.theta - priors.mean)
+        hessian = self.hessian[keep].sum(0) + self.weight * priors.square
+        slope = self.slope[keep].sum(0) - self.weight * priors.pull(self.theta)
         return np.clip(self.theta + newton_step(hessian, slope, self.theta, low, high, 0.0), low, high)
 
     def foreseen(self, theta: Array, chosen: NDArray[np.bool_]) -> float:
@@ -204,13 +204,13 @@ def fit_free_run(
     weight = max(variance, 1e-6) * max(CORRELATED * rate, 1.0)
 
     def penalty(where: Array) -> float:
-        return weight * float(priors.precision @ (where - priors.mean) ** 2)
+        return weight * priors.penalty(where)
 
     now, damping, converged = float(at[keep].sum()) + penalty(theta), 1e-3, not len(theta)
     hessian, slope, cost = normal_equations(model, task, names)
     for _ in range(steps if len(theta) else 0):
-        total = hessian[keep].sum(0) + weight * np.diag(priors.precision)
-        downhill = slope[keep].sum(0) - weight * priors.precision * (theta - priors.mean)
+        total = hessian[keep].sum(0) + weight * priors.square
+        downhill = slope[keep].sum(0) - weight * priors.pull(theta)
         for _trial in range(TRIALS):
             set_parameters(model, names, theta + newton_step(total, downhill, theta, low, high, damping))
             reached = parameters_of(model, names)

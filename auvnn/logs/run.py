@@ -14,6 +14,7 @@ from auvnn.cards import Card, Shown
 from auvnn.catalogue import unknown_name
 from auvnn.errors import InputError
 from auvnn.logs.channels import ACCELERATION, EULER, POSITION, QUATERNION, RESET, SCALARS, VELOCITY, WRENCH
+from auvnn.logs.signals.repeats import stale
 from auvnn.logs.signals.rotation import to_euler
 from auvnn.logs.signals.segments import stretches
 
@@ -220,6 +221,11 @@ class Run(Shown):
 
         wanted = (*VELOCITY, *ACCELERATION, *POSITION, *_SCALAR)
         return {name: spikes(self.channels[name]) for name in wanted if name in self.channels}
+
+    @cached_property
+    def stale(self) -> NDArray[np.bool_]:
+        """Samples (N, 12) of position, attitude and velocity that only repeat the last one of a slower sensor."""
+        return stale(self.position, self.quaternion, self.nu)
 
     @cached_property
     def cleaned(self) -> Run:

@@ -89,7 +89,7 @@ class OneStepReplay:
         self._read_sensors()
         self._drive()
 
-    def update(self, hooks: Collection[str] = ("sense", "command", "delay", "respond")) -> None:
+    def update(self, hooks: Collection[str] = ("sense", "command", "delay", "respond", "steer")) -> None:
         """Work out again what depends on the model's parameters; what does not is kept.
 
         Args:
@@ -97,7 +97,7 @@ class OneStepReplay:
         """
         if "sense" in hooks and self.model.using("sense"):
             self._read_sensors()
-        if any(h in hooks and self.model.using(h) for h in ("command", "delay", "respond")):
+        if any(h in hooks and self.model.using(h) for h in ("command", "delay", "respond", "steer")):
             self._drive()
 
     def _read_sensors(self) -> None:
@@ -108,7 +108,9 @@ class OneStepReplay:
     def _drive(self) -> None:
         model = self.model
         with torch.no_grad():
-            drive = model.actuators.drive(self.inputs.command, self.times, model.before_thrust)
+            drive = model.actuators.drive(
+                self.inputs.command, self.times, model.before_thrust, fins=self.inputs.fins
+            )
         self.start = torch.stack(drive.start)
         self.mean = torch.stack([part[0] for part in drive.mean])
 

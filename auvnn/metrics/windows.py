@@ -11,29 +11,13 @@ from torch import Tensor
 
 from auvnn.errors import InputError
 from auvnn.logs import Log, Run
+from auvnn.metrics.coloured_noise import NoiseColour
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.models.inputs import Inputs
 
 CHANNELS = (
-    "x",
-    "y",
-    "z",
-    "phi",
-    "theta",
-    "psi",
-    "u",
-    "v",
-    "w",
-    "p",
-    "q",
-    "r",
-    "du",
-    "dv",
-    "dw",
-    "dp",
-    "dq",
-    "dr",
-)
+    "x", "y", "z", "phi", "theta", "psi", "u", "v", "w", "p", "q", "r", "du", "dv", "dw", "dp", "dq", "dr",
+)  # fmt: skip
 POSITION, ATTITUDE, VELOCITY, ACCELERATION = slice(0, 3), slice(3, 6), slice(6, 12), slice(12, 18)
 # Longest step of an integrator, s, where nothing asks for a shorter one.
 MAX_STEP = 0.05
@@ -58,6 +42,7 @@ class Windows:
         warmup: rows of history.
         max_step: longest step with which an integrator may run them, s.
         law: of a stochastic force that acts in them; None for none.
+        noise: of the sensors, where it is not white.
         estimated: channels that were estimated and not measured: free running starts from them, and they do not count.
     """
 
@@ -73,6 +58,7 @@ class Windows:
     warmup: int
     max_step: float = MAX_STEP
     law: ForceLaw | None = None
+    noise: NoiseColour | None = None
     estimated: tuple[str, ...] = ()
 
     def __len__(self) -> int:
@@ -83,6 +69,14 @@ class Windows:
     def has_position(self) -> bool:
         """Whether any position was measured."""
         return bool(self.mask[..., POSITION].any())
+
+    def whitened(self, values: Tensor) -> Tensor:
+        """Return what is new in errors, or in what they change with, (B, L, C, ...), where the noise is not white."""
+        return (
+            values
+            if self.noise is None
+            else self.noise.whitened(values, self.mask, self.times[:, self.warmup :])
+        )
 
     def pick(self, chosen: slice | np.ndarray) -> Windows:
         """Return some of the windows."""
@@ -126,7 +120,7 @@ def starts(
         until: the stretch goes on beyond `part`, which is believed up to then, s: windows that end later are left out.
     """
     t = run.t[part]
-    usable = run.valid[part]
+    usable = run.valid[part] & ~run.stale[part].any(axis=1)
     found: list[tuple[int, int]] = []
     begin = float(t[0]) if begin is None else begin
     tolerance = 1e-6 * run.dt + 1e-3 * run.dt
@@ -248,10 +242,10 @@ def gathered(pieces: Sequence[Piece], warmup: float) -> Windows:
         ],
         axis=-1,
     )
-    spikes = gather(_spikes)[:, before:]
+    unseen = gather(_unseen)[:, before:]
     seen = np.isfinite(measured)
     attitude = np.repeat(seen[..., 3:7].all(-1, keepdims=True), 3, axis=-1)
-    mask = np.concatenate([seen[..., :3], attitude, seen[..., 7:]], axis=-1) & ~spikes
+    mask = np.concatenate([seen[..., :3], attitude, seen[..., 7:]], axis=-1) & ~unseen
     mask &= (np.arange(rows)[None, :] < length[:, None])[..., None]
     estimated = tuple(dict.fromkeys(n for run, *_ in pieces for n in run.estimated))
     mask[..., [CHANNELS.index(n) for n in estimated]] = False
@@ -283,11 +277,12 @@ def _double(values: np.ndarray) -> Tensor:
     return torch.tensor(values, dtype=torch.float64)
 
 
-def _spikes(run: Run, _: np.ndarray) -> np.ndarray:
-    """Return single-sample outliers of a run by channel, (N, 18)."""
+def _unseen(run: Run, _: np.ndarray) -> np.ndarray:
+    """Return what is no measurement of its moment, by channel (N, 18): single-sample outliers and repeated values."""
     found = np.zeros((run.samples, 18), dtype=bool)
+    found[:, :12] = run.stale
     masks = run.outliers
     for k, name in enumerate(CHANNELS):
         if name in masks:
-            found[:, k] = masks[name]
+            found[:, k] |= masks[name]
     return found

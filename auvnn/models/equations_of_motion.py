@@ -174,7 +174,8 @@ class EquationsOfMotion(Sensors):
             position: NED, m, (..., 3).
             rotation: body to NED, (..., 3, 3).
             nu: velocity over ground, m/s and rad/s, (..., 6).
-            thrust: of the actuators, N, (..., n).
+            thrust: of the actuators, N, (..., n); the fins' actual angles, rad, may follow it, (..., n + m), and count
+                instead of those of the inputs.
             inputs: at this moment.
             time: s since the start of the run, (...).
             prepared: body and inertia matrices; worked out here where None.
@@ -198,7 +199,7 @@ class EquationsOfMotion(Sensors):
             position: NED, m, (..., 3).
             rotation: body to NED, (..., 3, 3).
             nu: velocity over ground, m/s and rad/s, (..., 6).
-            thrust: of the actuators, N, (..., n).
+            thrust: of the actuators, N, (..., n), with the fins' actual angles after it or not.
             inputs: at this moment.
             time: s since the start of the run, (...).
         """
@@ -214,7 +215,9 @@ class EquationsOfMotion(Sensors):
         time: Tensor,
         prepared: Prepared | None,
     ) -> tuple[dict[str, Tensor], Prepared]:
-        altitude = inputs.altitude
+        altitude, fins = inputs.altitude, inputs.fins
+        if thrust.shape[-1] > self.actuators.size:
+            thrust, fins = thrust.split((self.actuators.size, thrust.shape[-1] - self.actuators.size), dim=-1)
         if altitude is None and self.bottom is not None:
             altitude = self.bottom - position[..., 2]
         moment = Moment(
@@ -225,7 +228,7 @@ class EquationsOfMotion(Sensors):
             nu,
             torch.zeros_like(nu),
             inputs.command,
-            inputs.fins,
+            fins,
             inputs.voltage,
             altitude,
         )
@@ -268,7 +271,7 @@ class EquationsOfMotion(Sensors):
         terms["restoring"] = -restoring_force(rotation, body.weight, body.buoyancy, body.hangs, body.cb)
         if self._known("fin_area") is not None:
             # Fins whose angles are not known are still there: they are taken as held at zero.
-            angles = nu_r.new_zeros(len(self.vehicle.fins)) if inputs.fins is None else inputs.fins
+            angles = nu_r.new_zeros(len(self.vehicle.fins)) if fins is None else fins
             terms["fins"] = fin_wrench(
                 nu_r,
                 angles,

@@ -18,6 +18,7 @@ from auvnn.errors import ConfigError
 from auvnn.models.actuation.actuators import Actuators
 from auvnn.models.equations_of_motion import EquationsOfMotion
 from auvnn.models.inputs import Inputs
+from auvnn.models.joint_covariance import JointCovariance, with_joint
 from auvnn.models.saving import PASSIVE, REGION, SUBNETWORKS, save
 from auvnn.models.shown import ShownModel
 from auvnn.models.stated_drag import StatedDrag
@@ -97,6 +98,7 @@ class GreyBox(ShownModel, EquationsOfMotion):
         self._by_hook = {h: [e for e in members if h in e.hooks()] for h in HOOKS}
         # Depth of a flat bottom, m: gives the altitude to a simulated vehicle that has no altimeter to go by.
         self.bottom: float | None = None
+        self.joint: JointCovariance | None = None  # of the effects' parameters, where a fit has said it
         self.time_varying = any(e.time_varying for e in self._by_hook["body"])
         self._constants(vehicle)
 
@@ -134,8 +136,8 @@ class GreyBox(ShownModel, EquationsOfMotion):
 
     @property
     def before_thrust(self) -> list[Effect]:
-        """The effects that decide how thrust follows from commands over time, in order of action."""
-        return [e for hook in ("command", "delay", "respond") for e in self.using(hook)]
+        """The effects that decide how thrust and fins follow their commands over time, in order of action."""
+        return [e for hook in ("command", "delay", "respond", "steer") for e in self.using(hook)]
 
     @property
     def members(self) -> list[Effect]:
@@ -183,11 +185,12 @@ class GreyBox(ShownModel, EquationsOfMotion):
             vehicle: other numbers, or None for the same.
             actuation: "thrusters" or "wrench", or None for the same.
         """
-        return self._like(effects, vehicle or self.vehicle, actuation or self.actuation, shared=False)
+        made = self._like(effects, vehicle or self.vehicle, actuation or self.actuation, shared=False)
+        return with_joint(made, self.joint)
 
     def sharing(self, effects: Iterable[Effect]) -> GreyBox:
         """Return a model with other effects that shares its learned parts with this one: nothing is copied."""
-        return self._like(effects, self.vehicle, self.actuation, shared=True)
+        return with_joint(self._like(effects, self.vehicle, self.actuation, shared=True), self.joint)
 
     def beside(self, *effects: Effect) -> GreyBox:
         """Return the model with further effects, probes among them: its own are copied, learned parts shared."""

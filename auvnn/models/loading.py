@@ -13,7 +13,9 @@ from auvnn.effects import Effect, effect_class
 from auvnn.effects.registering import names_of
 from auvnn.errors import ConfigError, ModelError
 from auvnn.models.grey_box import GreyBox
+from auvnn.models.joint_covariance import JointCovariance
 from auvnn.models.saving import (
+    COVARIANCE,
     MODEL,
     PASSIVE,
     REGION,
@@ -89,6 +91,16 @@ def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None 
             f"{path / MODEL}: is not UTF-8 text (byte {error.start}): save the model again"
         ) from None
     data: dict[str, Any] = parse_yaml(text, str(path / MODEL))
+    joint = data.pop(COVARIANCE, None)
+    model = _made(data, files, path, actuation)
+    if joint is not None:
+        known = [f"{e.name}.{p}" for e in model.members for p in e.values()]
+        model.joint = JointCovariance.read(joint, known, str(path / MODEL))
+    return model
+
+
+def _made(data: dict[str, Any], files: Mapping[str, bytes], path: Path, actuation: str | None) -> GreyBox:
+    """Return the model that the entries of a model file describe, with the weights beside it."""
     networks = data.pop(SUBNETWORKS, None)
     region = data.pop(REGION, None)
     passive = data.pop(PASSIVE, False)

@@ -16,6 +16,7 @@ MODEL, WEIGHTS = "model.yaml", "weights.safetensors"
 SUBNETWORKS = "damping_subnetworks"
 STRUCTURE = "structure"
 UNCERTAINTY = "uncertainty"
+COVARIANCE = "covariance"
 REGION = "trained_region"
 PASSIVE = "passive_drag"
 
@@ -61,6 +62,8 @@ def contents(model: GreyBox, path: Path) -> dict[str, bytes | str]:
         str(e.name): {**e.values(), **({UNCERTAINTY: dict(e.uncertainty)} if e.uncertainty else {})}
         for e in model.copied_effects()
     }
+    if model.joint is not None:
+        data[COVARIANCE] = model.joint.to_dict()
     data["actuation"] = model.actuation
     files: dict[str, bytes | str] = {}
     described, learned = model.learned_parts()

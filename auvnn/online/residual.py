@@ -106,7 +106,7 @@ class Predictor:
     def use(self, model: GreyBox) -> None:
         """Go on with another model's physics."""
         self.model = model
-        remembers = bool(model.using("respond") or model.using("command"))
+        remembers = bool(model.using("respond") or model.using("command") or model.using("steer"))
         self.history = deque(self.history, maxlen=MEMORY if remembers else 2)
         self._prepared: Prepared | None = None
         if not model.time_varying:
@@ -161,8 +161,9 @@ class Predictor:
     def _acceleration(self, sample: Sample) -> Tensor:
         rows, times = self._rows()
         drive = self.model.actuators.drive(
-            rows.command, times, self.model.using("command") + self.model.using("respond"), 1, len(times) - 1
-        )
+            rows.command, times, [e for h in ("command", "respond", "steer") for e in self.model.using(h)], 1,
+            len(times) - 1, rows.fins,
+        )  # fmt: skip
         return self.model.nu_dot(
             sample.eta[:3], quat_to_matrix(sample.eta[3:]), sample.nu, drive.start[-1], sample.inputs(),
             times[-1], self._prepared,

@@ -16,6 +16,7 @@ from auvnn.models.actuation.thrust_signal import ThrustSignal
 from auvnn.models.free_running.rollout import LIMIT, steps_per_interval
 from auvnn.physics.attitude import quat_derivative, quat_to_matrix
 from auvnn.plants.base import Controller, Look, Motion, Plant, PlantTask, diverged, refuse, refuse_laws
+from auvnn.plants.followed_fins import FollowedFins
 
 Array = NDArray[np.float64]
 
@@ -78,7 +79,7 @@ class OwnPlant(Plant):
                 run, inputs = closed_loop(model, task, task.controller, seen, voltage, t, task.max_step)
             position, quaternion = run.eta[..., :3], run.eta[..., 3:]
             times = run.times.expand(run.nu.shape[:-1])
-            rate = model.nu_dot(position, quat_to_matrix(quaternion), run.nu, run.thrust, inputs, times)
+            rate = model.nu_dot(position, quat_to_matrix(quaternion), run.nu, run.acting, inputs, times)
             sensed = model.sense(Sensed(position, quaternion, run.nu, rate))
         assert sensed.nu_dot is not None
         fins = None if inputs.fins is None else inputs.fins.numpy()
@@ -170,7 +171,7 @@ class Stepper:
         self.thrusts: list[Tensor] = []
         self.etas: list[Tensor] = []
         self.nus: list[Tensor] = []
-        self.lag = next(iter(model.using("respond")), None)
+        self.lag, self.followed = next(iter(model.using("respond")), None), FollowedFins(model)
         self.delay = max((float(e.delay()) for e in model.using("delay")), default=0.0)
         self.demands: list[Tensor] = []
         self.states: list[Tensor] = []
@@ -193,16 +194,15 @@ class Stepper:
         last = k == len(self.t) - 1
         h = float(self.t[min(k + 1, len(self.t) - 1)] - self.t[min(k, len(self.t) - 2)]) / self.substeps
         for part in range(self.substeps):
-            mean, slope = demand, None
+            mean, slope, start = demand, None, demand
             if self.lag is not None:
                 answer = self.lag.respond(self.actual, demand, torch.full((1,), h, dtype=demand.dtype))
                 mean, slope, start = answer.mean, answer.slope, answer.start
-            else:
-                start = demand
             if self.delay > 0:
                 mean, slope, start = self._delayed(k, part, h)
             if part == 0:
                 self.thrusts.append(start)
+            mean, slope = self.followed.beside(mean, slope, fins, h, part == 0)
             if last:
                 return
             if self.lag is not None:
@@ -215,7 +215,7 @@ class Stepper:
         times = self.t[: k + 1]
         first = max(int(torch.searchsorted(times, times[k] - self.delay - h)) - 1, 0)
         demand, state = (torch.stack(x[first:], dim=-2) for x in (self.demands, self.states))
-        signal = ThrustSignal(demand, state, times[first:], self.lag)
+        signal = ThrustSignal(demand, state, times[first:], self.lag and self.lag.respond)
         when = (times[k] + part * h - self.delay).expand(*demand.shape[:-2], 1)
         mean, slope = signal.over(when, torch.full_like(when, h), h)
         return mean.squeeze(-2), slope.squeeze(-2), signal.at(when).squeeze(-2)
@@ -274,7 +274,7 @@ class Stepper:
     def trajectory(self) -> Trajectory:
         """Return the motion so far."""
         eta, nu, thrust = (torch.stack(x, dim=-2) for x in (self.etas, self.nus, self.thrusts))
-        return Trajectory(self.t, eta, nu, thrust)
+        return Trajectory(self.t, eta, nu, thrust, fins=self.followed.angles())
 
 
 def _first_velocity(plant: GreyBox, plan: Start) -> Tensor:

@@ -124,7 +124,10 @@ def follows_device(
     )
     answer = effect.respond(row.command, row.command, scene.times[:1])
     command = effect.command(scene.inputs.command, scene.times.expand(scene.inputs.command.shape[:-1]))
-    for tensor in (rate, answer.end, answer.mean, answer.slope, answer.start, command):
+    assert row.fins is not None
+    turned = effect.steer(row.fins, row.fins, scene.times[:1])
+    parts = [x for a in (answer, turned) for x in (a.end, a.mean, a.slope, a.start)]
+    for tensor in (rate, *parts, command):
         require(
             tensor.device.type == device, f"{kind.name} gives a result on {tensor.device} instead of {device}"
         )
@@ -183,24 +186,29 @@ def answers_like_a_lag(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = 
         vehicle: in which it is tried.
         actuation: "thrusters" or "wrench".
     """
-    if "respond" not in kind.hooks():
-        return
+    for hook in ("respond", "steer"):
+        if hook in kind.hooks():
+            _answers(kind, vehicle, actuation, hook)
+
+
+def _answers(kind: Kind, vehicle: Vehicle, actuation: str, hook: str) -> None:
     effect = kind.build(vehicle, actuation, typical_values(kind, vehicle, actuation))
+    answer = getattr(effect, hook)
     state, demand = torch.tensor([3.0, -7.0, 20.0]).double(), torch.tensor([5.0, 11.0, -4.0]).double()
     length, one, none = torch.full((3,), 0.3).double(), torch.ones(3).double(), torch.zeros(3).double()
     with torch.no_grad():
-        whole, unit = effect.respond(state, demand, length), effect.respond(one, none, length)
+        whole, unit = answer(state, demand, length), answer(one, none, length)
         for name in ("end", "mean", "start", "slope"):
             scaled = (state - demand) * getattr(unit, name) + (none if name == "slope" else demand)
             require_close(
                 getattr(whole, name), scaled, 1e-12, f"{kind.name}: {name} is not linear in the gap"
             )
-        half = effect.respond(state, demand, 0.5 * length).end
-        twice = effect.respond(half, demand, 0.5 * length).end
+        half = answer(state, demand, 0.5 * length).end
+        twice = answer(half, demand, 0.5 * length).end
         require_close(twice, whole.end, 1e-12, f"{kind.name}: two half steps against one")
         nodes, weights = np.polynomial.legendre.leggauss(60)
         parts = (torch.tensor(nodes) + 1)[:, None] / 2
-        curve, weight = effect.respond(state, demand, parts * length).end, torch.tensor(weights)[:, None] / 2
+        curve, weight = answer(state, demand, parts * length).end, torch.tensor(weights)[:, None] / 2
         require_close(whole.mean, (weight * curve).sum(0), 1e-6, f"{kind.name}: mean over the step")
         rise = 12 * (weight * curve * (parts - 0.5)).sum(0)
         require_close(whole.slope, rise, 1e-6, f"{kind.name}: slope against the first moment")

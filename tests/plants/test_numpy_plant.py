@@ -22,7 +22,7 @@ from tests.unchecked import unchecked
 CLOSE = 2e-6
 VEHICLES = ("rov95", "bluerov2_heavy", "remus100")
 NEEDS = {"voltage_droop": "bluerov2", "fin_stall": "remus100", "fin_gain": "remus100", "fin_offset": "remus100",
-         "fin_drag": "remus100"}  # fmt: skip
+         "fin_drag": "remus100", "fin_lag": "remus100"}  # fmt: skip
 # Compared on their own below: the model takes sums (over strips, over rows) where this plant has integrals.
 SUMMED = ("cross_flow_drag", "thrust_overshoot")
 

@@ -157,7 +157,7 @@ def refit(
         )
         if done or steps == STEPS or not len(theta):
             break
-        known = NormalEquations.with_priors(sums.hessian, sums.slope, priors.precision, theta - priors.mean)
+        known = NormalEquations.with_priors(sums.hessian, sums.slope, priors.square, theta - priors.mean)
         step = known.bounded(low - theta, high - theta)
         done = float(step @ known.square @ step) < ENOUGH
         theta, steps = theta + step, steps + 1
@@ -175,7 +175,7 @@ def _errors(
 ) -> Array:
     """Return standard errors as `fit.standard_errors` does, for each effect's columns at a time."""
     size = len(sums.slope)
-    whole = NormalEquations(sums.hessian + np.diag(priors.precision), sums.slope)
+    whole = NormalEquations(sums.hessian + priors.square, sums.slope)
     covariance = whole.covariance()
     combinations, informations = [], []
     for own in blocks:

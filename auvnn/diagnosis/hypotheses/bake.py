@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, standard_errors
 from auvnn.diagnosis.hypotheses.layout import GROUPS, Layout
-from auvnn.effects import EFFECTS
+from auvnn.effects import EFFECTS, Effect
 from auvnn.effects.hooks import Body
 from auvnn.estimation.priors import set_parameters
 from auvnn.models import GreyBox
+from auvnn.models.joint_covariance import JointCovariance
 from auvnn.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -24,7 +25,8 @@ def with_fitted_parameters(model: GreyBox, layout: Layout, found: FittedHypothes
 
     Coefficients that were merely refitted become the vehicle's numbers; effects that were asked for, and
     those that the model had, stay effects, so that they can be seen and removed, with their standard errors as their
-    uncertainty. A mass, a centre or a thrust that was stated to be uncertain becomes an effect too.
+    uncertainty, and how they go together as the model's joint covariance. A mass, a centre or a thrust that was stated
+    to be uncertain becomes an effect too.
 
     Args:
         model: as it was given.
@@ -67,7 +69,42 @@ def holding(
             errors, _ = standard_errors(fit, at)
             known = zip(copies[name].parameters_of, errors, strict=True)
             copies[name].uncertainty = {p.name: float(std) for p, std in known if np.isfinite(std)}
-    return model.rebuilt([copies[n] for n in keep], with_body(model.vehicle, body))
+    made = model.rebuilt([copies[n] for n in keep], with_body(model.vehicle, body))
+    if fit is not None:
+        made.joint = _joint(layout, names, fit, copies, [n for n in keep if n in names and n in EFFECTS])
+    return made
+
+
+def _joint(
+    layout: Layout,
+    names: Sequence[str],
+    fit: FittedHypothesis,
+    copies: Mapping[str, Effect],
+    keep: Sequence[str],
+) -> JointCovariance | None:
+    """Return how the effects' parameters go together: the fit's correlations, at their standard errors.
+
+    What the log does not determine has no standard error and is left out; so are coefficients that became the vehicle's
+    numbers, over which the covariance is the marginal one.
+    """
+    covariance = (fit.under_law or fit.fitted).covariance()
+    labels: list[str] = []
+    columns: list[int] = []
+    std: list[float] = []
+    for name, at in layout.places(names).items():
+        if name in keep:
+            for parameter, column in zip(copies[name].parameters_of, at, strict=True):
+                error = copies[name].uncertainty.get(parameter.name, 0.0)
+                if error > 0.0 and covariance[column, column] > 0.0:
+                    labels.append(f"{name}.{parameter.name}")
+                    columns.append(int(column))
+                    std.append(error)
+    if len(labels) < 2:
+        return None
+    part = covariance[np.ix_(columns, columns)]
+    unit = np.array(std) / np.sqrt(np.diag(part))
+    matrix = part * unit[:, None] * unit
+    return JointCovariance(tuple(labels), 0.5 * (matrix + matrix.T))
 
 
 def with_body(vehicle: Vehicle, body: Body) -> Vehicle:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.hypotheses.layout import DETERMINED, Layout, priors, scales, shapes
+from auvnn.diagnosis.hypotheses.layout import DETERMINED, Layout, correlation_root, priors, scales, shapes
 from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.estimation.normal_equations import Statistics
@@ -79,11 +79,15 @@ def plausible(
         theta: where it ended, (P,).
     """
     mean, precision = held.mean.copy(), held.precision.copy()
+    joint = None if held.joint is None else held.joint.copy()
     for name, own in layout.places(names).items():
         if name in effects:
             precision[own] = np.maximum(precision[own], scales(layout, name) ** -2.0)
             mean[own] = np.where(shapes(layout, name), theta[own], mean[own])
-    return replace(held, mean=mean, precision=precision)
+            if joint is not None:
+                # What was asked for goes together with nothing that was known before.
+                joint[own, own] = precision[own]
+    return replace(held, mean=mean, precision=precision, joint=joint)
 
 
 def left_out(statistics: Statistics, theta: Array, held: Priors, fold: NDArray[np.int64]) -> Array:
@@ -103,8 +107,8 @@ def left_out(statistics: Statistics, theta: Array, held: Priors, fold: NDArray[n
         keep = fold != f
         if not keep.any():
             keep = fold == f
-        hessian = statistics.hessian[keep].sum(0) + np.diag(held.precision)
-        gradient = statistics.slope[keep].sum(0) - held.precision * (theta - held.mean)
+        hessian = statistics.hessian[keep].sum(0) + held.square
+        gradient = statistics.slope[keep].sum(0) - held.pull(theta)
         step = np.zeros(len(theta))
         if free.any():
             step[free] = np.linalg.lstsq(hessian[np.ix_(free, free)], gradient[free], rcond=1e-12)[0]
@@ -178,10 +182,13 @@ def log_evidence(layout: Layout, explanation: FittedHypothesis, factor: float) -
     # With nothing uncertain and nothing asked for, there is nothing to weigh but the data.
     size = np.concatenate([np.zeros(0), *prior])
     away = (fitted.theta - np.concatenate([np.zeros(0), *means])) / size
+    information = fitted.statistics.total * size[:, None] * size / factor
+    root = correlation_root(layout, explanation.names, explanation.effects)
+    if root is not None:
+        away, information = np.linalg.solve(root, away), root.T @ information @ root
     # Where it begins and how often it swings is as likely in one place as in another.
     away[np.concatenate([np.zeros(0, dtype=bool), *(shapes(layout, n) for n in explanation.names)])] = 0.0
     data = float(fitted.statistics.cost.sum()) / factor
-    information = fitted.statistics.total * size[:, None] * size / factor
     volume = np.linalg.slogdet(information + np.eye(len(size)))[1]
     misfit = data + float(away @ away)
     return replace(explanation, evidence=-0.5 * (misfit + volume), misfit=misfit)
@@ -212,7 +219,7 @@ def standard_errors(explanation: FittedHypothesis, columns: NDArray[np.int64]) -
     statistics = fitted.statistics
     covariance = fitted.covariance()
     others = np.setdiff1d(np.arange(len(fitted.theta)), columns)
-    whole = NormalEquations(statistics.total + np.diag(fitted.priors.precision), statistics.slope.sum(0))
+    whole = NormalEquations(statistics.total + fitted.priors.square, statistics.slope.sum(0))
     left = whole.eliminate(columns, others, rcond=1e-12)
     by_window = left.scores(statistics.slope[:, columns], statistics.slope[:, others])
     factor = variance_inflation(by_window, left.equations.square, statistics.run)

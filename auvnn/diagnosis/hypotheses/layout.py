@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from auvnn.effects import EFFECTS, Parameter, effect_class
 from auvnn.estimation.priors import Priors
 from auvnn.models import GreyBox
+from auvnn.models.joint_covariance import JointCovariance
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,8 @@ REACH = 4.0
 SHAPELESS = 1e4
 # A parameter whose standard error the log brings down by less than this share of its prior's is not determined.
 DETERMINED = 0.99
+# Share of independence in correlations, so that they can be inverted: a hundred times less than what is known of either.
+SINGULAR = 1e-6
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,7 @@ class Layout:
         nuisance: effects that stand for stated uncertainty.
         means: what was stated of each effect's parameters before anything was fitted.
         spreads: nuisance effect, or one that the model had, to the standard deviations of its parameters.
+        joint: how these go together, where a fit has said so; None where they are independent.
     """
 
     model: GreyBox
@@ -47,6 +51,7 @@ class Layout:
     nuisance: tuple[str, ...]
     means: dict[str, Array]
     spreads: dict[str, Array]
+    joint: JointCovariance | None = None
 
     def described(self, name: str) -> tuple[Parameter, ...]:
         """Return the parameters of an effect, or of one of its stand-ins, `name@number`."""
@@ -133,7 +138,7 @@ def lay_out(model: GreyBox, candidates: Sequence[str], learned: Array | None = N
         # What the model has was fitted or stated: were it all but free, it would swallow what is missing.
         if str(effect.name) not in spreads and str(effect.name) in EFFECTS:
             spreads[str(effect.name)] = effect.standard_deviations()
-    return Layout(full, tuple(columns), columns, tuple(groups), means, spreads)
+    return Layout(full, tuple(columns), columns, tuple(groups), means, spreads, model.joint)
 
 
 def priors(layout: Layout, names: Sequence[str], free: Sequence[str] = ()) -> Priors:
@@ -157,7 +162,41 @@ def priors(layout: Layout, names: Sequence[str], free: Sequence[str] = ()) -> Pr
             loose = np.where(shapes(layout, name), SHAPELESS, FREE)
             precision.append((loose * scales(layout, name)) ** -2)
             reach.append(np.full(len(stated_values), np.inf))
-    return Priors(np.concatenate(mean), np.concatenate(precision), np.concatenate(reach))
+    joint, whole = None, np.concatenate(precision)
+    if (correlations := correlation_of(layout, names, free)) is not None:
+        unit = np.sqrt(whole)
+        joint = np.asarray(np.linalg.inv(correlations) * unit[:, None] * unit, dtype=np.float64)
+    return Priors(np.concatenate(mean), whole, np.concatenate(reach), joint)
+
+
+def correlation_of(layout: Layout, names: Sequence[str], free: Sequence[str] = ()) -> Array | None:
+    """Return the correlations of the priors of the named effects' parameters, (P, P); None where there are none.
+
+    What was fitted before is known by its saved covariance: the correlations of that, at the standard deviations that
+    hold now. Effects that are asked for, and all that the model states, are independent of it.
+
+    Args:
+        layout: of the model.
+        names: effects, in order of their parameters.
+        free: those of them that are asked for.
+    """
+    if layout.joint is None:
+        return None
+    labels = []
+    for name in names:
+        known = name not in free and name in layout.spreads
+        labels += [f"{name}.{p.name}" if known else "" for p in layout.described(name)]
+    found = layout.joint.correlation(labels)
+    if not (found - np.eye(len(labels))).any():
+        return None
+    # Parameters that were told apart no better than to rounding still have a precision.
+    return (1.0 - SINGULAR) * found + SINGULAR * np.eye(len(labels))
+
+
+def correlation_root(layout: Layout, names: Sequence[str], free: Sequence[str] = ()) -> Array | None:
+    """Return L, (P, P), with L L^T = `correlation_of`; None where there are no correlations."""
+    found = correlation_of(layout, names, free)
+    return None if found is None else np.asarray(np.linalg.cholesky(found), dtype=np.float64)
 
 
 def shapes(layout: Layout, name: str) -> NDArray[np.bool_]:

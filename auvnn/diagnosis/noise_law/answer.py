@@ -13,11 +13,13 @@ import numpy as np
 from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.answers.answering import answer
 from auvnn.diagnosis.answers.table import fill_candidate
-from auvnn.diagnosis.noise_law.command_holding import Holding, holding, squared_error
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.noise_law.command_holding import holding, squared_error
 from auvnn.diagnosis.noise_law.foretold import Foretold, foretold
 from auvnn.diagnosis.noise_law.hypothesis import BesideForce, under_its_law
 from auvnn.diagnosis.noise_law.law import ALPHA_BOUNDARY, left
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
+from auvnn.diagnosis.noise_law.noise_colour import noise_colour
 from auvnn.diagnosis.noise_law.search import UNSOLVED, ForceSearch
 from auvnn.diagnosis.residuals.forces import actuators_of, share_of
 from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
@@ -49,11 +51,16 @@ def beside_what_is_left(found: Diagnosis, under_way: Searched) -> tuple[Diagnosi
     if not _leaves_something(found):
         return found, under_way
     asked = under_way.setting
-    held = _held(under_way)
-    if held.odds > 0.0:
-        asked.say(f"commands change between samples ({held.name}): searching again")
-        found, under_way = search(asked, held.applied(under_way.state.windows))
-    told: dict[str, Any] = {"commands": held.to_dict()}
+    least, held = _held(under_way.state)
+    windows = held.applied(under_way.state.windows)
+    asked.say("asking whether the sensors' noise is white")
+    colour = noise_colour(least, windows, under_way.floor)
+    if held.odds > 0.0 or colour.noise is not None:
+        why = [f"commands change between samples ({held.name})"] if held.odds > 0.0 else []
+        why += [] if colour.noise is None else ["the sensors' noise is not white"]
+        asked.say(f"{' and '.join(why)}: searching again")
+        found, under_way = search(asked, colour.applied(windows))
+    told: dict[str, Any] = {"commands": held.to_dict(), "noise": colour.to_dict()}
     if not _leaves_something(found):
         return replace(found, stochastic=told), under_way
     try:
@@ -75,20 +82,18 @@ def _leaves_something(found: Diagnosis) -> bool:
     return found.verdict in ("unknown", "partial") or found.steps[-1]["verdict"] == "unknown"
 
 
-def _held(under_way: Searched) -> Holding:
-    """Return how commands go between samples, by the explanation that leaves least, whatever the search made of it.
+def _held(state: State) -> tuple[FittedHypothesis, Holding]:
+    """Return the explanation that leaves least, whatever the search made of it, and how commands go by it.
 
     One that was tried and is about to diverge says nothing of them: then the next best is asked.
     """
-    state = under_way.state
-    ends = [state.first, *state.tried, state.current]
     sigma = state.first.fitted.sigma
-    for end in sorted(ends, key=lambda e: squared_error(e, sigma)):
+    for end in sorted([state.first, *state.tried, state.current], key=lambda e: squared_error(e, sigma)):
         try:
-            return holding(end, state.windows)
+            return end, holding(end, state.windows)
         except np.linalg.LinAlgError:
             continue
-    return Holding("held", 0.0, 0.0, 0.0)
+    return state.first, Holding("held", 0.0, 0.0, 0.0)
 
 
 def _beside_force(
@@ -107,12 +112,23 @@ def _beside_force(
     null = beside.begin(first, white(first, floor))
     if null is None:
         return None
-    result = beside.run(null, fitted_alone(asked, state), asked.most)
+    alone = fitted_alone(asked, state)
+    result = beside.run(null, alone, asked.most)
+    told = _foretold(asked, result)
+    if told is not None and not asked.tolerance.strict:
+        # What inputs foretell has a cause: one that costs little is taken where nothing is foretold beside it.
+        beside.whatever_it_costs = True
+        again = beside.run(null, alone, asked.most)
+        if _foretold(asked, again) is None:
+            result, told = again, None
+    return _state(asked, state, result, chance=told is None), result.estimate.law, told
+
+
+def _foretold(asked: Setting, result: BesideForce) -> Foretold | None:
+    """Return what measured inputs foretell of the force, None where that is little."""
     asked.say("asking how much of the force measured inputs foretell")
     told = foretold(under_its_law(result.last), result.windows)
-    if told is not None and told.least <= FORETOLD:
-        told = None
-    return _state(asked, state, result, chance=told is None), result.estimate.law, told
+    return None if told is None or told.least <= FORETOLD else told
 
 
 def _state(asked: Setting, state: State, result: BesideForce, *, chance: bool) -> State:
@@ -165,8 +181,10 @@ def overwhelming(asked: Setting, state: State, law: ForceLaw | None) -> bool:
         return False
     # What changes faster than the vehicle answers moves it little: the mean over a second counts.
     mean = law.rms * np.sqrt(np.minimum(1.0, 2.0 * law.time / SECOND))
-    share = share_of(mean, actuators_of(asked.layout.model, state.windows))[law.rms > 0.0]
-    return bool((share[np.isfinite(share)] > LARGEST).any())
+    drive = actuators_of(asked.layout.model, state.windows)
+    # Fins and a vehicle's own balance hold what thrusters do not: the largest of forces, and of moments, is the measure.
+    most = np.repeat([drive[:3].max(), drive[3:].max()], 3)
+    return bool((mean[most > 0.0] > LARGEST * most[most > 0.0]).any())
 
 
 def negligible(asked: Setting, state: State, law: ForceLaw | None) -> bool:

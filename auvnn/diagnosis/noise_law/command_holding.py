@@ -117,14 +117,14 @@ def holding(first: FittedHypothesis, windows: Windows) -> Holding:
         return held
     sums = first.fitted.statistics
     factor = variance_inflation(sums.slope, sums.total, sums.run)
-    plain = _cost(first, windows) / factor
-    half, full = (_cost(first, between(windows, share)) / factor for share in (LINEAR, 1.0))
+    plain = cost_at_best(first, windows) / factor
+    half, full = (cost_at_best(first, between(windows, share)) / factor for share in (LINEAR, 1.0))
     found = Holding("linear", LINEAR, 0.5 * (plain - half), plain - half)
     ahead = _vertex("ahead", (plain, half, full), plain)
     if ahead is not None and ahead.odds > found.odds + PLAINER:
         found = ahead
     low, half, full = (
-        _cost(first, between(windows, share, smooth=True)) / factor for share in (0.0, LINEAR, 1.0)
+        cost_at_best(first, between(windows, share, smooth=True)) / factor for share in (0.0, LINEAR, 1.0)
     )
     smooth = _vertex("smooth", (low, half, full), plain)
     if smooth is not None and smooth.odds > found.odds + PLAINER:
@@ -151,17 +151,28 @@ def squared_error(explanation: FittedHypothesis, sigma: Array) -> float:
     return float((explanation.fitted.statistics.channel.sum(0)[seen] / sigma[seen] ** 2).sum())
 
 
-def _cost(first: FittedHypothesis, windows: Windows) -> float:
-    """Return the squared error with everything that is uncertain following, to first order."""
+def cost_at_best(first: FittedHypothesis, windows: Windows, sigma: Array | None = None) -> float:
+    """Return the squared error with everything that is uncertain following, to first order, its priors in it.
+
+    Args:
+        first: a fit.
+        windows: perhaps other ones than it was fitted to.
+        sigma: (18,) weights, by default those of the fit.
+
+    Raises:
+        numpy.linalg.LinAlgError: free running with the fit grows without bound.
+    """
     fitted = first.fitted
     sums, _, _ = normal_equations(
-        windows, linearise(fitted.model, windows, fitted.initial, first.names), fitted.sigma
+        windows,
+        linearise(fitted.model, windows, fitted.initial, first.names),
+        fitted.sigma if sigma is None else sigma,
     )
     inside = fitted.priors.inside(fitted.theta)
     if not (np.isfinite(sums.cost).all() and np.isfinite(sums.total[np.ix_(inside, inside)]).all()):
         raise np.linalg.LinAlgError("free running grows without bound")
-    precision = fitted.priors.precision[inside]
-    pull = sums.slope.sum(0)[inside] - precision * (fitted.theta - fitted.priors.mean)[inside]
-    square = sums.total[np.ix_(inside, inside)] + np.diag(precision)
+    pull = (sums.slope.sum(0) - fitted.priors.pull(fitted.theta))[inside]
+    square = (sums.total + fitted.priors.square)[np.ix_(inside, inside)]
     step = np.linalg.lstsq(square, pull, rcond=1e-12)[0] if inside.any() else np.zeros(0)
-    return float(sums.cost.sum() - (pull @ step if inside.any() else 0.0))
+    best = float(sums.cost.sum() - (pull @ step if inside.any() else 0.0))
+    return best + (fitted.priors.cost(fitted.theta) if len(fitted.theta) else 0.0)

@@ -17,7 +17,6 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out
 from auvnn.diagnosis.residuals.additive_force import _by_part
 from auvnn.diagnosis.residuals.input_forces import ANGLES, AXES, InputForces, _euler, _raw
 from auvnn.estimation.normal_equations import Statistics
-from auvnn.estimation.priors import Priors
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
@@ -102,12 +101,13 @@ def _share(
     """Return the share of the mean square that a force of some features has, and its lower limit."""
     fitted, known = explanation.fitted, len(explanation.fitted.theta)
     some = sums.columns(columns)
-    precision = np.concatenate([fitted.priors.precision, size**-2.0])
-    unit = 1.0 / np.sqrt(np.maximum(np.diag(some.total) + precision, 1e-300))
-    square = (some.total + np.diag(precision)) * unit[:, None] * unit
+    held = fitted.priors.beside(size**-2.0)
+    square = some.total + held.square
+    unit = 1.0 / np.sqrt(np.maximum(np.diag(square), 1e-300))
+    square = square * unit[:, None] * unit
     covariance = np.linalg.pinv(square, hermitian=True) * unit[:, None] * unit
-    away = np.concatenate([fitted.theta - fitted.priors.mean, np.zeros(len(size))])
-    step = (covariance @ (some.slope.sum(0) - precision * away))[known:]
+    pull = held.pull(np.concatenate([fitted.theta, np.zeros(len(size))]))
+    step = (covariance @ (some.slope.sum(0) - pull))[known:]
     spread = covariance[known:, known:]
     gram = np.cov(features.T).reshape(len(size), len(size))
     inside = gram @ spread
@@ -124,10 +124,7 @@ def _left(
     sums: Statistics, columns: list[int], explanation: FittedHypothesis, size: Array, fold: NDArray[np.int64]
 ) -> Array:
     fitted = explanation.fitted
-    held = Priors(
-        np.concatenate([fitted.priors.mean, np.zeros(len(size))]),
-        np.concatenate([fitted.priors.precision, size**-2.0]),
-    )
+    held = fitted.priors.beside(size**-2.0)
     return left_out(sums.columns(columns), np.concatenate([fitted.theta, np.zeros(len(size))]), held, fold)
 
 

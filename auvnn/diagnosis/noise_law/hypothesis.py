@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout, scales, shapes
+from auvnn.diagnosis.hypotheses.layout import Layout, correlation_root, scales, shapes
 from auvnn.diagnosis.noise_law.law import Estimate, Likelihood, estimate
 from auvnn.diagnosis.noise_law.sums import ForceSums
 from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS
@@ -115,9 +115,12 @@ def judged(
         shape.append(shapes(layout, name))
     sizes, means, fixed = np.concatenate(size), np.concatenate(mean), np.concatenate(shape)
     theta, priors = explanation.fitted.theta + found.step, explanation.fitted.priors
-    data = found.value - float(priors.precision @ (theta - priors.mean) ** 2)
+    data = found.value - priors.penalty(theta)
     away = np.where(fixed, 0.0, (theta - means) / sizes)
     information = found.information * sizes[:, None] * sizes
+    root = correlation_root(layout, explanation.names, explanation.effects)
+    if root is not None:
+        away, information = np.linalg.solve(root, away), root.T @ information @ root
     volume = float(np.linalg.slogdet(information + np.eye(len(sizes)))[1])
     misfit = data + float(away @ away)
     own = replace(explanation.fitted, statistics=Likelihood(sums).by_window(found.law), sigma=sigma)

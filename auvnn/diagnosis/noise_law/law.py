@@ -79,10 +79,9 @@ class Likelihood:
         self.theta_slope = statistics.slope[:, keep].sum(0)
         self.whole = statistics.total[:n, :n]
         self.cost = float(statistics.cost.sum())
-        self.precision = sums.precision[keep]
-        self.away = (sums.theta - sums.mean)[keep]
-        fixed = sums.precision @ (sums.theta - sums.mean) ** 2
-        self.prior = float(fixed) if len(sums.theta) else 0.0
+        self.precision = sums.priors.square[np.ix_(keep, keep)]
+        self.pull = sums.priors.pull(sums.theta)[keep]
+        self.prior = sums.priors.penalty(sums.theta) if len(sums.theta) else 0.0
 
     def shown(self) -> list[int]:
         """Return the degrees of freedom in which a force would move anything that is measured.
@@ -129,8 +128,8 @@ class Likelihood:
             )
             along = (half[..., 1:].mT @ half).sum(0).numpy()
             square, slope = square - along[:, 1:], slope - along[:, 0]
-        pull = slope - self.precision * self.away
-        inverse = _inverse(square + np.diag(self.precision))
+        pull = slope - self.pull
+        inverse = _inverse(square + self.precision)
         step = inverse @ pull
         value += self.prior - float(pull @ step)
         if not axes:

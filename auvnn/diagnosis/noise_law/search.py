@@ -77,6 +77,7 @@ class ForceSearch:
         self.log, self.scale = asked.log, scale_of(asked.log)
         self.sigma = self.weights = np.full(18, np.inf)
         self.cell = CELL
+        self.whatever_it_costs = asked.tolerance.strict
 
     def begin(self, first: FittedHypothesis, sigma: Array) -> Hypothesis | None:
         """Return the explanation without any name under the law of the force; None where no variance is above zero.
@@ -156,7 +157,7 @@ class ForceSearch:
                 if h.evidence > current.evidence + odds
                 and sure[h.name] < level
                 and foresees(h, current, least)
-                and (self.tolerance.strict or self._cost(h, current) > cost * self.tolerance.cost)
+                and (self.whatever_it_costs or self._cost(h, current) > cost * self.tolerance.cost)
             ]
             if not good:
                 break
@@ -276,8 +277,7 @@ class ForceSearch:
         sums, _, _ = normal_equations(
             self.windows, linearise(model, self.windows, initial, found.names), fitted.sigma
         )
-        away = theta - fitted.priors.mean
-        cost = float(sums.cost.sum() + fitted.priors.precision @ away**2)
+        cost = float(sums.cost.sum()) + fitted.priors.penalty(theta)
         moved = replace(fitted, model=model, theta=theta, initial=initial, statistics=sums, cost=cost)
         return replace(
             found, fitted=moved, left_out=left_out(sums, theta, judged_by, folds(self.windows.run))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
+from auvnn.estimation.priors import Priors
 from auvnn.estimation.sensitivity import Response
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.windows import Windows
@@ -36,6 +37,7 @@ class ForceSums:
         times: shortest and longest correlation time, s.
         span: longest window, s.
         cell: length of the cells, s.
+        joint: (P, P) precision of all parameters together, where some go together.
     """
 
     statistics: Statistics
@@ -49,6 +51,12 @@ class ForceSums:
     times: tuple[float, float]
     span: float
     cell: float
+    joint: Array | None = None
+
+    @property
+    def priors(self) -> Priors:
+        """What is assumed of the parameters."""
+        return Priors(self.mean, self.precision, None, self.joint)
 
 
 def force_sums(
@@ -84,5 +92,5 @@ def force_sums(
     return ForceSums(
         statistics, len(fitted.theta), plain.cells, fitted.theta, priors.mean, priors.precision,
         priors.inside(fitted.theta), np.array([force] * 3 + [0.1 * force * float(vehicle.length)] * 3),
-        (shortest, max(0.1 * max(runs), 2.0 * shortest)), span, cell,
+        (shortest, max(0.1 * max(runs), 2.0 * shortest)), span, cell, priors.joint,
     )  # fmt: skip

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
@@ -134,8 +135,8 @@ class _ForceSums:
         self.explanation, self.blocks = explanation, blocks
         fitted = explanation.fitted
         self.inside = np.flatnonzero(fitted.priors.inside(fitted.theta))
-        self.precision = fitted.priors.precision[self.inside]
-        self.away = (fitted.theta - fitted.priors.mean)[self.inside]
+        self.precision = fitted.priors.square[np.ix_(self.inside, self.inside)]
+        self.pull = fitted.priors.pull(fitted.theta)[self.inside]
         self.total = np.zeros((0, 0))
         self._slopes: list[Array] = []
         self._across: list[Array] = []
@@ -151,17 +152,17 @@ class _ForceSums:
             self._own[key].append(statistics.hessian[:, own[:, None], own])
         self._runs.append(statistics.run)
 
-    def held(self, columns: NDArray[np.int64], precision: Array, away: Array) -> NormalEquations:
+    def held(self, columns: NDArray[np.int64], precision: Array, pull: Array) -> NormalEquations:
         """Return the equations of all windows, some of the columns held by priors.
 
         Args:
             columns: that are held, K of them.
-            precision: of their priors, (K,).
-            away: how far they are from the priors' means, (K,).
+            precision: of their priors, (K, K).
+            pull: the precision times how far they are from the priors' means, (K,).
         """
         square, right = self.total.copy(), self.slope.sum(0)
-        square[columns, columns] += precision
-        right[columns] -= precision * away
+        square[np.ix_(columns, columns)] += precision
+        right[columns] -= pull
         return NormalEquations(square, right)
 
     @cached_property
@@ -187,7 +188,7 @@ class _ForceSums:
 def _tested(sums: _ForceSums, key: str, scale: Array) -> tuple[float, float]:
     """Return the p-value of one force, what was fitted taking its share first, and the fall of the squared error."""
     own, inside = sums.blocks[key], sums.inside
-    left = sums.held(inside, sums.precision, sums.away).eliminate(own, inside, rcond=1e-12)
+    left = sums.held(inside, sums.precision, sums.pull).eliminate(own, inside, rcond=1e-12)
     carry, gradient = left.carry, left.equations.right * scale
     information = left.information * scale[:, None] * scale
     values, vectors = np.linalg.eigh(information)
@@ -219,9 +220,9 @@ def _need(sums: _ForceSums, layout: Layout, own: NDArray[np.int64], scale: Array
     wanted, null = wanted[kept], null[kept]
     free = np.concatenate([inside, own])
     # Of the force as little is assumed as keeps what the log does not see at nought.
-    precision = np.concatenate([sums.precision, 1e-4 * scale**-2.0])
-    away = np.concatenate([sums.away, np.zeros(len(own))])
-    known = sums.held(free, precision, away).part(free)
+    precision = np.asarray(block_diag(sums.precision, np.diag(1e-4 * scale**-2.0)))
+    pull = np.concatenate([sums.pull, np.zeros(len(own))])
+    known = sums.held(free, precision, pull).part(free)
     covariance = known.covariance()
     step = covariance @ known.right
     at = np.searchsorted(inside, wanted)

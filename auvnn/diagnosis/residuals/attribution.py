@@ -9,7 +9,6 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out
 from auvnn.diagnosis.residuals.autocorrelation import excess_variance
 from auvnn.diagnosis.residuals.input_forces import AXES, InputForces
 from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
-from auvnn.estimation.priors import Priors
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
@@ -73,8 +72,5 @@ def _left(
     fitted = explanation.fitted
     known = len(fitted.theta)
     own = np.array([c - known for c in columns if c >= known], dtype=int)
-    held = Priors(
-        np.concatenate([fitted.priors.mean, np.zeros(len(own))]),
-        np.concatenate([fitted.priors.precision, scale[own] ** -2.0]),
-    )
+    held = fitted.priors.beside(scale[own] ** -2.0)
     return left_out(sums.columns(columns), np.concatenate([fitted.theta, np.zeros(len(own))]), held, fold)

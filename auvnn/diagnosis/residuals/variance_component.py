@@ -122,11 +122,10 @@ def variance_component_test(explanation: FittedHypothesis, windows: Windows, sig
     sums = sums.finite()
     known = len(fitted.theta)
     # What is known takes its share first: the fit weighed the channels otherwise.
-    prior = fitted.priors.precision
     inside = fitted.priors.inside(fitted.theta)
-    pull = sums.slope[:, :known].sum(0) - prior * (fitted.theta - fitted.priors.mean)
+    pull = sums.slope[:, :known].sum(0) - fitted.priors.pull(fitted.theta)
     step = np.zeros(known)
-    square = sums.total[:known, :known] + np.diag(prior)
+    square = sums.total[:known, :known] + fitted.priors.square
     step[inside] = np.linalg.lstsq(square[np.ix_(inside, inside)], pull[inside], rcond=1e-12)[0]
     slope = sums.slope[:, known:] - sums.hessian[:, known:, :known] @ step
     count = 2 * HARMONICS + 1

@@ -286,4 +286,4 @@ def probed(
     if not starts:
         return Probed(layout, {})
     whole = model.sharing(effects)
-    return Probed(Layout(whole, tuple(columns), columns, layout.nuisance, means, layout.spreads), starts)
+    return Probed(replace(layout, model=whole, names=tuple(columns), columns=columns, means=means), starts)

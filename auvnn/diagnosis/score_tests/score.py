@@ -21,7 +21,7 @@ from auvnn.diagnosis.hypotheses.layout import DETERMINED, FREE, Layout, priors, 
 from auvnn.diagnosis.score_tests.variance_inflation import TINY, variance_inflation
 from auvnn.estimation.normal_equations import Statistics
 from auvnn.estimation.nuisance import NormalEquations, carry_of
-from auvnn.estimation.priors import Priors, parameters_of
+from auvnn.estimation.priors import parameters_of
 
 Array = NDArray[np.float64]
 # Information on a parameter in units of its plausible scale that leaves it no better known than its prior does.
@@ -112,11 +112,10 @@ def projection(
     theta = parameters_of(layout.model, others)
     # What is at the end of its reach cannot move further to take the candidate's share.
     movable = held.inside(theta)
-    f, theta = f[movable], theta[movable]
-    held = Priors(held.mean[movable], held.precision[movable])
+    f, pull = f[movable], held.pull(theta)[movable]
     square, right = total.copy(), slope.copy()
-    square[f, f] += held.precision
-    right[f] -= held.precision * (theta - held.mean)
+    square[np.ix_(f, f)] += held.square[np.ix_(movable, movable)]
+    right[f] -= pull
     left = NormalEquations(square, right).eliminate(c, f)
     return Projection(c, f, left.carry, left.equations.right, left.information)
 
@@ -145,7 +144,7 @@ def following(
     """
     others = [n for n in base if n != effect]
     f, c = layout.of(others), layout.columns[effect]
-    inner = total[np.ix_(f, f)] + np.diag(priors(layout, others, free).precision)
+    inner = total[np.ix_(f, f)] + priors(layout, others, free).square
     return c, f, carry_of(inner, total[np.ix_(f, c)])
 
 
@@ -260,7 +259,7 @@ def similarity(statistics: Statistics, layout: Layout, base: Sequence[str], name
             f = layout.of(others)
             ca, cb = layout.columns[a], layout.columns[b]
             both = np.concatenate([ca, cb])
-            inner = total[np.ix_(f, f)] + np.diag(priors(layout, others).precision)
+            inner = total[np.ix_(f, f)] + priors(layout, others).square
             across = total[np.ix_(f, both)]
             left = total[np.ix_(both, both)] - carry_of(inner, across) @ across
             sa, sb = scales(layout, a), scales(layout, b)

@@ -36,12 +36,11 @@ def cross_validated_log_density(explanation: FittedHypothesis) -> Array:
     inside = np.nonzero(held.inside(theta) & (theta != low) & (theta != high))[0]
     sums = fitted.statistics.columns(inside.tolist())
     fold = folds(sums.run)
-    precision = held.precision[inside]
-    pull = precision * (theta - held.mean)[inside]
+    pull = held.pull(theta)[inside]
     out = sums.cost.copy()
     for f in np.unique(fold):
         own = np.nonzero(fold == f)[0]
-        known = sums.hessian[fold != f].sum(0) + np.diag(precision)
+        known = sums.hessian[fold != f].sum(0) + held.square[np.ix_(inside, inside)]
         step, volume = NormalEquations(known, sums.slope[fold != f].sum(0) - pull).solve_with_determinant()
         for w in own[np.lexsort((sums.first[own], sums.run[own]))]:
             hessian, slope = sums.hessian[w], sums.slope[w]

@@ -10,6 +10,7 @@ from auvnn.logs.channels import POSITION, VELOCITY
 from auvnn.logs.quality import excitation as exciting
 from auvnn.logs.quality import sensor_findings as sensors
 from auvnn.logs.quality.channel_quality import Channel, frozen
+from auvnn.logs.quality.command_rate import between_samples
 from auvnn.logs.quality.excitation import Excitation
 from auvnn.logs.quality.finding import Finding
 from auvnn.logs.quality.kinematics import Agreement
@@ -62,6 +63,7 @@ def collect(
         *sensors.levers(log, kinematics),
         *sensors.stretches(log),
         *_excitation(log, excitation),
+        *between_samples(log),
     ]
     if log.unknown:
         found.append(Finding("info", "columns", f"kept but not used: {', '.join(log.unknown)}"))

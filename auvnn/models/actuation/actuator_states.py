@@ -9,7 +9,8 @@ from torch import Tensor, nn
 
 from auvnn.effects import Effect
 from auvnn.errors import ConfigError
-from auvnn.models.actuation.actuators import Actuators
+from auvnn.models.actuation.actuators import Actuators, answer_of
+from auvnn.models.actuation.thrust_signal import Answer
 from auvnn.physics.thrusters import quadratic_thrust, summed_table_thrust
 
 PADE = 3
@@ -26,6 +27,9 @@ class ActuatorStates(nn.Module):
     For steps of a fixed length the state is [thrust before the delay | filters | settled thrust of the last rows], and
     lag, filter and delay are exact for commands that are held, as in a rollout.
 
+    Where fins follow their commands with a lag, their actual angles are the first numbers of the state, either way; a
+    command is then [commands of the thrusters | commanded fin angles], and what acts [thrust | fin angles].
+
     Reference: Franklin, Powell and Workman (1998), Digital Control of Dynamic Systems, section 4.3; for the Padé
     approximant Golub and Van Loan (2013), section 9.3.
 
@@ -33,12 +37,15 @@ class ActuatorStates(nn.Module):
         actuators: thruster curves.
         effects: effects of the model, in order of action.
         dt: length of a step, s, for which a delay is kept; None for continuous time.
+        fins: how many the vehicle has.
 
     Raises:
         ConfigError: an effect on commands remembers, but does not say how.
     """
 
-    def __init__(self, actuators: Actuators, effects: list[Effect], dt: float | None = None) -> None:
+    def __init__(
+        self, actuators: Actuators, effects: list[Effect], dt: float | None = None, fins: int = 0
+    ) -> None:
         """Find out what remembers."""
         super().__init__()
         self.actuators, self.dt = actuators, dt
@@ -50,9 +57,14 @@ class ActuatorStates(nn.Module):
                 raise ConfigError(
                     f"effect {effect.name} remembers commands and does not say how: see Effect.follow"
                 )
-        lag = next((e for e in effects if "respond" in e.hooks()), None)
-        self.rate_of_lag = None if lag is None else _decay(lag)
-        self.lag = lag if self.rate_of_lag is not None else None
+        answer = answer_of(effects, "respond")
+        self.rate_of_lag = None if answer is None else _decay(answer)
+        self.lag = answer if self.rate_of_lag is not None else None
+        answer = answer_of(effects, "steer") if fins else None
+        self.rate_of_fins = None if answer is None else _decay(answer)
+        self.steer = answer if self.rate_of_fins is not None else None
+        # Fins whose angles are part of the state; others are where they are commanded.
+        self.fins = fins if self.steer is not None else 0
         self.delay = max((float(e.delay().detach()) for e in effects if "delay" in e.hooks()), default=0.0)
         # Rows whose settled thrust is still on its way as a step begins, and the share of the step until the next.
         self.rows, self.share = 0, 0.0
@@ -69,7 +81,12 @@ class ActuatorStates(nn.Module):
     def states(self) -> int:
         """Numbers that are remembered."""
         late = 0 if not self.delay else (self.rows if self.dt is not None else PADE)
-        return self.size * ((self.lag is not None) + len(self.filters) + late)
+        return self.size * ((self.lag is not None) + len(self.filters) + late) + self.fins
+
+    @property
+    def inputs(self) -> int:
+        """Numbers in a command, and in what acts."""
+        return self.size + self.fins
 
     def names(self) -> list[str]:
         """Return one name per number of the state."""
@@ -79,7 +96,8 @@ class ActuatorStates(nn.Module):
         blocks += [str(e.name) for e in self.filters]
         if self.delay:
             blocks += [f"delay_{k + 1}" for k in range(self.rows if self.dt is not None else PADE)]
-        return [f"{block}.{place}" for block in blocks for place in places]
+        names = [f"{block}.{place}" for block in blocks for place in places]
+        return [*(f"angle.fin_{k + 1}" for k in range(self.fins)), *names]
 
     def static(self, command: Tensor) -> Tensor:
         """Return the settled thrust of commands (..., n), N; tables as sums of kinks, without an index."""
@@ -93,7 +111,8 @@ class ActuatorStates(nn.Module):
         return torch.stack(columns, dim=-1)
 
     def settled(self, command: Tensor) -> Tensor:
-        """Return the state (..., k) of actuators that have been at a command (..., n) for long."""
+        """Return the state (..., k) of actuators that have been at a command (..., n + m) for long."""
+        command, angles = command.split((self.size, self.fins), dim=-1)
         shaped, filters = command, []
         for effect in self.shaping:
             if effect.remembers:
@@ -105,11 +124,14 @@ class ActuatorStates(nn.Module):
         parts += filters
         if self.delay:
             parts += [thrust] * self.rows if self.dt is not None else [thrust, 0 * thrust, 0 * thrust]
+        parts = [angles, *parts] if self.fins else parts
         return torch.cat(parts, dim=-1) if parts else command[..., :0]
 
     def rate(self, state: Tensor, command: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the thrust that acts (..., n), N, and the rate of the state (..., k), in continuous time."""
-        blocks = list(state.split(self.size, dim=-1)) if self.states else []
+        """Return what acts (..., n + m), N and rad, and the rate of the state (..., k), in continuous time."""
+        angles, state = state.split((self.fins, self.states - self.fins), dim=-1)
+        command, wanted = command.split((self.size, self.fins), dim=-1)
+        blocks = list(state.split(self.size, dim=-1)) if self.states > self.fins else []
         rates: list[Tensor] = []
         lagged = blocks.pop(0) if self.lag is not None else None
         for effect in self.shaping:
@@ -127,24 +149,30 @@ class ActuatorStates(nn.Module):
             a, b, c = blocks
             rates += [b / self.delay, c / self.delay, (60 * (thrust - a) - 36 * b - 9 * c) / self.delay]
             thrust = a - 0.4 * b + 0.05 * c
+        if self.fins:
+            assert self.rate_of_fins is not None
+            rates.insert(0, self.rate_of_fins.to(thrust) * (wanted - angles))
+            thrust = torch.cat([thrust, angles], dim=-1)
         return thrust, torch.cat(rates, dim=-1) if rates else state
 
     def advance(
         self, state: Tensor, command: Tensor, step: Tensor, substeps: int = 1
     ) -> tuple[list[tuple[Tensor, Tensor | None]], Tensor]:
-        """Hold a command (..., n) for one step.
+        """Hold a command (..., n + m) for one step.
 
         Args:
             state: (..., k).
-            command: (..., n).
+            command: (..., n + m).
             step: its length, s, (..., 1); with a delay it must be `dt`.
             substeps: equal parts.
 
         Returns:
-            Mean thrust and rise of the equivalent line, (..., n) each, of every part (None where it is constant), and
-            the state afterwards, (..., k).
+            Mean of what acts and rise of the equivalent line, (..., n + m) each, of every part (None where it is
+            constant), and the state afterwards, (..., k).
         """
-        blocks = list(state.split(self.size, dim=-1)) if self.states else []
+        angles, state = state.split((self.fins, self.states - self.fins), dim=-1)
+        command, wanted = command.split((self.size, self.fins), dim=-1)
+        blocks = list(state.split(self.size, dim=-1)) if self.states > self.fins else []
         filters: list[Tensor] = []
         thrust = blocks.pop(0) if self.lag is not None else None
         for effect in self.shaping:
@@ -166,6 +194,13 @@ class ActuatorStates(nn.Module):
             parts.append(self._part(inside, begin, end, thrust, step))
             thrust = None if thrust is None else self._after(inside, thrust, step)
         left = ([] if thrust is None else [thrust]) + filters + (queue[: self.rows] if self.delay else [])
+        if self.steer is not None:
+            for k, (mean, rise) in enumerate(parts):
+                turned = self.steer(angles, wanted, step / substeps)
+                rise = torch.zeros_like(mean) if rise is None else rise
+                parts[k] = (torch.cat([mean, turned.mean], dim=-1), torch.cat([rise, turned.slope], dim=-1))
+                angles = turned.end
+            left.insert(0, angles)
         return parts, torch.cat(left, dim=-1) if left else state
 
     def _part(
@@ -185,7 +220,7 @@ class ActuatorStates(nn.Module):
             width, middle = (b - a) / (end - begin), (0.5 * (a + b) - begin) / (end - begin) - 0.5
             own, lean = demand, None
             if thrust is not None and self.lag is not None:
-                answer = self.lag.respond(thrust, demand, (b - a) * step)
+                answer = self.lag(thrust, demand, (b - a) * step)
                 own, lean, thrust = answer.mean, answer.slope, answer.end
             mean = mean + width * own
             rise = rise + 12.0 * width * middle * own
@@ -197,7 +232,7 @@ class ActuatorStates(nn.Module):
     def _after(self, inside: list[tuple[float, float, Tensor]], thrust: Tensor, step: Tensor) -> Tensor:
         assert self.lag is not None
         for a, b, demand in inside:
-            thrust = self.lag.respond(thrust, demand, (b - a) * step).end
+            thrust = self.lag(thrust, demand, (b - a) * step).end
         return thrust
 
 
@@ -215,7 +250,7 @@ def _looks_back(effect: Effect, size: int) -> bool:
     return not torch.equal(made[0, 2], made[1, 2])
 
 
-def _decay(lag: Effect) -> Tensor | None:
+def _decay(lag: Answer) -> Tensor | None:
     """Return the rates at which the gap to the demand closes, 1/s; None where it is closed at once.
 
     A gap that closes in proportion to itself, whenever one looks, does so as exp(-rate t).
@@ -224,7 +259,7 @@ def _decay(lag: Effect) -> Tensor | None:
         one = torch.ones(1, dtype=torch.float64)
         step = 1e-3 * one
         for _ in range(3):
-            left = lag.respond(one, 0 * one, step).end
+            left = lag(one, 0 * one, step).end
             if float(left.min()) <= 0.0:
                 return None
             rate = -torch.log(left) / step

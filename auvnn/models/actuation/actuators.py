@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from auvnn.effects import Effect, Response
 from auvnn.errors import ConfigError
-from auvnn.models.actuation.thrust_signal import ThrustSignal
+from auvnn.models.actuation.thrust_signal import Answer, ThrustSignal
 from auvnn.physics.thrusters import allocation_matrix, quadratic_thrust, table_thrust
 from auvnn.vehicle import Vehicle
 
@@ -19,6 +19,9 @@ from auvnn.vehicle import Vehicle
 @dataclass(frozen=True)
 class Drive:
     """The thrust over T rows' intervals, each cut into equal steps, N (or the wrench).
+
+    Where an effect has the fins follow their commands, their actual angles, rad, come after the thrust: n is then the
+    number of thrusters and fins together.
 
     Attributes:
         means: average thrust over each step, (..., T, steps, n), or (..., T, 1, n) where all steps have the same.
@@ -137,12 +140,31 @@ class Actuators(nn.Module):
             effects: of the model that act on commands and thrust.
         """
         demand = self.demand(command, times, effects)
-        lag = _only(effects, "respond")
+        lag = answer_of(effects, "respond")
         states = demand if lag is None else _states(demand, times, lag, 1)[0]
         return ThrustSignal(demand, states, times, lag)
 
+    def steering(self, fins: Tensor | None, times: Tensor, effects: Sequence[Effect]) -> ThrustSignal | None:
+        """Return the actual fin angles as a function of time; None where they are the commanded ones.
+
+        Args:
+            fins: commanded angles, held per interval, rad, (..., T, m), or None.
+            times: of the rows, s, (..., T).
+            effects: of the model.
+        """
+        steer = answer_of(effects, "steer")
+        if steer is None or fins is None:
+            return None
+        return ThrustSignal(fins, _states(fins, times, steer, 1)[0], times, steer)
+
     def drive(
-        self, command: Tensor, times: Tensor, effects: Sequence[Effect], substeps: int = 1, warmup: int = 0
+        self,
+        command: Tensor,
+        times: Tensor,
+        effects: Sequence[Effect],
+        substeps: int = 1,
+        warmup: int = 0,
+        fins: Tensor | None = None,
     ) -> Drive:
         """Work out the thrust over a stretch, after the effects on commands and the actuators' dynamics.
 
@@ -155,12 +177,24 @@ class Actuators(nn.Module):
             effects: in order of action.
             substeps: equal steps per interval.
             warmup: rows before the stretch.
+            fins: commanded fin angles, rad, (..., warmup + T, m); where an effect has the fins follow them, the actual
+                angles come after the thrust.
 
         Returns:
             The thrust over the T - 1 intervals of the stretch, and at its last row.
         """
+        thrust = self._thrust(command, times, effects, substeps, warmup)
+        steer = answer_of(effects, "steer")
+        if steer is None or fins is None:
+            return thrust
+        angles = _lagged(fins, *_states(fins, times, steer, substeps), substeps, warmup)
+        return _side_by_side(thrust, angles)
+
+    def _thrust(
+        self, command: Tensor, times: Tensor, effects: Sequence[Effect], substeps: int, warmup: int
+    ) -> Drive:
         demand = self.demand(command, times, effects)
-        lag, late = _only(effects, "respond"), _only(effects, "delay")
+        lag, late = answer_of(effects, "respond"), _only(effects, "delay")
         if lag is None:
             rows = demand[..., warmup:, :]
             plain = Drive(rows.unsqueeze(-2), None, rows, substeps)
@@ -183,7 +217,32 @@ def _only(effects: Sequence[Effect], hook: str) -> Effect | None:
     return found[0] if found else None
 
 
-def _states(demand: Tensor, times: Tensor, effect: Effect, substeps: int) -> tuple[Tensor, Response]:
+def answer_of(effects: Sequence[Effect], hook: str) -> Answer | None:
+    """Return how actuators answer ("respond") or fins ("steer"); None where no effect gives them dynamics.
+
+    Raises:
+        ConfigError: several do.
+    """
+    effect = _only(effects, hook)
+    return None if effect is None else getattr(effect, hook)
+
+
+def _side_by_side(thrust: Drive, angles: Drive) -> Drive:
+    """Return thrust and fin angles as one, (..., n + m)."""
+    assert angles.slopes is not None
+    slopes = thrust.slopes
+    if slopes is None:
+        slopes = torch.zeros_like(thrust.means).expand(*thrust.means.shape[:-2], thrust.steps, -1)
+    means = thrust.means.expand(slopes.shape)
+    return Drive(
+        torch.cat([means, angles.means], dim=-1),
+        torch.cat([slopes, angles.slopes], dim=-1),
+        torch.cat([thrust.starts, angles.starts], dim=-1),
+        thrust.steps,
+    )
+
+
+def _states(demand: Tensor, times: Tensor, lag: Answer, substeps: int) -> tuple[Tensor, Response]:
     """Return the thrust as each row begins, (..., T, n), and the answer to a unit gap over each step."""
     # The last row has no interval of its own; its thrust is needed only at its very start.
     steps = torch.cat([times[..., 1:] - times[..., :-1], torch.zeros_like(times[..., :1])], dim=-1)
@@ -191,7 +250,7 @@ def _states(demand: Tensor, times: Tensor, effect: Effect, substeps: int) -> tup
     # The answer is linear in the gap between state and demand: one call for all steps tells how the gap closes,
     # and the recursion in time is left with two operations a row.
     unit = torch.ones_like(h)
-    answer = effect.respond(unit, torch.zeros_like(h), h)
+    answer = lag(unit, torch.zeros_like(h), h)
     rows = demand.unbind(-2)
     over = (answer.end**substeps).unbind(-2)
     state, states = rows[0], []

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import torch
 from torch import Tensor
 
-from auvnn.effects import Effect
+from auvnn.effects import Response
+
+# How an actuator goes from a state under a constant demand over a step: `Effect.respond` or `Effect.steer`.
+Answer = Callable[[Tensor, Tensor, Tensor], Response]
 
 
 class ThrustSignal:
@@ -18,10 +23,10 @@ class ThrustSignal:
         demand: (..., T, n), N, held from times[k] to times[k + 1].
         state: (..., T, n), N, as each piece begins; the demand itself where the actuators have no dynamics.
         times: (..., T), s, with the same leading shape.
-        lag: the effect that gives the actuators dynamics, or None.
+        lag: how the actuators answer, where they have dynamics, or None.
     """
 
-    def __init__(self, demand: Tensor, state: Tensor, times: Tensor, lag: Effect | None) -> None:
+    def __init__(self, demand: Tensor, state: Tensor, times: Tensor, lag: Answer | None) -> None:
         """Keep the pieces; times in double precision, because differences of them are what counts."""
         self.demand, self.gap, self.lag = demand, state - demand, lag
         self.times = _rising(times.detach().double().expand(demand.shape[:-1]).contiguous())
@@ -99,7 +104,7 @@ class ThrustSignal:
         assert self.lag is not None
         step = since.unsqueeze(-1).to(self.demand)
         one = torch.ones_like(step)
-        return self.lag.respond(one, torch.zeros_like(one), step)
+        return self.lag(one, torch.zeros_like(one), step)
 
     def _since(self, index: Tensor, since: Tensor) -> tuple[Tensor, Tensor]:
         """Return the integrals of the thrust, and of time since the piece began times thrust, up to `since`."""

@@ -111,6 +111,8 @@ def rollout(
     if substeps * (times.shape[-1] - warmup) > MAX_STEPS:
         raise ConfigError(_over_budget(substeps * (times.shape[-1] - warmup), max_step))
     rows = torch.broadcast_shapes(inputs.command.shape[:-1], times.shape)
+    if model.using("steer") and inputs.fins is not None:
+        rows = torch.broadcast_shapes(rows, inputs.fins.shape[:-1])
     members = [e for e in model.effects if isinstance(e, Effect)]
     drive = model.actuators.drive(
         inputs.command.expand(*rows, inputs.command.shape[-1]),
@@ -118,6 +120,7 @@ def rollout(
         members,
         substeps,
         warmup,
+        _alongside(inputs.fins, rows) if model.using("steer") else None,
     )
     whole, inputs, times = (inputs, times), inputs.rows(warmup), times[..., warmup:]
     state = (eta0.expand(*batch, 7), nu0.expand(*batch, 6))
@@ -135,8 +138,11 @@ def rollout(
         raise ConfigError(
             f"no solver called '{solver}'. There are: {', '.join(TABLEAUS)}, torchdiffeq:METHOD"
         )
-    thrust = drive.starts.expand(*batch, *drive.starts.shape[-2:])
-    result = Trajectory(times, eta, nu, thrust)
+    begun = drive.starts.expand(*batch, *drive.starts.shape[-2:])
+    size = model.actuators.size
+    result = Trajectory(
+        times, eta, nu, begun[..., :size], fins=begun[..., size:] if begun.shape[-1] > size else None
+    )
     if not check:
         return result
     result = _checked(model, result, inputs)
@@ -155,6 +161,10 @@ def rollout(
             if not again.diverged:
                 return replace(again, notes=(stiff_words(rate, step), *again.notes))
     return replace(result, notes=tuple(notes)) if notes else result
+
+
+def _alongside(fins: Tensor | None, rows: torch.Size) -> Tensor | None:
+    return None if fins is None else fins.expand(*rows, fins.shape[-1])
 
 
 def _longest(times: Tensor) -> float:

@@ -85,7 +85,7 @@ def _checked(model: GreyBox, run: Trajectory, inputs: Inputs) -> Trajectory:
             run.nu.detach().reshape(-1, count, 6).clone(),
         )
         times = run.times.expand(sound.shape).reshape(-1, count)
-        thrust = run.thrust.reshape(-1, count, run.thrust.shape[-1])
+        thrust = run.acting.reshape(-1, count, run.acting.shape[-1])
         command = inputs.command.expand(*sound.shape, inputs.command.shape[-1]).reshape(
             -1, count, model.actuators.size
         )
@@ -129,5 +129,10 @@ def _checked(model: GreyBox, run: Trajectory, inputs: Inputs) -> Trajectory:
             )
             eta[index, last + 1 :], nu[index, last + 1 :] = eta[index, last], nu[index, last]
         return Trajectory(
-            run.times, eta.reshape(run.eta.shape), nu.reshape(run.nu.shape), run.thrust, tuple(found)
+            run.times,
+            eta.reshape(run.eta.shape),
+            nu.reshape(run.nu.shape),
+            run.thrust,
+            tuple(found),
+            fins=run.fins,
         )

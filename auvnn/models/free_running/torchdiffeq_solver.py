@@ -75,6 +75,11 @@ def solve(
     since = torch.zeros((), dtype=times.dtype) if offset is None else offset.to(times)
     clock = times.expand(shape[:-1]) + since.unsqueeze(-1)
     signal = model.actuators.signal(inputs.command, clock, model.before_thrust)
+    steering = model.actuators.steering(
+        None if inputs.fins is None else inputs.fins.expand(*clock.shape, inputs.fins.shape[-1]),
+        clock,
+        model.before_thrust,
+    )
     late = next((e.delay() for e in model.using("delay")), torch.zeros(())).to(times)
     # Delayed pieces of thrust change inside the intervals; where they do, the integration starts afresh.
     jumps = (times + late).tolist() if model.using("delay") else []
@@ -89,7 +94,9 @@ def solve(
         begin, end = float(times[k]), float(times[k + 1])
         cuts = [begin, *(t for t in jumps if begin < t < end), end]
 
-        def rate(t: Tensor, y: Tensor, piece: Tensor, row: Inputs = row, begin: float = begin) -> Tensor:
+        def rate(
+            t: Tensor, y: Tensor, piece: Tensor, held: Tensor, row: Inputs = row, begin: float = begin
+        ) -> Tensor:
             nonlocal lost, spent
             spent += 1
             if spent > MAX_EVALUATIONS:
@@ -98,6 +105,8 @@ def solve(
                     f"{MAX_EVALUATIONS} evaluations: loosen rtol and atol, or use solver=rk4"
                 )
             now = signal.along(piece, (t - late + since).expand(shape[:-2]))
+            if steering is not None:
+                now = torch.cat([now, steering.along(held, (t + since).expand(shape[:-2]))], dim=-1)
             rotation = quat_to_matrix(y[..., 3:7] / torch.linalg.norm(y[..., 3:7], dim=-1, keepdim=True))
             nu = y[..., 7:]
             change = torch.cat(
@@ -117,9 +126,12 @@ def solve(
         for low, high in itertools.pairwise(cuts):
             middle = torch.full(shape[:-2], 0.5 * (low + high), dtype=times.dtype)
             piece = signal.piece(middle - late.detach().cpu() + since)
+            held = piece if steering is None else steering.piece(middle + since)
             ends = torch.tensor([low, high], dtype=times.dtype, device=times.device)
             try:
-                run = odeint(partial(rate, piece=piece), y, ends, method=method, rtol=rtol, atol=atol)
+                run = odeint(
+                    partial(rate, piece=piece, held=held), y, ends, method=method, rtol=rtol, atol=atol
+                )
             except AssertionError as problem:
                 raise ConfigError(
                     f"torchdiffeq {method} gave up at t = {begin:g} s ({problem or 'step too small'}): "

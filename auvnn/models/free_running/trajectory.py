@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+import torch
 from torch import Tensor
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)
@@ -38,6 +35,8 @@ class Trajectory:
         nu: (..., T, 6), m/s and rad/s.
         thrust: (..., T, n), N, just after each row's command.
         divergences: empty where the run stayed sound; a diverged trajectory holds its last sound state.
+        fins: (..., T, m), rad, the actual fin angles just after each row's command, where an effect has them follow it;
+            else None.
         notes: in words, steps that were cut because the model is stiff, and velocities beyond those that the damping
             was trained on, where what it says is extrapolated.
     """
@@ -48,6 +47,12 @@ class Trajectory:
     thrust: Tensor
     divergences: tuple[Divergence, ...] = ()
     notes: tuple[str, ...] = ()
+    fins: Tensor | None = None
+
+    @property
+    def acting(self) -> Tensor:
+        """What the actuators do as each row begins, for `GreyBox.nu_dot`: thrust, and fin angles where they lag."""
+        return self.thrust if self.fins is None else torch.cat([self.thrust, self.fins], dim=-1)
 
     @property
     def diverged(self) -> bool:

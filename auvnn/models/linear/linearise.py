@@ -163,7 +163,7 @@ def _is_euler(state: Tensor, space: StateSpace) -> bool:
         found = {SIZE + k: False, SIZE - 1 + k: True}.get(size)
     if found is None and space.dt is None and space.actuators.delay:
         # The state of the discrete system, which `linearise` sorts out: only its head counts here.
-        found = (size - SIZE + 1) % space.actuators.size == 0
+        found = (size - SIZE + 1 - space.actuators.fins) % space.actuators.size == 0
     if found is None:
         raise ConfigError(
             f"state {tuple(state.shape)}: the last size is {SIZE} with a quaternion or {SIZE - 1} with Euler angles, "
@@ -177,7 +177,7 @@ def _given(
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Return state with actuators, inputs and time, of one leading shape."""
     base = SIZE - _is_euler(state, space)
-    own = space.actuators.settled(u[..., : space.actuators.size])
+    own = space.actuators.settled(u[..., : space.actuators.inputs])
     if state.shape[-1] == base + space.actuators.states:
         own = state[..., base:]
     t = torch.as_tensor(time, dtype=state.dtype, device=state.device)

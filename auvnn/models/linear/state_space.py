@@ -39,7 +39,7 @@ class StateSpace(nn.Module):
         if dt is not None and not 0 < dt < 1e6:
             raise ConfigError(f"dt={dt!r} s: give a positive step")
         self.model, self.dt = model, dt
-        self.actuators = ActuatorStates(model.actuators, model.members, dt)
+        self.actuators = ActuatorStates(model.actuators, model.members, dt, len(model.vehicle.fins))
         channels = {c for e in model.members for c in e.channels}
         self.fins = len(model.vehicle.fins)
         self.voltage = "voltage" in channels
@@ -117,25 +117,30 @@ class StateSpace(nn.Module):
         lead = torch.broadcast_shapes(*(p.shape[:-1] for p in parts))
         return torch.cat([p.expand(*lead, p.shape[-1]) for p in parts], dim=-1)
 
-    def settled(self, eta: Tensor, nu: Tensor, command: Tensor) -> Tensor:
+    def settled(self, eta: Tensor, nu: Tensor, command: Tensor, fins: Tensor | None = None) -> Tensor:
         """Return x (..., n) with actuators that have been at a command (..., k) for long.
 
         Args:
             eta: (..., 7), or (..., 6) with Euler angles.
             nu: (..., 6), m/s and rad/s.
             command: (..., k).
+            fins: angles at which the fins have been, rad, (..., m); zero where not given.
         """
+        if self.actuators.fins:
+            fins = command.new_zeros(self.fins) if fins is None else fins
+            lead = torch.broadcast_shapes(command.shape[:-1], fins.shape[:-1])
+            command = torch.cat([x.expand(*lead, x.shape[-1]) for x in (command, fins)], dim=-1)
         eta = eta6_to_eta7(eta) if eta.shape[-1] == 6 else eta
         own = self.actuators.settled(command)
         lead = torch.broadcast_shapes(eta.shape[:-1], nu.shape[:-1], own.shape[:-1])
         return torch.cat([p.expand(*lead, p.shape[-1]) for p in (eta, nu, own)], dim=-1)
 
     def motion(self, y: Tensor, thrust: Tensor, u: Tensor, time: Tensor) -> Tensor:
-        """Return the rate of position, quaternion and velocity y (..., 13) under a thrust (..., k), N.
+        """Return the rate of position, quaternion and velocity y (..., 13) under a thrust (..., k), N, and fin angles.
 
         Args:
             y: position, quaternion and velocity, (..., 13).
-            thrust: N, (..., k).
+            thrust: N, (..., k), and after it, where the fins lag, their actual angles, rad.
             u: inputs, (..., m).
             time: s, (...).
         """
@@ -149,7 +154,7 @@ class StateSpace(nn.Module):
             u: inputs, (..., m).
             time: s, (...).
         """
-        thrust, own = self.actuators.rate(x[..., SIZE:], u[..., : self.actuators.size])
+        thrust, own = self.actuators.rate(x[..., SIZE:], u[..., : self.actuators.inputs])
         return torch.cat([self.motion(x[..., :SIZE], thrust, u, time), own], dim=-1)
 
     def step(self, x: Tensor, u: Tensor, time: Tensor, h: Tensor, substeps: int = 1) -> Tensor:
@@ -165,7 +170,7 @@ class StateSpace(nn.Module):
             substeps: into how many it is cut.
         """
         y, step = x[..., :SIZE], h.unsqueeze(-1)
-        parts, own = self.actuators.advance(x[..., SIZE:], u[..., : self.actuators.size], step, substeps)
+        parts, own = self.actuators.advance(x[..., SIZE:], u[..., : self.actuators.inputs], step, substeps)
         part = step / substeps
         for k, (mean, rise) in enumerate(parts):
             begin = time + k * (h / substeps)

@@ -13,6 +13,7 @@ from auvnn.plants.independent.fins import Fins
 from auvnn.plants.independent.forces import Forces
 from auvnn.plants.independent.hull import build, curved, grasp
 from auvnn.plants.independent.loads import LOADS, Instant
+from auvnn.plants.independent.servos import Servos
 from auvnn.plants.independent.sizes import sphere_radius
 from auvnn.plants.independent.thrust import Actuators
 from auvnn.plants.independent.vectors import cross, cross_matrix, times
@@ -70,6 +71,7 @@ class Equations(Forces):
         self.loads = [(name, LOADS[name], values) for name, values in effects.items() if name in LOADS]
         self.strangers = [(n, STRANGERS.get(n), values) for n, values in strangers.items()]
         self.fins = None
+        self.servos = Servos(effects.get("fin_lag", {}).get("time_constant", 0.0))
         if vehicle.fins:
             self.fins = Fins(
                 vehicle, effects.get("fin_stall", {}).get("factor", 1.0), laws.separation, effects
@@ -201,7 +203,8 @@ class Equations(Forces):
             moment = moment + self.actuators.torque(left)
         out["thrust"] = np.concatenate([left @ self.actuators.forces.T, moment], axis=-1)
         if self.fins is not None:
-            out["fins"] = np.concatenate(self.fins.wrench(flow, turn, angles), axis=-1)
+            turned = self.servos.now(t, angles)
+            out["fins"] = np.concatenate(self.fins.wrench(flow, turn, turned), axis=-1)
         out["weight"] = self._weight(t, down, flow, turn)
         if self.loads:
             a = (near.grown * np.diagonal(self.hull.added)[:3]).T

@@ -105,6 +105,7 @@ class Stretch:
         begin = float(task.t[k])
         end = begin if last else float(task.t[k + 1])
         self.actuators.hold(command, begin, end)
+        self.equations.servos.hold(fins, begin)
         self.commands.append(command)
         self.fins.append(fins)
         held = (command, fins, voltage)

@@ -43,7 +43,7 @@ def training_windows(model: GreyBox, log: Log, horizon: float) -> Windows:
     Raises:
         InputError: no stretch is long enough, or there are too few windows.
     """
-    lagging = model.using("respond") or model.using("command")
+    lagging = model.using("respond") or model.using("command") or model.using("steer")
     warmup = HISTORY if lagging else 0.0
     windows = cut_windows(log, horizon, warmup=warmup, kind=model.actuation, partial=True)
     if len(windows) < FEWEST:

@@ -91,9 +91,8 @@ def test_a_fit_that_grows_without_bound_is_passed_over(model):
         holding(wild, windows)
 
     def found(first, *tried):
-        where: Any = SimpleNamespace(first=first, tried=list(tried), current=wild, windows=windows)
-        ended: Any = SimpleNamespace(state=where)
-        return _held(ended)
+        state: Any = SimpleNamespace(first=first, tried=list(tried), current=wild, windows=windows)
+        return _held(state)
 
-    assert found(first, wild) == holding(first, windows)
-    assert found(wild).name == "held"
+    assert found(first, wild) == (first, holding(first, windows))
+    assert found(wild)[1].name == "held"

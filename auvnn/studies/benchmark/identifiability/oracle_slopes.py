@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from auvnn.plants import Motion, PlantTask
 from auvnn.plants.independent.equations import Equations
 from auvnn.plants.independent.sensors import Reported, report
+from auvnn.plants.independent.servos import Servos
 from auvnn.plants.independent.thrust import Actuators
 from auvnn.plants.independent.vectors import cross_matrix, matrix_of, orthonormal
 
@@ -101,6 +102,8 @@ def accelerations(course: Course, effects: Values, kicks: Array | None = None) -
     turns = Rotation.from_rotvec(changes[:, 3:6]).as_matrix()
     many = len(changes)
     memory = any(name in REMEMBERING for name in effects)
+    # The mean over a step is what moves the vehicle, of fins that lag as of thrusters.
+    servos = Servos(effects["fin_lag"]["time_constant"]) if "fin_lag" in effects else None
     out = np.empty((many, *speeds.shape))
     done = -1
 
@@ -116,11 +119,15 @@ def accelerations(course: Course, effects: Values, kicks: Array | None = None) -
             actuators.hold(
                 motion.command[:, done], float(task.t[done]), float(task.t[min(done + 1, len(task.t) - 1)])
             )
+            if servos is not None and motion.fins is not None:
+                servos.hold(motion.fins[:, done], float(task.t[done]))
         thrust = _mean(actuators, moment - 0.5 * course.step, moment + 0.5 * course.step, memory)
         place = (places[None, :, j] + changes[:, None, :3]).reshape(-1, 3)
         rotation = (rotations[None, :, j] @ turns[:, None]).reshape(-1, 3, 3)
         nu = (speeds[None, :, j] + changes[:, None, 6:]).reshape(-1, 6)
         fins = None if motion.fins is None else motion.fins[:, row]
+        if servos is not None and fins is not None:
+            fins = servos.mean(moment - 0.5 * course.step, moment + 0.5 * course.step)
         voltage = None if task.voltage is None else task.voltage[:, row]
         held = (np.concatenate([motion.command[:, row]] * many), all_of(fins), all_of(voltage))
         rate = equations.rate(

@@ -106,7 +106,9 @@ def covers(plant: str, names: Sequence[str]) -> bool:
     """
     from auvnn.plants import PLANTS
 
-    remembering = any(n in REMEMBERING or {"delay", "respond"} & set(effect_class(n).hooks()) for n in names)
+    remembering = any(
+        n in REMEMBERING or {"delay", "respond", "steer"} & set(effect_class(n).hooks()) for n in names
+    )
     return not remembering and not any(PLANTS.get(plant)().refuses(n) for n in names)
 
 
