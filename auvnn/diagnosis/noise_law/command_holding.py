@@ -175,4 +175,4 @@ def cost_at_best(first: FittedHypothesis, windows: Windows, sigma: Array | None 
     square = (sums.total + fitted.priors.square)[np.ix_(inside, inside)]
     step = np.linalg.lstsq(square, pull, rcond=1e-12)[0] if inside.any() else np.zeros(0)
     best = float(sums.cost.sum() - (pull @ step if inside.any() else 0.0))
-    return best + (fitted.priors.cost(fitted.theta) if len(fitted.theta) else 0.0)
+    return best + (fitted.priors.penalty(fitted.theta) if len(fitted.theta) else 0.0)
