@@ -42,12 +42,40 @@ class Extent:
         duration: from there to the latest time, s.
         longest: duration of the longest run, s.
         distance: median and largest distance from the origin of the positions, m; zeros without positions.
+        runs: first and last time of each run, s; empty where all of the duration was recorded.
     """
 
     begin: float
     duration: float
     longest: float
     distance: tuple[float, float] = (0.0, 0.0)
+    runs: tuple[tuple[float, float], ...] = ()
+
+    def recorded(self) -> list[tuple[float, float]]:
+        """Return the stretches of time that at least one run has recorded, s, in order and without overlap."""
+        if not self.runs:
+            return [(self.begin, self.begin + self.duration)]
+        joined: list[tuple[float, float]] = []
+        for low, high in sorted(self.runs):
+            if joined and low <= joined[-1][1]:
+                joined[-1] = (joined[-1][0], max(joined[-1][1], high))
+            else:
+                joined.append((low, high))
+        return joined
+
+    def moment(self, share: float) -> float:
+        """Return the time, s, before which lies a share, 0 to 1, of what was recorded: never between two dives."""
+        stretches = self.recorded()
+        left = share * self.seconds()
+        for low, high in stretches:
+            if left <= high - low:
+                return low + left
+            left -= high - low
+        return stretches[-1][1]
+
+    def seconds(self) -> float:
+        """Return how long at least one run was recorded, s."""
+        return sum(high - low for low, high in self.recorded())
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,8 @@ GRASP = 0.3
 PLACES = ("x", "y", "z")
 TIMES = 8
 """At so many times it is asked for, and between any two of them that are further apart than a fit finds its way."""
+LATEST = 1e10
+"""s: later than the stamps of any log, dates among them."""
 SURE = 1.0
 """s: an onset that is off by less is found by the fit."""
 
@@ -47,7 +49,7 @@ class Payload(Effect):
         mass, length = float(vehicle.mass), float(vehicle.length)
         weight = mass * float(vehicle.gravity)
         return (
-            Parameter("time", "s", 0.0, 10.0, 0.0, 1e7, probes=(0.5,), shape=True),
+            Parameter("time", "s", 0.0, 10.0, 0.0, LATEST, probes=(0.5,), shape=True),
             Parameter("mass", "kg", 0.0, 0.05 * mass, -0.5 * mass, 5 * mass),
             *(Parameter(n, "m", 0.0, 0.3 * length, -3 * length, 3 * length, shape=True) for n in PLACES),
             Parameter("buoyancy", "N", 0.0, 0.05 * weight, -0.5 * weight, 5 * weight),
@@ -56,8 +58,8 @@ class Payload(Effect):
 
     @classmethod
     def starts(cls, parameters: tuple[Parameter, ...], extent: Extent) -> list[dict[str, float]]:
-        """Return eight times, evenly over the log."""
-        return [{"time": extent.begin + (k + 0.5) / TIMES * extent.duration} for k in range(TIMES)]
+        """Return eight times, evenly over what was recorded."""
+        return [{"time": extent.moment((k + 0.5) / TIMES)} for k in range(TIMES)]
 
     @classmethod
     def closer(
@@ -76,11 +78,13 @@ class Payload(Effect):
         cls, parameters: tuple[Parameter, ...], extent: Extent, shape: dict[str, float], level: int
     ) -> list[dict[str, float]]:
         """Return times before and after the one found, at the place found, until they are a second apart."""
-        before = extent.duration / TIMES ** (level + 1)
+        before = extent.seconds() / TIMES ** (level + 1)
         if before <= SURE:
             return []
         times = [shape["time"] + k / TIMES * before for k in range(1 - TIMES, TIMES)]
-        return [{**shape, "time": t} for t in times if 0 <= t - extent.begin <= extent.duration]
+        return [
+            {**shape, "time": t} for t in times if any(low <= t <= high for low, high in extent.recorded())
+        ]
 
     def settle(self, vehicle: Any, actuation: str) -> None:
         """Keep gravity and the duration of the grasp."""

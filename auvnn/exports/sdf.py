@@ -188,6 +188,8 @@ def _thrusters(main: xml.Element, model: GreyBox) -> None:
         _text(plugin, "propeller_diameter", [0.1])
         _text(plugin, "max_thrust_cmd", [gain * unit.max_forward])
         _text(plugin, "min_thrust_cmd", [-gain * unit.max_reverse])
+        # Else a controller turns the blades by torque, with a gain that is far too high for a link so light.
+        xml.SubElement(plugin, "velocity_control").text = "true"
         _own(plugin, "handedness", str(unit.handedness))
         if isinstance(unit.curve, ThrustTable):
             _own(plugin, "command", " ".join(map(repr, unit.curve.command.tolist())))
@@ -201,8 +203,8 @@ def _part(main: xml.Element, name: str, place: Any, axis: Any, limit: float | No
     inertial = xml.SubElement(link, "inertial")
     xml.SubElement(inertial, "mass").text = LIGHT
     moments = xml.SubElement(inertial, "inertia")
-    for i in ("ixx", "iyy", "izz"):
-        xml.SubElement(moments, i).text = "1e-07"
+    for i in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"):
+        xml.SubElement(moments, i).text = "1e-07" if i[1] == i[2] else "0"
     joint = xml.SubElement(main, "joint", {"name": f"{name}_joint", "type": "revolute"})
     xml.SubElement(joint, "parent").text = "base_link"
     xml.SubElement(joint, "child").text = name

@@ -13,6 +13,7 @@ import numpy as np
 
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs.channels import SCALARS, VELOCITY
+from auvnn.logs.clock_origin import from_their_beginning
 from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.run import MIN_SAMPLES, Run
 from auvnn.logs.shown import ShownLog
@@ -28,7 +29,7 @@ class Log(ShownLog):
     `len(log)` is the number of runs, `log[0]` the first of them, `log[1:]` a log of the others, `log["u"]` a column.
 
     Args:
-        runs: the runs, with the same columns and different numbers.
+        runs: the runs, with the same columns and different numbers; stamps of 1e7 s and more count from the earliest.
         name: what to call the log in words and file names.
         paths: the files it was read from; empty for a log made in memory.
         repairs: what was mended or noted while reading.
@@ -56,9 +57,10 @@ class Log(ShownLog):
     unsealed: tuple[Path, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
-        """Check that the runs belong together."""
-        object.__setattr__(self, "runs", tuple(self.runs))
-        object.__setattr__(self, "repairs", tuple(self.repairs))
+        """Check that the runs belong together, and count stamps that are dates from the first of them."""
+        runs, notes = from_their_beginning(self.runs, self.name)
+        object.__setattr__(self, "runs", runs)
+        object.__setattr__(self, "repairs", (*self.repairs, *notes))
         if not self.runs:
             raise InputError(f"log '{self.name}' has no run")
         numbers = [run.number for run in self.runs]

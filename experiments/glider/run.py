@@ -10,6 +10,7 @@ import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -145,8 +146,19 @@ def study(data: Path, out: Path, say: Callable[[str], None] = print) -> dict:
     return result
 
 
+def plain(value: Any) -> Any:
+    """Return a result without numbers that JSON has not: what is unknown is null."""
+    if isinstance(value, dict):
+        return {k: plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
 def _write(result: dict, out: Path) -> None:
-    (out / "result.json").write_text(json.dumps(result, indent=1, default=float))
+    (out / "result.json").write_text(json.dumps(plain(result), indent=1, allow_nan=False) + "\n")
 
 
 if __name__ == "__main__":
@@ -155,4 +167,4 @@ if __name__ == "__main__":
     folder = Path(sys.argv[2] if len(sys.argv) > 2 else "outputs/glider")
     answer = study(Path(sys.argv[1]), folder)
     _write(answer, folder)
-    print(json.dumps(answer, indent=1, default=float))
+    print(json.dumps(plain(answer), indent=1))

@@ -61,16 +61,48 @@ def test_the_mapping_reads_what_a_glider_writes(tmp_path):
 
 
 def test_what_is_expected_holds_together():
+    """The README rests on these: depth rates foretold, no name, and a compressibility that the record cannot show."""
     expected = json.loads((HERE / "expected.json").read_text())
     assert expected["fitted"]["depth_rate_r2"] >= 0.95 > expected["as_given"]["depth_rate_r2"]
+    assert expected["diagnosis"]["verdict"] == "unknown" and not expected["diagnosis"]["missing"]
+    assert max(c["explained"] for c in expected["diagnosis"]["candidates"]) < 0.004
+    found = expected["with_compressibility"]["parameters"]["compressibility.per_metre"]
+    assert abs(found["value"]) < 2.0 * found["std"]
 
 
-@pytest.mark.data
-@pytest.mark.skipif(
+ABSENT = pytest.mark.skipif(
     not (DATA / "gliderflight_data.npy").is_file(),
     reason="the glider's record is not here: set AUVNN_DATA to the folder above glider/",
 )
+
+
+@pytest.mark.data
+@ABSENT
 def test_mass_and_drag_of_one_half_foretell_the_other(study, tmp_path):
+    expected = json.loads((HERE / "expected.json").read_text())
     first, second = study.halves(DATA, tmp_path)
-    made, _ = study.fitted(load(HERE / "glider.yaml"), first)
-    assert study.scores(study.predicted_rate(made, second))["depth_rate_r2"] >= 0.95
+    assert [len(first.runs), len(second.runs)] == expected["dives"]
+    made, values = study.fitted(load(HERE / "glider.yaml"), first)
+    for name, found in values.items():
+        wanted = expected["fitted"]["parameters"][name]
+        # To a hundredth of a standard error: processors add up in different orders.
+        assert found["value"] == pytest.approx(wanted["value"], abs=0.01 * wanted["std"]), name
+    scores = study.scores(study.predicted_rate(made, second))
+    assert scores["depth_rate_r2"] >= 0.95
+    for name, value in scores.items():
+        assert value == pytest.approx(expected["fitted"][name], abs=2e-4), name
+
+
+@pytest.mark.data
+@pytest.mark.long
+@ABSENT
+def test_the_whole_study_gives_what_is_expected(study, tmp_path):
+    expected = json.loads((HERE / "expected.json").read_text())
+    found = study.plain(study.study(DATA, tmp_path, say=lambda words: None))
+    for name in ("verdict", "missing"):
+        assert found["diagnosis"][name] == expected["diagnosis"][name]
+    assert found["as_given"] == pytest.approx(expected["as_given"], abs=2e-4)
+    mine, theirs = (
+        r["with_compressibility"]["parameters"]["compressibility.per_metre"] for r in (found, expected)
+    )
+    assert mine["value"] == pytest.approx(theirs["value"], abs=0.05 * theirs["std"])

@@ -14,7 +14,7 @@ from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.answers.answering import answer
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.noise_law.command_holding import holding, squared_error
+from auvnn.diagnosis.noise_law.command_holding import Holding, holding, squared_error
 from auvnn.diagnosis.noise_law.foretold import Foretold, foretold
 from auvnn.diagnosis.noise_law.hypothesis import BesideForce, under_its_law
 from auvnn.diagnosis.noise_law.law import ALPHA_BOUNDARY, left
@@ -51,8 +51,7 @@ def beside_what_is_left(found: Diagnosis, under_way: Searched) -> tuple[Diagnosi
     if not _leaves_something(found):
         return found, under_way
     asked = under_way.setting
-    least = _leaves_least(under_way.state)
-    held = holding(least, under_way.state.windows)
+    least, held = _held(under_way.state)
     windows = held.applied(under_way.state.windows)
     asked.say("asking whether the sensors' noise is white")
     colour = noise_colour(least, windows, under_way.floor)
@@ -83,10 +82,18 @@ def _leaves_something(found: Diagnosis) -> bool:
     return found.verdict in ("unknown", "partial") or found.steps[-1]["verdict"] == "unknown"
 
 
-def _leaves_least(state: State) -> FittedHypothesis:
-    """Return the explanation that leaves least, whatever the search made of it."""
+def _held(state: State) -> tuple[FittedHypothesis, Holding]:
+    """Return the explanation that leaves least, whatever the search made of it, and how commands go by it.
+
+    One that was tried and is about to diverge says nothing of them: then the next best is asked.
+    """
     sigma = state.first.fitted.sigma
-    return min([state.first, *state.tried, state.current], key=lambda e: squared_error(e, sigma))
+    for end in sorted([state.first, *state.tried, state.current], key=lambda e: squared_error(e, sigma)):
+        try:
+            return end, holding(end, state.windows)
+        except np.linalg.LinAlgError:
+            continue
+    return state.first, Holding("held", 0.0, 0.0, 0.0)
 
 
 def _beside_force(

@@ -107,6 +107,9 @@ def holding(first: FittedHypothesis, windows: Windows) -> Holding:
     Args:
         first: a fit of commands that are held.
         windows: those it was fitted to.
+
+    Raises:
+        numpy.linalg.LinAlgError: free running with the fit grows without bound.
     """
     held = Holding("held", 0.0, 0.0, 0.0)
     # An acceleration is measured at an instant: the mean over an interval says nothing of it.
@@ -155,6 +158,9 @@ def cost_at_best(first: FittedHypothesis, windows: Windows, sigma: Array | None 
         first: a fit.
         windows: perhaps other ones than it was fitted to.
         sigma: (18,) weights, by default those of the fit.
+
+    Raises:
+        numpy.linalg.LinAlgError: free running with the fit grows without bound.
     """
     fitted = first.fitted
     sums, _, _ = normal_equations(
@@ -163,6 +169,8 @@ def cost_at_best(first: FittedHypothesis, windows: Windows, sigma: Array | None 
         fitted.sigma if sigma is None else sigma,
     )
     inside = fitted.priors.inside(fitted.theta)
+    if not (np.isfinite(sums.cost).all() and np.isfinite(sums.total[np.ix_(inside, inside)]).all()):
+        raise np.linalg.LinAlgError("free running grows without bound")
     pull = (sums.slope.sum(0) - fitted.priors.pull(fitted.theta))[inside]
     square = (sums.total + fitted.priors.square)[np.ix_(inside, inside)]
     step = np.linalg.lstsq(square, pull, rcond=1e-12)[0] if inside.any() else np.zeros(0)

@@ -83,6 +83,14 @@ class Likelihood:
         self.pull = sums.priors.pull(sums.theta)[keep]
         self.prior = sums.priors.penalty(sums.theta) if len(sums.theta) else 0.0
 
+    def shown(self) -> list[int]:
+        """Return the degrees of freedom in which a force would move anything that is measured.
+
+        In a vertical plane with a measured attitude two of six do: of the others every likelihood ratio is one.
+        """
+        seen = torch.diagonal(self.force, dim1=-2, dim2=-1).sum(0).reshape(6, self.sums.cells).sum(-1)
+        return [int(i) for i in np.flatnonzero(seen.numpy() > 0.0)]
+
     def law(self, axes: Sequence[int], rms: Array, time: Array) -> ForceLaw:
         """Return a law with forces in some degrees of freedom.
 
@@ -233,10 +241,10 @@ def estimate(sums: ForceSums, start: ForceLaw | None = None, only: Sequence[int]
     Args:
         sums: of an explanation's windows.
         start: a law from which to begin.
-        only: degrees of freedom to look at, by default all; given, none of them is left out.
+        only: degrees of freedom to look at, by default all that show; given, none of them is left out.
     """
     likelihood = Likelihood(sums)
-    axes = list(range(6)) if only is None else list(only)
+    axes = likelihood.shown() if only is None else list(only)
     p_values = np.ones(6)
     while axes:
         begin = None

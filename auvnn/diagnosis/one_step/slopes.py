@@ -86,4 +86,5 @@ def extent_of_log(log: Log) -> Extent:
     away = np.concatenate([np.linalg.norm(r.eta[:, :3], axis=1) for r in log.runs])
     away = away[np.isfinite(away)]
     distance = (float(np.median(away)), float(away.max())) if len(away) else (0.0, 0.0)
-    return Extent(float(begin), float(end - begin), max(r.duration for r in log.runs), distance)
+    runs = tuple((float(r.t[0]), float(r.t[-1])) for r in log.runs)
+    return Extent(float(begin), float(end - begin), max(r.duration for r in log.runs), distance, runs)

@@ -41,14 +41,13 @@ def extent_of(windows: Windows) -> Extent:
     """Return how far a log reaches, by its windows."""
     times = windows.times[:, windows.warmup :]
     first, last = times[:, 0].numpy(), times[:, -1].numpy()
-    longest = max(
-        float(last[windows.run == run].max() - first[windows.run == run].min())
-        for run in np.unique(windows.run)
-    )
+    own = [windows.run == run for run in np.unique(windows.run)]
+    runs = tuple((float(first[mine].min()), float(last[mine].max())) for mine in own)
+    longest = max(high - low for low, high in runs)
     seen = windows.mask[..., POSITION].all(-1)
     away = torch.linalg.vector_norm(windows.eta[..., :3], dim=-1)[seen].numpy()
     distance = (float(np.median(away)), float(away.max())) if len(away) else (0.0, 0.0)
-    return Extent(float(first.min()), float(last.max() - first.min()), longest, distance)
+    return Extent(float(first.min()), float(last.max() - first.min()), longest, distance, runs)
 
 
 class _One(nn.Module):

@@ -111,8 +111,6 @@ def _seconds(t: NDArray) -> NDArray[np.float64]:
 def _clean(values: NDArray) -> NDArray:
     if values.dtype.kind == "i" and values.dtype.itemsize == 8:
         return values
-    numbers = values.astype(np.float64)
+    numbers = values.astype(np.float64, copy=False)
     bad = np.isinf(numbers)
-    if bad.any():
-        numbers[bad] = np.nan
-    return numbers
+    return np.where(bad, np.nan, numbers) if bad.any() else numbers

@@ -89,11 +89,13 @@ def _checked(raw: bytes, where: str, notes: list[Repair]) -> bytes:
     if order is None:
         raise InputError(f"{where}: is a MATLAB file of version 4 or damaged; save it with -v7")
     limit = max(_MOST, 10 * len(raw))
-    out = [raw[:_HEADER]]
+    # Nothing is copied before it must be: a file without packed and damaged parts is read as it is.
+    whole, plain = memoryview(raw), True
+    out: list[bytes | memoryview] = [whole[:_HEADER]]
     at, total, bad, opaque = _HEADER, 0, 0, 0
     while at + 8 <= len(raw):
         kind, size = struct.unpack_from(order + "II", raw, at)
-        data = raw[at + 8 : at + 8 + size]
+        data = whole[at + 8 : at + 8 + size]
         at += 8 + size
         if len(data) < size:
             notes.append(
@@ -101,9 +103,10 @@ def _checked(raw: bytes, where: str, notes: list[Repair]) -> bytes:
             )
             break
         if kind == _COMPRESSED:
+            plain = False
             worker = zlib.decompressobj()
             try:
-                data = worker.decompress(data, min(limit - total, _RATIO * len(data) + 1024) + 1)
+                data = memoryview(worker.decompress(data, min(limit - total, _RATIO * len(data) + 1024) + 1))
             except zlib.error:
                 bad += 1
                 continue
@@ -126,7 +129,7 @@ def _checked(raw: bytes, where: str, notes: list[Repair]) -> bytes:
         elif verdict:
             bad += 1
         else:
-            out.append(struct.pack(order + "II", kind, len(data)) + data)
+            out += [struct.pack(order + "II", kind, len(data)), data]
     if opaque:
         words = (
             "objects of MATLAB (timetable, timeseries, datetime, string) left out: only MATLAB can read them"
@@ -137,6 +140,9 @@ def _checked(raw: bytes, where: str, notes: list[Repair]) -> bytes:
     if len(out) == 1:
         cure = "save the columns of timetables and timeseries as plain arrays" if opaque else "copy it again"
         raise InputError(f"{where}: holds no array that can be read; {cure}")
+    if plain and not bad and not opaque and at == len(raw):
+        refuse_more_than_memory(total, where)
+        return raw
     refuse_more_than_memory(2 * total, where)
     return b"".join(out)
 
@@ -144,7 +150,7 @@ def _checked(raw: bytes, where: str, notes: list[Repair]) -> bytes:
 _SIZES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
 
 
-def _array(data: bytes, order: str, depth: int) -> str:
+def _array(data: memoryview, order: str, depth: int) -> str:
     """Return what is wrong with the lengths within an array, "" where nothing is."""
     if depth > _DEPTH:
         return "nested too deeply"
@@ -185,8 +191,8 @@ def _array(data: bytes, order: str, depth: int) -> str:
     return "opaque" if kind == 5 else "class"
 
 
-def _parts(data: bytes, order: str) -> list[tuple[int, bytes]] | None:
-    parts: list[tuple[int, bytes]] = []
+def _parts(data: memoryview, order: str) -> list[tuple[int, memoryview]] | None:
+    parts: list[tuple[int, memoryview]] = []
     at = 0
     while at + 8 <= len(data):
         first, size = struct.unpack_from(order + "II", data, at)

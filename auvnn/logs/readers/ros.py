@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from array import array
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from auvnn.logs.recording import Recording, Topic, Wanted
 
 _BATCH = 2_000
 _BATCH_BYTES = 8_000_000
+_MERGED = 32  # batches that are put together as soon as there are so many
 _SURVEY = 60  # messages of a topic that are decoded to see what it holds
 SURVEY_BYTES = 48_000_000
 _FIELDS = 400  # columns of a topic that are shown
@@ -132,10 +134,11 @@ class _Columns:
         self.channel, self.decoder, self.first = channel, decoder, first
         self.waiting: list[bytes] = []
         self.bytes = 0
-        self.arrivals: list[int] = []
+        # Eight bytes a message: a list of Python's integers takes five times as much.
+        self.arrivals = array("q")
         self.parts: list[dict[str, Any]] = []
         self.sizes: list[int] = []
-        self.decoded = self.count = self.last = 0
+        self.decoded = self.count = self.last = self.merged = 0
 
     def add(self, stamp: int, data: bytes) -> None:
         self.count += 1
@@ -157,7 +160,17 @@ class _Columns:
             self.parts.append(self.decoder.decode(self.waiting))
             self.sizes.append(len(self.waiting))
             self.decoded += len(self.waiting)
+            if len(self.parts) == self.merged + _MERGED:
+                self._merge()
         self.waiting, self.bytes = [], 0
+
+    def _merge(self) -> None:
+        """Put the last parts together: memory of large arrays goes back as they are freed, that of small ones stays."""
+        parts, sizes = self.parts[self.merged :], self.sizes[self.merged :]
+        names = dict.fromkeys(name for part in parts for name in part)
+        self.parts[self.merged :] = [{name: _joined(parts, sizes, name) for name in names}]
+        self.sizes[self.merged :] = [sum(sizes)]
+        self.merged += 1
 
     def note(self, where: str, notes: Notes) -> None:
         if self.decoder is not None and self.decoder.bad:
@@ -170,8 +183,7 @@ class _Columns:
         columns = {}
         for name in names:
             # Taken out one by one: all of them twice would be the most that reading needs.
-            pieces = [p.pop(name, np.full(n, np.nan)) for p, n in zip(self.parts, self.sizes, strict=True)]
-            columns[name] = np.concatenate(pieces)
+            columns[name] = _joined(self.parts, self.sizes, name)
         words = {}
         if self.decoder is not None:
             words = {p: w for p, w in self.decoder.words.items() if p not in self.decoder.changing}
@@ -185,6 +197,11 @@ class _Columns:
             if (whole != 0).any():
                 t = np.where(whole == 0, np.nan, (whole - epoch) * 1e-9).astype(np.float64)
         return Topic(self.channel.topic, self.channel.kind, t, columns, words, arrival, self.count)
+
+
+def _joined(parts: list[dict[str, Any]], sizes: list[int], name: str) -> np.ndarray[Any, Any]:
+    """Take a column out of the parts and return it in one, (N,); NaN where a part has none."""
+    return np.concatenate([p.pop(name, np.full(n, np.nan)) for p, n in zip(parts, sizes, strict=True)])
 
 
 def _clocks(topics: dict[str, Topic], where: str, notes: Notes) -> None:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import InputError
+from auvnn.logs import clock_origin
 from auvnn.logs.channels import (
     ACCELERATION,
     EULER,
@@ -32,6 +34,9 @@ from auvnn.logs.run import MIN_SAMPLES, Run
 
 Array = NDArray[np.float64]
 
+# Rows by which it is told whether a file's stamps are dates.
+FIRST_ROWS = 5000
+
 
 @dataclass
 class Collector:
@@ -42,7 +47,33 @@ class Collector:
     unknown: dict[str, None] = field(default_factory=dict)
 
 
-def collect(table: Table, plan: Mapping, file: Path, collector: Collector) -> None:
+@dataclass(frozen=True)
+class FileClock:
+    """From when the stamps of a file count, whichever of its rows are read.
+
+    Attributes:
+        first: the file's first stamp as it stands there, from which integers are counted.
+        origin: s, taken off stamps that are dates; nought for others.
+    """
+
+    first: Any
+    origin: float
+
+    @classmethod
+    def of(cls, table: Table, plan: Mapping) -> FileClock:
+        """Return it by the first rows of a file."""
+        raw = table.columns["t"][:FIRST_ROWS]
+        first = raw[0] if len(raw) else 0.0
+        return cls(first, clock_origin.origin_of(plan.seconds(raw, "t" in table.seconds, first)))
+
+    def seconds(self, table: Table, plan: Mapping) -> Array:
+        """Return the stamps of a table, s, (N,), dates as dates."""
+        return plan.seconds(table.columns["t"], "t" in table.seconds, self.first)
+
+
+def collect(
+    table: Table, plan: Mapping, file: Path, collector: Collector, clock_from: FileClock | None = None
+) -> None:
     """Turn a table into runs: told apart, in order of time, mended and checked.
 
     Args:
@@ -50,6 +81,7 @@ def collect(table: Table, plan: Mapping, file: Path, collector: Collector) -> No
         plan: the mapping.
         file: from which they are, for messages.
         collector: takes the runs and the repairs.
+        clock_from: from when the file's stamps count, where the table is a part of it.
     """
     where = str(file)
     plan = table.rest or plan
@@ -61,7 +93,10 @@ def collect(table: Table, plan: Mapping, file: Path, collector: Collector) -> No
         groups = _groups(table, str(label_column), where, collector)
     outside = [n for n in table.columns if not is_canonical(n) and n != plan.run]
     collector.unknown.update(dict.fromkeys(outside))
-    t = plan.seconds(table.columns["t"], "t" in table.seconds)
+    begin = FileClock.of(table, plan) if clock_from is None else clock_from
+    t = begin.seconds(table, plan)
+    if begin.origin and clock_from is None:
+        collector.repairs.append(clock_origin.note(begin.origin, where, table.rows))
     highest = max(number for number, _ in groups)
     for number, rows in groups:
         here = where if len(groups) == 1 else f"{where}, run {number}"
@@ -76,7 +111,7 @@ def collect(table: Table, plan: Mapping, file: Path, collector: Collector) -> No
             whole = len(taken) == table.rows and bool((np.diff(taken) == 1).all())
             pick = slice(None) if whole else taken
             columns = {n: c[pick].astype(np.float64, copy=False) for n, c in table.columns.items()}
-            columns["t"] = t[pick]
+            columns["t"] = clock_origin.counted_from(t[pick], begin.origin)
             columns, notes = delays.undo_delays(columns, plan, here)
             collector.repairs.extend(notes)
             columns, notes = several_rates.settle(columns, plan, here)

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import InputError
+from auvnn.logs.clock_origin import counted_from
 from auvnn.logs.readers import READERS, choose
 from auvnn.logs.readers.ros2_folder import ros2_files
-from auvnn.logs.reading.collect import Collector, collect
+from auvnn.logs.reading.collect import FIRST_ROWS, Collector, FileClock, collect
 from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.run import Run
 from auvnn.logs.seal import compare, file_hash, sealed
@@ -26,7 +27,7 @@ class Portion:
     """Rows of a file and the runs in them.
 
     Attributes:
-        t: stamps as the file has them, s, (N,); NaN where one is missing.
+        t: stamps in the order of the file, on the clock of its runs, s, (N,); NaN where one is missing.
         label: run number of each row, (N,); ones where the file has none.
         runs: in the order of the file; mended as on reading a whole log, with what these rows say alone.
     """
@@ -80,8 +81,10 @@ def read_portion(path: Path, mapping: Mapping, first: int, count: int) -> Portio
                 f"{path}: column '{name}' names the runs: a log that is read in parts needs numbers there, or one "
                 "run per file (mapping run: file)"
             )
-        collect(table, mapping, path, collector)
-    t = mapping.seconds(table.columns["t"], "t" in table.seconds)
+        clock = _clock(path, mapping) if first else None
+        collect(table, mapping, path, collector, clock)
+    clock = clock or FileClock.of(table, mapping)
+    t = counted_from(clock.seconds(table, mapping), clock.origin)
     numbered = mapping.run != "file" and name in table.columns
     label = table.columns[str(name)].astype(np.float64) if numbered else np.ones(table.rows)
     return Portion(t, label, tuple(collector.runs))
@@ -168,6 +171,18 @@ def kinds_of(paths: Sequence[Path], mapping: Any = None) -> tuple[str, ...]:
     return (run.kind, *(k for k, known in there.items() if known and k != run.kind))
 
 
+def _clock(path: Path, mapping: Mapping) -> FileClock:
+    """Return from when a file's stamps count; the last one is kept for as long as the file does not change."""
+    state = path.stat()
+    key = (str(path), state.st_size, state.st_mtime_ns, repr(mapping))
+    if key not in _CLOCKS:
+        found = FileClock.of(choose(path)[0].mapped_rows(path, mapping, 0, FIRST_ROWS), mapping)
+        _CLOCKS.clear()
+        _CLOCKS[key] = found
+    return _CLOCKS[key]
+
+
+_CLOCKS: dict[tuple[str, int, int, str], FileClock] = {}
 # s since 1970 beyond which a stamp is a date.
 _UNIX = 1e8
 

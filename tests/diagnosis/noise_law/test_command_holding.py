@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ import torch
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.noise_law.answer import _held
 from auvnn.diagnosis.noise_law.command_holding import between, cubic_weights, holding
 from auvnn.logs import Log
 from auvnn.models import GreyBox
@@ -75,3 +78,21 @@ def test_a_smooth_command_is_the_mean_of_its_cubic(model):
     mixed, plain = between(windows, 0.5, smooth=True).inputs.command, windows.inputs.command
     own = (-plain[:, :-3] + 13.0 * plain[:, 1:-2] + 13.0 * plain[:, 2:-1] - plain[:, 3:]) / 24.0
     assert torch.allclose(mixed[:, 1:-2], own)
+
+
+def test_a_fit_that_grows_without_bound_is_passed_over(model):
+    """Its squared error may have been the smallest while it was fitted: the next best says how commands go."""
+    log = make_log(model, duration=12.0, rate=5.0, noise=0.3)
+    windows, layout = windows_for(model, log), lay_out(model, [])
+    first = fit_hypothesis(layout, windows, list(layout.names), (), iterations=2)
+    none = replace(first.fitted.statistics, channel=0.0 * first.fitted.statistics.channel)
+    wild = replace(first, fitted=replace(first.fitted, initial=1e160 * first.fitted.initial, statistics=none))
+    with pytest.raises(np.linalg.LinAlgError, match="without bound"):
+        holding(wild, windows)
+
+    def found(first, *tried):
+        state: Any = SimpleNamespace(first=first, tried=list(tried), current=wild, windows=windows)
+        return _held(state)
+
+    assert found(first, wild) == (first, holding(first, windows))
+    assert found(wild)[1].name == "held"

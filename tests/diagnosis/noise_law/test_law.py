@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -119,3 +121,24 @@ def test_windows_one_by_one_add_up_to_the_likelihood():
     cost = sums.statistics.cost[0] - g[own] @ inner @ g[own] - np.linalg.slogdet(inner)[1]
     assert found.cost[0] == pytest.approx(cost + np.linalg.slogdet(covariance)[1], rel=1e-6)
     assert found.slope[0] == pytest.approx(g[:2] - h[:2, own] @ inner @ g[own], rel=1e-6)
+
+
+def test_a_degree_of_freedom_that_moves_nothing_measured_is_not_asked():
+    """Its likelihood ratio is one whatever the law: the answer is that of asking the others alone."""
+    sums = linear_windows(np.array([2.0, 0.0, 0.0, 3.0, 0.0, 0.0]), np.ones(6), windows=30, cells=4)
+    given = sums.statistics
+    hessian, slope = given.hessian.copy(), given.slope.copy()
+    for i in (1, 2, 4, 5):
+        own = slice(2 + 4 * i, 2 + 4 * (i + 1))
+        hessian[:, own], hessian[:, :, own], slope[:, own] = 0.0, 0.0, 0.0
+    blind = replace(sums, statistics=replace(given, hessian=hessian, slope=slope))
+    assert Likelihood(blind).shown() == [0, 3] and Likelihood(sums).shown() == list(range(6))
+    found, among = estimate(blind), estimate(blind, only=[0, 3])
+    assert found.law is not None and among.law is not None and found.law.axes == [0, 3]
+    assert (found.p_values[[1, 2, 4, 5]] == 1.0).all() and (found.p_values[[0, 3]] < 0.01).all()
+    assert found.value == pytest.approx(among.value, abs=1e-9)
+    # A force there would change nothing.
+    likelihood = Likelihood(blind)
+    more = likelihood.law([0, 1, 3], np.array([2.0, 5.0, 3.0]), np.ones(3))
+    same = likelihood.law([0, 3], np.array([2.0, 3.0]), np.ones(2))
+    assert likelihood.of(more)[0] == pytest.approx(likelihood.of(same)[0], rel=1e-12)

@@ -230,12 +230,18 @@ class Mapping:
             x, y, z, w = (table.columns[n] for n in QUATERNION)
             table.columns.update(zip(QUATERNION, (w, x, y, z), strict=True))
 
-    def seconds(self, values: NDArray[Any], already: bool) -> NDArray[np.float64]:
-        """Return the column `t` in seconds; integers in a finer unit are counted from their first value."""
+    def seconds(self, values: NDArray[Any], already: bool, first: Any = None) -> NDArray[np.float64]:
+        """Return the column `t` in seconds, (N,).
+
+        Args:
+            values: of the column, (N,).
+            already: whether they are seconds.
+            first: integers in a finer unit are counted from this one; from the first of `values` where None.
+        """
         factor = 1.0 if already else _TIME_UNITS[self.time_unit]
         if values.dtype != np.float64:
             # Subtracting first keeps the digits that a float64 of the date would lose.
-            values = (values - values[0]).astype(np.float64)
+            values = (values - (values[0] if first is None else first)).astype(np.float64)
         return values * factor
 
 

@@ -160,6 +160,8 @@ def from_recording(recording: Recording, plan: Mapping, where: str, consume: boo
         series, {n: r for n, r in plan.topics.items() if r.offset == "auto"}, where, result.repairs
     )
     if consume:
+        for one in recording.topics.values():
+            one.columns.clear()  # a topic may be held elsewhere: its columns are what is large
         recording.topics.clear()
         times.known.clear()
     _merged(series, recording, plan, where, result)

@@ -109,7 +109,8 @@ def clipped(y: Array) -> tuple[Mask, float]:
     same = np.concatenate([[False], (y[1:] == y[:-1])])
     starts = np.flatnonzero(~same)
     lengths = np.diff(np.append(starts, len(y)))
-    tops = [(s, s + n) for s, n in zip(starts, lengths, strict=True) if n >= _FLAT and at[s]]
+    flat = (lengths >= _FLAT) & at[starts]
+    tops = [(int(s), int(s + n)) for s, n in zip(starts[flat], lengths[flat], strict=True)]
     steep = [
         max(
             abs(y[s] - y[s - 1]) if s > 0 and good[s - 1] else 0.0,
