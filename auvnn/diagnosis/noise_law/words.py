@@ -1,4 +1,4 @@
-"""What was found of a stochastic force, and of commands between samples, in plain words."""
+"""What was found of a stochastic force, of the noise, and of commands between samples, in plain words."""
 
 from __future__ import annotations
 
@@ -17,6 +17,9 @@ def stochastic_words(stochastic: Mapping[str, Any]) -> list[str]:
             for axis, told in stochastic["force"].items()
         ]
         lines.append(f"A stochastic force is left (rms, correlation time): {', '.join(parts)}.")
+    if stochastic.get("noise"):
+        times = ", ".join(f"{name} {time:.2g} s" for name, time in stochastic["noise"].items())
+        lines.append(f"The sensors' noise is not white; its correlation times: {times}.")
     commands = stochastic.get("commands")
     if commands and commands["between_samples"] != "held":
         next_one = commands["share_of_next"]
