@@ -1,0 +1,35 @@
+"""What was found beside other effects is a candidate by itself, from the values that it had there."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
+from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.noise_law.leaders import fitted_alone
+from auvnn.models import GreyBox
+from tests.small_logs import make_log, small_vehicle
+
+NAMES = ["net_buoyancy", "constant_force"]
+
+
+def test_an_effect_that_was_named_second_is_fitted_by_itself():
+    truth = GreyBox(small_vehicle()).with_effects({"net_buoyancy": {"force": 5.0}})
+    log = make_log(truth, noise=1.0)
+    model = GreyBox(small_vehicle())
+    windows, layout = windows_for(model, log), lay_out(model, NAMES)
+    first = fit_hypothesis(layout, windows, (), (), iterations=3)
+    alone = fit_hypothesis(layout, windows, (), ["constant_force"], iterations=3)
+    both = fit_hypothesis(layout, windows, (), ["constant_force", "net_buoyancy"], iterations=3)
+    steps = [{"verdict": "named", "effects": [n], "p_value": 0.0} for n in ("constant_force", "net_buoyancy")]
+    asked: Any = SimpleNamespace(layout=layout, base=(), say=lambda words: None)
+    state: Any = SimpleNamespace(windows=windows, first=first, tried=(alone, both), steps=steps)
+    found = {e.effects: e for e in fitted_alone(asked, state)}
+    assert set(found) == {("constant_force",), ("net_buoyancy",)}
+    assert found[("constant_force",)] is alone
+    value = float(found[("net_buoyancy",)].fitted.theta[0])
+    assert value == pytest.approx(5.0, abs=0.5)
