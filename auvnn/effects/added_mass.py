@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from auvnn.effects.base import axis_scale
-from auvnn.effects.factors import AxisFactors
+from auvnn.effects.factors import AxisFactors, axis_scale
 from auvnn.effects.hooks import Body, Moment
 
 

@@ -295,12 +295,3 @@ class Effect(nn.Module):
 
 
 HOOKS = ("command", "delay", "respond", "steer", "thrust", "water", "body", "wrench", "sense")
-
-
-def axis_scale(factors: Tensor) -> Tensor:
-    """Return the 6x6 pattern sqrt(f_i f_j): scales a diagonal by f and keeps a matrix positive definite.
-
-    Clipped at a tiny positive number so that the slope stays finite at the bound.
-    """
-    root = torch.sqrt(torch.clamp(factors, min=1e-12))
-    return root.unsqueeze(-1) * root.unsqueeze(-2)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from auvnn.effects.base import AXES, Effect, axis_scale
+import torch
+from torch import Tensor
+
+from auvnn.effects.base import AXES, Effect
 from auvnn.effects.hooks import Body, Moment, Parameter
 
 
@@ -13,6 +16,15 @@ def actuators(vehicle: Any, actuation: str) -> tuple[str, ...]:
     if actuation == "wrench":
         return AXES
     return tuple(f"thruster_{i + 1}" for i in range(len(vehicle.thrusters)))
+
+
+def axis_scale(factors: Tensor) -> Tensor:
+    """Return the 6x6 pattern sqrt(f_i f_j): scales a diagonal by f and keeps a matrix positive definite.
+
+    Clipped at a tiny positive number so that the slope stays finite at the bound.
+    """
+    root = torch.sqrt(torch.clamp(factors, min=1e-12))
+    return root.unsqueeze(-1) * root.unsqueeze(-2)
 
 
 class AxisFactors(Effect):

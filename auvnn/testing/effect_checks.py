@@ -124,9 +124,8 @@ def follows_device(
     )
     answer = effect.respond(row.command, row.command, scene.times[:1])
     command = effect.command(scene.inputs.command, scene.times.expand(scene.inputs.command.shape[:-1]))
-    assert row.fins is not None
-    turned = effect.steer(row.fins, row.fins, scene.times[:1])
-    parts = [x for a in (answer, turned) for x in (a.end, a.mean, a.slope, a.start)]
+    answers = [answer] if row.fins is None else [answer, effect.steer(row.fins, row.fins, scene.times[:1])]
+    parts = [x for a in answers for x in (a.end, a.mean, a.slope, a.start)]
     for tensor in (rate, *parts, command):
         require(
             tensor.device.type == device, f"{kind.name} gives a result on {tensor.device} instead of {device}"

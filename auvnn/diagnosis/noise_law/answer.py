@@ -17,10 +17,11 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.command_holding import Holding, holding, squared_error
 from auvnn.diagnosis.noise_law.foretold import Foretold, foretold
 from auvnn.diagnosis.noise_law.hypothesis import BesideForce, under_its_law
-from auvnn.diagnosis.noise_law.law import ALPHA_BOUNDARY, left
+from auvnn.diagnosis.noise_law.law import ALPHA_BOUNDARY
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
 from auvnn.diagnosis.noise_law.noise_colour import noise_colour
 from auvnn.diagnosis.noise_law.search import UNSOLVED, ForceSearch
+from auvnn.diagnosis.noise_law.words import left
 from auvnn.diagnosis.residuals.forces import actuators_of, share_of
 from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
 from auvnn.diagnosis.search import search

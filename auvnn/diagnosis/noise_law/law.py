@@ -25,7 +25,6 @@ from scipy.optimize import minimize
 from scipy.stats import chi2
 
 from auvnn.diagnosis.noise_law.sums import ForceSums
-from auvnn.diagnosis.residuals.input_forces import AXES
 from auvnn.estimation.normal_equations import Statistics
 from auvnn.metrics.force_law import ForceLaw, correlation
 
@@ -286,13 +285,6 @@ def boundary_p_value(gain: float) -> float:
     variance makes it larger. Half of a chi-square with two degrees of freedom bounds both from above.
     """
     return float(0.5 * chi2.sf(max(gain, 0.0), 2)) if gain > 0.0 else 1.0
-
-
-def left(law: ForceLaw | None) -> dict[str, dict[str, float]]:
-    """Return a law as answers hold it: by degree of freedom rms, N or N m, and correlation time, s."""
-    if law is None:
-        return {}
-    return {AXES[i]: {"rms": float(law.rms[i]), "correlation_time": float(law.time[i])} for i in law.axes}
 
 
 def _inverse(square: Array) -> Array:

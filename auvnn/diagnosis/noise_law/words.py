@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from auvnn.diagnosis.residuals.input_forces import AXES
+from auvnn.metrics.force_law import ForceLaw
+
 MOTIONS = {"X": "surge", "Y": "sway", "Z": "heave", "K": "roll", "M": "pitch", "N": "yaw"}
 
 
@@ -30,3 +33,10 @@ def stochastic_words(stochastic: Mapping[str, Any]) -> list[str]:
         )
         lines.append(f"Commands change between the log's samples: the mean of an interval was taken {along}.")
     return lines
+
+
+def left(law: ForceLaw | None) -> dict[str, dict[str, float]]:
+    """Return a law as answers hold it: by degree of freedom rms, N or N m, and correlation time, s."""
+    if law is None:
+        return {}
+    return {AXES[i]: {"rms": float(law.rms[i]), "correlation_time": float(law.time[i])} for i in law.axes}
