@@ -19,7 +19,7 @@ from auvnn.diagnosis.noise_law.foretold import Foretold, foretold
 from auvnn.diagnosis.noise_law.hypothesis import BesideForce, under_its_law
 from auvnn.diagnosis.noise_law.law import ALPHA_BOUNDARY
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
-from auvnn.diagnosis.noise_law.noise_colour import noise_colour
+from auvnn.diagnosis.noise_law.noise_colour import Colour, noise_colour
 from auvnn.diagnosis.noise_law.search import UNSOLVED, ForceSearch
 from auvnn.diagnosis.noise_law.words import left
 from auvnn.diagnosis.residuals.forces import actuators_of, share_of
@@ -55,7 +55,10 @@ def beside_what_is_left(found: Diagnosis, under_way: Searched) -> tuple[Diagnosi
     least, held = _held(under_way.state)
     windows = held.applied(under_way.state.windows)
     asked.say("asking whether the sensors' noise is white")
-    colour = noise_colour(least, windows, under_way.floor)
+    try:
+        colour = noise_colour(least, windows, under_way.floor)
+    except UNSOLVED:
+        colour = Colour(None, 0.0)
     if held.odds > 0.0 or colour.noise is not None:
         why = [f"commands change between samples ({held.name})"] if held.odds > 0.0 else []
         why += [] if colour.noise is None else ["the sensors' noise is not white"]

@@ -26,10 +26,10 @@ from auvnn.metrics.coloured_noise import NoiseColour
 from auvnn.metrics.windows import ATTITUDE, POSITION, Windows
 
 Array = NDArray[np.float64]
-# Correlation times that are tried, s.
-TIMES = (0.1, 0.3, 1.0)
+# Correlation times that are tried, s. What lasts longer is no noise of a sensor: it could be anything that a model lacks.
+TIMES = (0.1, 0.25, 0.6)
 # Of the best one, for each sensor by itself.
-FACTORS = (0.0, 0.55, 1.8)
+FACTORS = (0.0, 0.55)
 SENSORS = {"position": POSITION, "attitude": ATTITUDE, "velocity": slice(6, 9), "rates": slice(9, 12)}
 # Correlation time, s, by which news is judged when outliers are looked for; how many standard deviations are too many.
 NEWS, OUTLIER, NORMAL = 0.3, 6.0, 1.4826
@@ -77,7 +77,8 @@ def noise_colour(explanation: FittedHypothesis, windows: Windows, floor: Array) 
     for time in TIMES:
         times = np.where(np.arange(18) < 12, time, 0.0)
         best = min(best, (cost_of(times), times), key=lambda found: found[0])
-    if 0.5 * (plain - best[0]) <= ODDS:
+    # Said so that numbers which are none answer no.
+    if not 0.5 * (plain - best[0]) > ODDS:
         return Colour(None, 0.0)
     for place in SENSORS.values():
         if not np.isfinite(explanation.fitted.sigma[place]).any():
