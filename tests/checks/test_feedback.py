@@ -1,4 +1,4 @@
-"""A controller that answers its sensors' noise makes no thruster look exchanged."""
+"""A controller that answers its sensors' noise, or an unknown current, makes no thruster look exchanged."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from auvnn.checks.actuators import check_actuators
 from auvnn.models import load
 from auvnn.simulation import simulate
 from auvnn.studies.benchmark.one_log import conditions
+from auvnn.studies.demo import VEHICLE, made_logs
 from tests.studies.benchmark.plans import of_plan
 
 
@@ -32,3 +33,11 @@ def test_what_feedback_and_coloured_noise_seem_to_say_is_not_said():
     wrong.actuators.allocation.copy_(wrong.actuators.allocation.new_tensor(changed))
     assert foretells_better(wrong, made.log, model.actuators.allocation.numpy())
     assert not foretells_better(model, made.log, changed)
+
+
+def test_a_current_makes_no_thruster_look_exchanged():
+    """The demo's log: thrusters driven against a current that the model does not know."""
+    model = load(VEHICLE)
+    log = made_logs(model)[0].log
+    for part in (log, log.split()[0]):
+        assert check_actuators(model, part).words == []
