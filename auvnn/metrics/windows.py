@@ -120,7 +120,10 @@ def starts(
         until: the stretch goes on beyond `part`, which is believed up to then, s: windows that end later are left out.
     """
     t = run.t[part]
-    usable = run.valid[part] & ~run.stale[part].any(axis=1)
+    usable = run.valid[part]
+    # A start from an old velocity is off by what has changed since; sensors out of step leave no better one.
+    fresh = usable & ~run.stale[part, 6:9].any(axis=1)
+    usable = fresh if fresh.any() else usable
     found: list[tuple[int, int]] = []
     begin = float(t[0]) if begin is None else begin
     tolerance = 1e-6 * run.dt + 1e-3 * run.dt

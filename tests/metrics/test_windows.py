@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -12,6 +14,7 @@ from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.windows import CHANNELS, VELOCITY, cut_windows
 from auvnn.models import GreyBox
 from auvnn.vehicle import load_vehicle
+from tests.small_logs import make_log, small_vehicle
 
 
 def plain_run(t, number=0, **changes) -> Run:
@@ -168,3 +171,30 @@ def test_nothing_to_cut_is_said():
         cut_windows(log_of(plain_run(t)), 5.0)
     with pytest.raises(InputError, match=r"run 0 has no thruster_1"):
         cut_windows(log_of(plain_run(t)), 1.0, kind="thrusters")
+
+
+def test_windows_start_at_new_velocities_and_old_ones_do_not_count():
+    log = slow_velocities(make_log(GreyBox(small_vehicle()), runs=1, duration=20.0, rate=20.0))
+    windows = cut_windows(log, 2.0)
+    assert (windows.first % 4 == 0).all() and len(windows) >= 8
+    seen = windows.mask.numpy().mean((0, 1))
+    assert seen[6:9] == pytest.approx(0.25, abs=0.02) and (seen[9:12] > 0.95).all()
+
+
+def test_sensors_out_of_step_leave_windows_all_the_same():
+    log = slow_velocities(make_log(GreyBox(small_vehicle()), runs=1, duration=20.0, rate=20.0))
+    run = log.runs[0]
+    old = np.arange(run.samples) % 4 != 1
+    quaternion = np.where(old[:, None], np.nan, run.quaternion)
+    windows = cut_windows(Log.from_runs([replace(run, quaternion=quaternion)], name="out of step"), 2.0)
+    assert len(windows) >= 8 and (windows.first % 4 == 1).all()
+
+
+def slow_velocities(log: Log) -> Log:
+    """Return a log whose velocities are measured at every fourth row and repeated in between."""
+    runs = []
+    for run in log.runs:
+        nu = run.nu.copy()
+        nu[:, :3] = run.nu[np.arange(run.samples) // 4 * 4, :3]
+        runs.append(replace(run, nu=nu))
+    return Log.from_runs(runs, name=log.name)
