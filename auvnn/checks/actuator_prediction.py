@@ -1,4 +1,4 @@
-"""Does a change of the actuators foretell the log better? Free running decides, which no feedback deceives.
+"""Does a model with other actuators predict the log better? Free running decides, which no feedback deceives.
 
 A controller answers the noise of its sensors, so that under feedback commands and measured accelerations hang together
 by the noise too, and a regression of one on the other is biased, at worst to the wrong sign. Free running from a measured
@@ -18,11 +18,11 @@ from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
 HORIZON = "5"
-# Standard errors, over the windows, by which the change has to foretell better.
+# Standard errors, over the windows, by which the change has to predict better.
 GAIN = 3.0
 
 
-def foretells_better(model: GreyBox, log: Log, allocation: Array) -> bool:
+def predicts_better(model: GreyBox, log: Log, allocation: Array) -> bool:
     """Whether a model with another allocation runs free beside a log better than it does as it is.
 
     Args:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from auvnn.answers import plain
 from auvnn.checks import regression
-from auvnn.checks.actuator_prediction import foretells_better
+from auvnn.checks.actuator_prediction import predicts_better
 from auvnn.checks.actuator_regression import (
     EXCITED,
     SOUND,
@@ -52,7 +52,7 @@ class ActuatorCheck:
         misfit: root mean square distance of the estimated columns from the stated ones, in standard errors.
         cures: what to do about the findings.
         axes: force or moment of all actuators together over what is stated, by axis, where they are driven together.
-        withdrawn: findings of the regression with which free running foretells the log no better.
+        withdrawn: findings of the regression with which free running predicts the log no better.
     """
 
     names: list[str]
@@ -130,6 +130,7 @@ class ActuatorCheck:
                 "cures": self.cures if self.findings else [],
                 **({"axes": self.axes} if self.axes else {}),
                 "alike": self.alike,
+                **({"withdrawn": self.withdrawn} if self.withdrawn else {}),
                 "story": self.story,
             }
         )
@@ -190,8 +191,9 @@ def check_actuators(model: GreyBox, log: Log) -> ActuatorCheck:
         words, confidence, misfit = axes.findings, axes.confidence, axes.misfit
         changed = np.where(np.isin(np.arange(6), axes.turned), -1.0, 1.0)[:, None] * allocation
     withdrawn: list[str] = []
-    if words and confidence >= SURE and misfit < SOUND and not foretells_better(model, log, changed):
-        words, withdrawn = [], words
+    if words and confidence >= SURE and misfit < SOUND and not predicts_better(model, log, changed):
+        words, withdrawn, confidence = [], words, 0.0
+        place, sign, gains = list(same.place), list(same.sign), np.full(len(names), np.nan)
     return ActuatorCheck(
         names,
         not words,

@@ -1,9 +1,9 @@
-"""Sensor noise that hangs together over time: what of an error is new since the last measurement of its channel.
+"""Sensor noise that is correlated over time: the innovation of each error, given the channel's last measurement.
 
 The noise of a channel is taken as a process of one correlation time, E[n(t) n(s)] = sigma^2 exp(-|t - s| / T). With
 rho = exp(-(t_k - t_j) / T) to the measurement j before it, (n_k - rho n_j) / sqrt(1 - rho^2) is independent of all that
-came before and has the standard deviation sigma again: errors, and what they change with, are replaced by this, and all
-that is made for white noise holds. Where T is nought nothing changes.
+came before and has the standard deviation sigma again: errors and their derivatives are replaced by these
+innovations (prewhitening), and all that is made for white noise holds. Where T is nought nothing changes.
 
 Reference: Box, Jenkins and Reinsel (2008), Time Series Analysis, section 3.2; Jones (1980), Technometrics 22(3), for
 samples that are missing.
@@ -48,7 +48,7 @@ class NoiseColour:
         return rho, known
 
     def whitened(self, values: Tensor, mask: Tensor, times: Tensor) -> Tensor:
-        """Return what is new in errors, or in what they change with, (B, L, C, ...).
+        """Return the innovations of errors, or of their derivatives, (B, L, C, ...).
 
         Args:
             values: the same shape, zero where nothing was measured; C at most 18.

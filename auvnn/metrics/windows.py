@@ -71,7 +71,7 @@ class Windows:
         return bool(self.mask[..., POSITION].any())
 
     def whitened(self, values: Tensor) -> Tensor:
-        """Return what is new in errors, or in what they change with, (B, L, C, ...), where the noise is not white."""
+        """Return the innovations of errors, or of their derivatives, (B, L, C, ...), where the noise is not white."""
         return (
             values
             if self.noise is None

@@ -106,3 +106,17 @@ def test_nothing_is_found_in_twenty_sound_logs():
         assert found.as_stated and found.words == [], (run.number, found.story)
         assert found.untold == [] and found.confidence > 0.95
         assert set(found.axes) <= set("XYZKMN") and min(found.axes.values()) > 0.5
+
+
+def test_what_free_running_does_not_bear_out_is_not_said(monkeypatch):
+    """The regression is as sure as above, but a model with the change predicts no better."""
+    monkeypatch.setattr("auvnn.checks.actuators.predicts_better", lambda *_: False)
+    found = check_actuators(guessed(2), log_of(2, reversed_one(2)))
+    assert found.withdrawn == ["thruster_3 is reversed"] and not found.findings and found.words == []
+    told = found.to_dict()
+    assert (
+        told["confidence"] == 0.0
+        and set(told["sign"].values()) == {1}
+        and told["withdrawn"] == found.withdrawn
+    )
+    assert "nothing is said of the actuators" in found.story[0]

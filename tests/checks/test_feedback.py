@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from auvnn.checks.actuator_prediction import foretells_better
+from auvnn.checks.actuator_prediction import predicts_better
 from auvnn.checks.actuators import check_actuators
 from auvnn.models import load
 from auvnn.simulation import simulate
@@ -31,8 +31,8 @@ def test_what_feedback_and_coloured_noise_seem_to_say_is_not_said():
     changed = model.actuators.allocation.numpy() * np.where(np.arange(6) == 0, -1.0, 1.0)[:, None]
     wrong = model.rebuilt(model.copied_effects())
     wrong.actuators.allocation.copy_(wrong.actuators.allocation.new_tensor(changed))
-    assert foretells_better(wrong, made.log, model.actuators.allocation.numpy())
-    assert not foretells_better(model, made.log, changed)
+    assert predicts_better(wrong, made.log, model.actuators.allocation.numpy())
+    assert not predicts_better(model, made.log, changed)
 
 
 def test_a_current_makes_no_thruster_look_exchanged():

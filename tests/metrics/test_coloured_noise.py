@@ -1,4 +1,4 @@
-"""News of coloured noise against the covariance matrix of all measurements."""
+"""Innovations of coloured noise against the covariance matrix of all measurements."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import torch
 from auvnn.metrics.coloured_noise import NoiseColour, previous
 
 
-def test_news_weighs_as_the_whole_covariance_does():
+def test_innovations_weigh_as_the_whole_covariance_does():
     """Sum of squares and determinant, with rows that are missing and steps that vary; channels that are white stay so."""
     random = np.random.default_rng(0)
     times = np.cumsum(random.uniform(0.02, 0.2, size=40))
@@ -29,7 +29,7 @@ def test_news_weighs_as_the_whole_covariance_does():
     np.testing.assert_allclose(colour.log_determinant(*tensors), expected, rtol=1e-9)
 
 
-def test_what_errors_change_with_is_treated_alike():
+def test_derivatives_are_treated_alike():
     random = np.random.default_rng(1)
     mask, times = torch.ones(2, 30, 18), torch.arange(30.0)[None].repeat(2, 1) * 0.1
     colour = NoiseColour(np.full(18, 0.5))

@@ -121,7 +121,7 @@ def _beside_force(
     told = _foretold(asked, result)
     if told is not None and not asked.tolerance.strict:
         # What inputs foretell has a cause: one that costs little is taken where nothing is foretold beside it.
-        beside.whatever_it_costs = True
+        beside.ignores_cost = True
         again = beside.run(null, alone, asked.most)
         if _foretold(asked, again) is None:
             result, told = again, None
@@ -144,7 +144,7 @@ def _state(asked: Setting, state: State, result: BesideForce, *, chance: bool) -
         table = fill_candidate(asked.layout, table, explanation, state.first)
     share = _share_left(result)
     # A force that follows from what is measured is no noise: a name beside which most of it stays is not its cause.
-    refuted = (not chance and share > MOST) or overwhelming(asked, state, law)
+    refuted = (not chance and share > MOST) or exceeds_actuators(asked, state, law)
     named = [] if refuted else list(result.steps)
     tried = [e for s in result.steps for e in s["effects"]]
     end: dict[str, Any] = {
@@ -173,7 +173,7 @@ def _state(asked: Setting, state: State, result: BesideForce, *, chance: bool) -
     )
 
 
-def overwhelming(asked: Setting, state: State, law: ForceLaw | None) -> bool:
+def exceeds_actuators(asked: Setting, state: State, law: ForceLaw | None) -> bool:
     """Whether the stochastic force is so large beside the actuators' that no cause can be told from the motion.
 
     Args:

@@ -1,6 +1,6 @@
 """Is the sensors' noise white? Asked of the log by evidence, against a stochastic force that may explain the same.
 
-Noise that hangs together over half a second, as filters and estimators make it, looks like a force to whoever takes it
+Noise that is correlated over half a second, as filters and estimators make it, looks like a force to whoever takes it
 for white: errors that last. But it does not add up as a force does. So the likelihood of white noise beside a stochastic
 force, which is integrated out, is compared with that of noise of a few correlation times without any force; then each
 sensor may have a time of its own, or go back to white.
@@ -31,8 +31,8 @@ TIMES = (0.1, 0.25, 0.6)
 # Of the best one, for each sensor by itself.
 FACTORS = (0.0, 0.55)
 SENSORS = {"position": POSITION, "attitude": ATTITUDE, "velocity": slice(6, 9), "rates": slice(9, 12)}
-# Correlation time, s, by which news is judged when outliers are looked for; how many standard deviations are too many.
-NEWS, OUTLIER, NORMAL = 0.3, 6.0, 1.4826
+# Correlation time, s, of the innovations in which outliers are looked for; how many standard deviations are too many.
+INNOVATION, OUTLIER, NORMAL = 0.3, 6.0, 1.4826
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def noise_colour(explanation: FittedHypothesis, windows: Windows, floor: Array) 
 
 
 def without_outliers(explanation: FittedHypothesis, windows: Windows) -> Tensor:
-    """Return the windows' mask (B, L, 18) without measurements whose news stands far out.
+    """Return the windows' mask (B, L, 18) without measurements whose innovation is far out.
 
     A single false value counts once where noise is white, but many times where it is expected to be near the last one:
     left in, a few of them refute every colour.
@@ -101,7 +101,7 @@ def without_outliers(explanation: FittedHypothesis, windows: Windows) -> Tensor:
         windows: those it was fitted to.
     """
     fitted = explanation.fitted
-    asked = replace(windows, noise=NoiseColour(np.where(np.arange(18) < 12, NEWS, 0.0)))
+    asked = replace(windows, noise=NoiseColour(np.where(np.arange(18) < 12, INNOVATION, 0.0)))
     error = torch.cat([r.error for r in linearise(fitted.model, asked, fitted.initial, ())])
     size = torch.where(windows.mask > 0, error.abs(), torch.nan).flatten(0, 1).nanmedian(0).values
     far = error.abs() > OUTLIER * NORMAL * size
@@ -118,7 +118,7 @@ class _Costs:
         colour = NoiseColour(times)
         windows = replace(self.windows, noise=colour)
         fitted = self.explanation.fitted
-        # What is new in the errors has a white part of its own.
+        # Innovations have a white part of their own.
         plain, _, _ = normal_equations(
             windows, linearise(fitted.model, windows, fitted.initial, ()), fitted.sigma
         )

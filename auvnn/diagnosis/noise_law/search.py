@@ -76,7 +76,7 @@ class ForceSearch:
         self.log, self.scale = asked.log, scale_of(asked.log)
         self.sigma = self.weights = np.full(18, np.inf)
         self.cell = CELL
-        self.whatever_it_costs = asked.tolerance.strict
+        self.ignores_cost = asked.tolerance.strict
 
     def begin(self, first: FittedHypothesis, sigma: Array) -> Hypothesis | None:
         """Return the explanation without any name under the law of the force; None where no variance is above zero.
@@ -156,7 +156,7 @@ class ForceSearch:
                 if h.evidence > current.evidence + odds
                 and sure[h.name] < level
                 and foresees(h, current, least)
-                and (self.whatever_it_costs or self._cost(h, current) > cost * self.tolerance.cost)
+                and (self.ignores_cost or self._cost(h, current) > cost * self.tolerance.cost)
             ]
             if not good:
                 break

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.diagnosis.noise_law.answer import overwhelming
+from auvnn.diagnosis.noise_law.answer import exceeds_actuators
 from auvnn.diagnosis.residuals.forces import actuators_of
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.models import GreyBox
@@ -28,5 +28,5 @@ def test_the_mean_over_a_second_is_held_against_the_actuators(share, time, expec
     state: Any = SimpleNamespace(windows=windows)
     rms = np.array([0.0, share * drive[:3].max(), 0.0, 0.0, 0.0, 0.0])
     law = ForceLaw(rms, np.full(6, time), 0.5, 5.0)
-    assert overwhelming(asked, state, law) is expected
-    assert not overwhelming(asked, state, None)
+    assert exceeds_actuators(asked, state, law) is expected
+    assert not exceeds_actuators(asked, state, None)
