@@ -29,7 +29,7 @@ def blind(log: Log) -> list[str]:
     dark = [_WORDS[n] for n in VELOCITY if n in absent and _MOVES[n] not in there]
     if dark:
         found.append(
-            f"{', '.join(dark)} not seen directly: coefficients and effects there are told only by what they do to "
+            f"{', '.join(dark)} not seen directly: coefficients and effects there show only by what they do to "
             "what was measured"
         )
     lost = {}

@@ -14,7 +14,7 @@ from auvnn.answers import PLOTTED, Answer, plain
 from auvnn.cards import Card, figure
 from auvnn.checks.blind import blind
 from auvnn.checks.doubts import doubts
-from auvnn.comparison.beside import beside, standing
+from auvnn.comparison.baseline import compare_with_baseline, standing
 from auvnn.comparison.locate import AXES, failures, locate
 from auvnn.comparison.predictions import stitch, write_predictions
 from auvnn.errors import ConfigError
@@ -164,7 +164,7 @@ def compare(
         located,
         noise,
         None,
-        beside(rolled, model.actuation, scale, log, how),
+        compare_with_baseline(rolled, model.actuation, scale, log, how),
     )
 
 

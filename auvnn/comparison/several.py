@@ -10,7 +10,7 @@ from typing import Any, overload
 
 from auvnn.answers import DRAWERS, PLOTTED, Answer, plain, write_text
 from auvnn.cards import Card, figure
-from auvnn.comparison.beside import HORIZONS as MAIN
+from auvnn.comparison.baseline import HORIZONS as MAIN
 from auvnn.comparison.compare import Comparison
 from auvnn.comparison.compare import compare as compare_one
 from auvnn.comparison.predictions import write_predictions

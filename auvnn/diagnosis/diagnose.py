@@ -10,19 +10,19 @@ import numpy as np
 
 from auvnn.checks.blind import blind
 from auvnn.checks.doubts import doubts
-from auvnn.comparison.beside import stands
+from auvnn.comparison.baseline import baseline_of
 from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
-from auvnn.diagnosis.hypotheses.layout import lay_out
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
-from auvnn.diagnosis.noise_law.answer import beside_what_is_left
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.noise_law.answer import answer_with_force
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.state import Searched, Setting
 from auvnn.errors import ConfigError, InputError
-from auvnn.estimation.normal_equations import TRUST, motion
 from auvnn.estimation.prediction_error import SINGULAR
+from auvnn.estimation.window_normal_equations import TRUST, motion
 from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.unmeasured import assumed, completed
@@ -69,7 +69,7 @@ def diagnose(
         advice: for an ambiguous answer, also work out which manoeuvre would tell the candidates apart.
         whiteness: also test what is left for correlations, before and after; no verdict depends on these tests.
         stochastic: where a force is left without a name, also ask how commands go between samples, and compare the
-            effects again beside a stochastic force whose law is estimated; takes as long again.
+            effects again together with a stochastic force whose law is estimated; takes as long again.
         force: go on with a log that contradicts itself: signs, units, axes.
         tolerance: what does not matter: a number for the cost in free running, with a fifth of it for the force as a
             share of the actuators', or a mapping with `cost` and `force`; by default 0.1 and 0.02. At 0 everything
@@ -172,10 +172,10 @@ def searched(
     try:
         found, under_way = search(asked, windows)
         if stochastic:
-            found, under_way = beside_what_is_left(found, under_way)
+            found, under_way = answer_with_force(found, under_way)
     except (np.linalg.LinAlgError, SINGULAR) as problem:
         raise InputError(
             f"{log.name} cannot be diagnosed with {model.vehicle.name}: free running grows without bound, so that the "
             f"sums of its tests cannot be solved ({problem}); choose shorter windows with window=, and check the model"
         ) from None
-    return replace(found, baseline=stands(model, log, choose_derivative(log))), under_way
+    return replace(found, baseline=baseline_of(model, log, choose_derivative(log))), under_way

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from auvnn.catalogue import unknown_name
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout, priors
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, priors
 from auvnn.diagnosis.left_out_folds import Fold
 from auvnn.diagnosis.one_step.fit import fit_hypothesis_one_step
 from auvnn.diagnosis.score_tests.shape_search import searched_start
 from auvnn.errors import ConfigError
-from auvnn.estimation.nuisance import NormalEquations
+from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.prediction_error import Fitted, fit
 from auvnn.estimation.priors import limits, parameters_of, set_parameters
 from auvnn.logs import Log

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.fitters import ByWindows, Fitter, at, fitter_for
 from auvnn.diagnosis.hypotheses.bake import with_fitted_parameters
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout, lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, lay_out
 from auvnn.diagnosis.left_out_errors import Gain, LeftOut, gain
 from auvnn.diagnosis.left_out_folds import MOST_FOLDS, Fold, folds_of
 from auvnn.errors import InputError
@@ -39,7 +39,7 @@ HORIZONS = ("5", "2", "1", "0.5")
 
 @dataclass(frozen=True)
 class EachName:
-    """What each of several effects is worth beside the others.
+    """What each of several effects is worth in addition to the others.
 
     Attributes:
         nothing: only what is uncertain refitted.

@@ -27,7 +27,7 @@ class UnitPush(Effect):
     reference = "Kristensen, Madsen and Joergensen (2004)"
 
     def __init__(self) -> None:
-        """Make the wrench, at nought."""
+        """Make the wrench, at zero."""
         super().__init__(
             tuple(
                 Parameter(axis, "N" if i < 3 else "N m", 0.0, 1.0, -1e12, 1e12)

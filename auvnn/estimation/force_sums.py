@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 LOOSE = np.array([10.0] * 3 + [1.0] * 3 + [2.0] * 3 + [2.0] * 3)
 
 
-def beside_force(
+def sums_with_force(
     answer: Response, weight: Tensor, live: list[int], *, leverage: bool
 ) -> tuple[Tensor, Tensor, tuple[Array, Array]]:
     """Return a response's sums after the best initial state and force.
@@ -29,7 +29,7 @@ def beside_force(
     Returns:
         products of errors and parameters, (B, 1 + P, 1 + P); how initial state and force follow both, (B, 12 + F, 1 + P);
         the logarithm of the determinant (B,) of what is known of initial state and force, and the degrees of freedom
-        (B, 18) that they take of each channel, nought where not wanted.
+        (B, 18) that they take of each channel, zero where not wanted.
     """
     assert answer.force is not None
     gram = _gram(answer, weight, live)
@@ -48,7 +48,7 @@ def beside_force(
     return sums, solved, (volume, spent)
 
 
-def cost_beside_force(answer: Response, weight: Tensor) -> float:
+def cost_with_force(answer: Response, weight: Tensor) -> float:
     """Return the weighted squared error of the initial states as they are, of which the likeliest force is taken away."""
     assert answer.force is not None
     size, told = answer.force.shape[-1], answer.state.shape[-2]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor, as_tensor
 
-from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
+from auvnn.estimation.window_normal_equations import Statistics, linearise, normal_equations
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from auvnn.catalogue import unknown_name
-from auvnn.comparison.beside import beside
+from auvnn.comparison.baseline import compare_with_baseline
 from auvnn.comparison.predictions import stitch
 from auvnn.diagnosis.answers.answer import OneOf
 from auvnn.diagnosis.answers.table import values
@@ -183,7 +183,7 @@ def _assembled(
             for k, (step, candidate) in enumerate(fits.steps)
         ],
         by_effect=judged.by_effect,
-        baseline=beside(
+        baseline=compare_with_baseline(
             rolled[last],
             model.actuation,
             judged.scale,

@@ -192,7 +192,7 @@ class GreyBox(ShownModel, EquationsOfMotion):
         """Return a model with other effects that shares its learned parts with this one: nothing is copied."""
         return with_joint(self._like(effects, self.vehicle, self.actuation, shared=True), self.joint)
 
-    def beside(self, *effects: Effect) -> GreyBox:
+    def extended_by(self, *effects: Effect) -> GreyBox:
         """Return the model with further effects, probes among them: its own are copied, learned parts shared."""
         return self.sharing([*self.copied_effects(), *effects])
 

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.estimation.normal_equations import cost_of, linearise, normal_equations
+from auvnn.estimation.window_normal_equations import cost_of, linearise, normal_equations
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.free_run import initial_states, predict
 from auvnn.models import GreyBox

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from auvnn.cli.notes import once
-from auvnn.cli.runs.dry import foreseen
+from auvnn.cli.runs.dry import check_inputs
 from auvnn.cli.runs.job import Answering, Job, Verb, files
 
 _STYLE = {"error": "red", "warning": "yellow"}
@@ -74,5 +74,5 @@ def _run(job: Job) -> Answering:
 
 VERB = Verb(
     "quality report of a log: what was read, repaired, implausible, excited", ("log", "mapping", "model"),
-    ("quality.json", "report.html", "figures/"), _run, foresee=foreseen,
+    ("quality.json", "report.html", "figures/"), _run, dry_run=check_inputs,
 )  # fmt: skip

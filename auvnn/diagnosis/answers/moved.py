@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
 
 # Stated standard deviations from which on a movement is told, and coefficients that the words name.
 FAR, NAMED = 2.0, 6

@@ -34,7 +34,7 @@ class Cost:
     """What one name costs.
 
     Attributes:
-        gain: the fall of the error on what is left out that it brings beside the others; None where none can be had.
+        gain: fall of the error on what is left out that it brings in addition to the others; None where there is none.
         force: (6,) root mean square, N and N m.
         share: (6,) of the actuators'.
         matters: whether that is beyond the tolerance.
@@ -63,33 +63,33 @@ class Worth:
 
     Attributes:
         names: name to its cost.
-        beside: name to the fit without it, everything else refitted.
+        without: name to the fit without it, everything else refitted.
         left: degree of freedom to the force without a name, and its cost; as the answer has it.
         words: how that was worked out.
     """
 
     names: Mapping[str, Cost] = field(default_factory=dict)
-    beside: Mapping[str, FittedHypothesis] = field(default_factory=dict)
+    without: Mapping[str, FittedHypothesis] = field(default_factory=dict)
     left: Mapping[str, Any] = field(default_factory=dict)
     words: str = ""
 
 
-def worth(asked: Setting, state: State, beside: Mapping[str, FittedHypothesis]) -> Worth:
+def worth(asked: Setting, state: State, without: Mapping[str, FittedHypothesis]) -> Worth:
     """Return what each name of the fit, and what is left, is worth.
 
     Args:
         asked: what was asked.
         state: at the end of the search.
-        beside: name to the fit without it.
+        without: name to the fit without it.
     """
     found, model = state.current, asked.layout.model
     actuators = actuators_of(model, state.windows)
     costs: dict[str, Cost] = {}
     # Where nothing is there and nothing is left, there is nothing to work out.
-    asked_for = asked.costs and bool(beside or state.left is not None)
+    asked_for = asked.costs and bool(without or state.left is not None)
     whole = _errors(asked, state, found) if asked_for else None
-    forces = forces_of(found, state.windows, list(beside))
-    for name, other in beside.items():
+    forces = forces_of(found, state.windows, list(without))
+    for name, other in without.items():
         asked.say(f"asking what {name} costs")
         fall = None
         if whole is not None:
@@ -98,7 +98,7 @@ def worth(asked: Setting, state: State, beside: Mapping[str, FittedHypothesis]) 
         share = share_of(forces[name], actuators)
         costs[name] = Cost(fall, forces[name], share, _matters(asked, fall, share))
     words = "" if whole is None else whole.how
-    return Worth(costs, dict(beside), _left(asked, state, actuators, whole), words)
+    return Worth(costs, dict(without), _left(asked, state, actuators, whole), words)
 
 
 def small(asked: Setting, state: State, left: Unnamed) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, standard_errors
-from auvnn.diagnosis.hypotheses.layout import GROUPS, Layout
+from auvnn.diagnosis.hypotheses.stated_priors import GROUPS, Layout
 from auvnn.effects import EFFECTS, Effect
 from auvnn.effects.hooks import Body
 from auvnn.estimation.priors import set_parameters

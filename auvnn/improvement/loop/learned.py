@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.hypotheses.layout import Layout
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.effects import Effect, effect_class
 from auvnn.effects.residual_force import INPUTS, ResidualForce
 from auvnn.estimation.priors import limits, set_parameters
@@ -84,12 +84,12 @@ def choose(base: GreyBox, judge: Judge, state: State, kind: str) -> list[Choice]
     sums = (begin, *normal_equations(model, task, names))
     weight = 1.0 if state.fit is None else state.fit.weight
 
-    def foreseen(columns: Index, trial: Recipe) -> float:
-        return _foreseen(layout, trial, names, columns, sums, weight, own, free, judge)
+    def cross_validated_error(columns: Index, trial: Recipe) -> float:
+        return _cross_validated_error(layout, trial, names, columns, sums, weight, own, free, judge)
 
     own_columns = layout.places(names)[name]
     others = np.setdiff1d(np.arange(len(begin)), own_columns)
-    before = foreseen(others, recipe)
+    before = cross_validated_error(others, recipe)
     found: list[tuple[int, Choice]] = []
     for inputs in SUBSETS if kind == "residual_force" else (None,):
         mine = _columns(layout.model.effect(name), own_columns, inputs)
@@ -97,7 +97,9 @@ def choose(base: GreyBox, judge: Judge, state: State, kind: str) -> list[Choice]
             continue
         for ridge in RIDGES:
             trial = _with(base, state.recipe, name, inputs, ridge)
-            fall = (before - foreseen(np.sort(np.concatenate([others, mine])), trial)) / max(before, 1e-300)
+            fall = (before - cross_validated_error(np.sort(np.concatenate([others, mine])), trial)) / max(
+                before, 1e-300
+            )
             if fall > PROMISE:
                 words = " and ".join(inputs) if inputs else "velocity"
                 found.append((len(mine), Choice(trial, float(fall), words)))
@@ -133,7 +135,7 @@ def _columns(effect: Effect, columns: Index, inputs: Sequence[str] | None) -> In
     return columns[np.array(wanted)]
 
 
-def _foreseen(
+def _cross_validated_error(
     layout: Layout,
     recipe: Recipe,
     names: Sequence[str],
@@ -144,7 +146,7 @@ def _foreseen(
     free: NDArray[np.bool_],
     judge: Judge,
 ) -> float:
-    """Return the squared error of all folds, each foreseen by the others, some columns free."""
+    """Return the squared error of all folds, each predicted by the others, some columns free."""
     begin, hessian, slope, cost = sums
     held = held_by(layout, names, recipe)
     total = 0.0
@@ -170,7 +172,7 @@ def _foreseen(
             downhill = fit.slope[keep].sum(0) - weight * precision * (theta - mean)
             # Within the bounds, as the fit itself will be: what is promised beyond them cannot be had.
             theta = theta + newton_step(square, downhill, theta, low[index], high[index], 0.0)
-        total += max(fit.foreseen(theta, mine), 0.0)
+        total += max(fit.predicted_error(theta, mine), 0.0)
     return total
 
 

@@ -1,4 +1,4 @@
-"""Which effects are worth a fit: all of the catalogue at once, linearised, by what they foresee of what is left out."""
+"""Which effects are worth a fit: all of the catalogue at once, linearised, by what they predict of what is left out."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
-from auvnn.diagnosis.hypotheses.layout import lay_out, shapes
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out, shapes
 from auvnn.diagnosis.score_tests.probes import null_is_no_start
 from auvnn.estimation.priors import set_parameters
 from auvnn.improvement.free_run import FreeRunFit, normal_equations
@@ -66,7 +66,7 @@ def promises(
 ) -> list[Promise]:
     """Return what each of several effects promises beside a state, best first.
 
-    Each is linearised where its fit would begin, everything else free beside it; a fold is foreseen by the others.
+    Each is linearised where its fit would begin, everything else free beside it; a fold is predicted by the others.
 
     Args:
         base: the model as given.
@@ -106,14 +106,14 @@ def _group(base: GreyBox, judge: Judge, state: State, group: Sequence[str]) -> l
     weight = 1.0 if state.fit is None else state.fit.weight
     places = layout.places(names)
     without = [n for n in names if n not in group or n in layout.nuisance]
-    before = _foreseen(
+    before = _cross_validated_error(
         layout, state.recipe, without, places, (begin, hessian, slope, cost), weight, own, free, judge
     )[0]
     found = []
     for name in group:
         columns = [*without, *([] if name in without else [name])]
         own_recipe = replace(state.recipe, effects=(*state.recipe.effects, name))
-        after, theta = _foreseen(
+        after, theta = _cross_validated_error(
             layout, own_recipe, columns, places, (begin, hessian, slope, cost), weight, own, free, judge
         )
         # The fit of this effect alone has its own columns, in its own order.
@@ -127,8 +127,10 @@ def _group(base: GreyBox, judge: Judge, state: State, group: Sequence[str]) -> l
     return found
 
 
-def _foreseen(layout, recipe, columns, places, sums, weight, own, free, judge) -> tuple[float, Array]:
-    """Return the squared error of all folds, each foreseen by the others, and the fit to all."""
+def _cross_validated_error(
+    layout, recipe, columns, places, sums, weight, own, free, judge
+) -> tuple[float, Array]:
+    """Return the squared error of all folds, each predicted by the others, and the fit to all."""
     begin, hessian, slope, cost = sums
     index = np.concatenate([places[n] for n in columns]) if columns else np.zeros(0, dtype=int)
     held = held_by(layout, columns, recipe)
@@ -147,5 +149,5 @@ def _foreseen(layout, recipe, columns, places, sums, weight, own, free, judge) -
         mine = own == fold
         if mine.any():
             theta = fit.newton(layout.model, free[:, k]) if free[:, k].any() else fit.theta
-            total += max(fit.foreseen(theta, mine), 0.0)
+            total += max(fit.predicted_error(theta, mine), 0.0)
     return total, fit.newton(layout.model, slice(None))

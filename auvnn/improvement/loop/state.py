@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from auvnn.damping.bank import DampingBank
 from auvnn.diagnosis.fitters import newton
 from auvnn.diagnosis.hypotheses.bake import holding
-from auvnn.diagnosis.hypotheses.layout import Layout, lay_out, priors, scales
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, lay_out, priors, scales
 from auvnn.diagnosis.left_out_errors import LeftOut
 from auvnn.diagnosis.one_step.fit import fit_hypothesis_one_step
 from auvnn.effects import Effect

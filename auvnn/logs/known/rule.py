@@ -139,7 +139,7 @@ def pwm_channels(topic: Topic, pattern: str, recording: Recording, base: int = 0
         topic: with the pulse widths.
         pattern: of the names of its fields, with one place for a number.
         recording: for the autopilot's parameters.
-        base: 1 where the fields count from nought.
+        base: 1 where the fields count from zero.
     """
     parameters = recording.facts.get("parameters", {})
     motors: dict[int, int] = {}

@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from torch.func import functional_call
 
 from auvnn.errors import ConfigError, InputError
-from auvnn.estimation.simulated_windows import window_error
+from auvnn.estimation.window_simulation import window_error
 from auvnn.logs import Log
 from auvnn.metrics.free_run import moved
 from auvnn.metrics.windows import Windows

@@ -67,7 +67,7 @@ def planned(paths: list[Path]) -> tuple[Plan, WindowCut]:
 
 def point(paths: list[Path], cut: WindowCut, asked: list[str]) -> tuple[LinearisationPoint, Any, list[str]]:
     """Stand at a point that no fit has chosen, so that nothing vanishes there."""
-    from auvnn.diagnosis.hypotheses.layout import lay_out
+    from auvnn.diagnosis.hypotheses.stated_priors import lay_out
     from auvnn.diagnosis.score_tests.probes import extent_of
 
     windows = cut_windows(Log.read(paths), 2.0, warmup=1.5, kind="thrusters", partial=True)

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from auvnn.diagnosis.noise_law.law import Likelihood, boundary_p_value, estimate
+from auvnn.diagnosis.noise_law.estimate_law import Likelihood, boundary_p_value, estimate
 from auvnn.diagnosis.noise_law.sums import ForceSums
-from auvnn.estimation.normal_equations import Statistics
+from auvnn.estimation.window_normal_equations import Statistics
 from auvnn.metrics.force_law import correlation
 
 CELL = 0.5

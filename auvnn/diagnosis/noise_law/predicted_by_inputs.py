@@ -1,4 +1,4 @@
-"""How much of a force the measured inputs foretell: that part is not stochastic.
+"""How much of a force the measured inputs predict: that part is not stochastic.
 
 With the law of the stochastic force in the windows, a force that is a simple function of one measured input
 (`InputForces`) is asked for in every degree of freedom. The one is taken whose gain on runs left out is surest, and its
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out
 from auvnn.diagnosis.residuals.additive_force import _by_part
 from auvnn.diagnosis.residuals.input_forces import ANGLES, AXES, InputForces, _euler, _raw
-from auvnn.estimation.normal_equations import Statistics
+from auvnn.estimation.window_normal_equations import Statistics
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
@@ -27,14 +27,14 @@ LIMIT = 1.645
 
 
 @dataclass(frozen=True)
-class Foretold:
-    """The share of a degree of freedom's force that a measured input foretells.
+class InputPrediction:
+    """The share of a degree of freedom's force that a measured input predicts.
 
     Attributes:
         axis: "X" to "N".
         input: name.
         share: of the force's mean square, that of the stochastic force included.
-        least: lower 95 % limit of the share; nought where the gain on runs left out may be chance.
+        least: lower 95 % limit of the share; zero where the gain on runs left out may be chance.
         gain: fall of the weighted squared error on what is left out.
     """
 
@@ -45,8 +45,8 @@ class Foretold:
     gain: float = 0.0
 
 
-def foretold(explanation: FittedHypothesis, windows: Windows) -> Foretold | None:
-    """Return the largest share that is foretold, None where there is no stochastic force.
+def predicted_by_inputs(explanation: FittedHypothesis, windows: Windows) -> InputPrediction | None:
+    """Return the largest share that is predicted, None where there is no stochastic force.
 
     Args:
         explanation: the fit under the law.
@@ -84,9 +84,9 @@ def foretold(explanation: FittedHypothesis, windows: Windows) -> Foretold | None
             z = float(gain.sum()) / max(float(np.sqrt(len(gain)) * gain.std(ddof=1)), 1e-300)
             found = _share(whole, columns, explanation, size, features[:, own], float(law.rms[i]))
             least = found[1] if z > SURE else 0.0
-            told = Foretold(AXES[i], name, found[0], least, float(gain.sum()))
-            if best is None or (told.least, told.share) > (best.least, best.share):
-                best = told
+            predicted = InputPrediction(AXES[i], name, found[0], least, float(gain.sum()))
+            if best is None or (predicted.least, predicted.share) > (best.least, best.share):
+                best = predicted
     return best
 
 
@@ -101,7 +101,7 @@ def _share(
     """Return the share of the mean square that a force of some features has, and its lower limit."""
     fitted, known = explanation.fitted, len(explanation.fitted.theta)
     some = sums.columns(columns)
-    held = fitted.priors.beside(size**-2.0)
+    held = fitted.priors.extended_by(size**-2.0)
     square = some.total + held.square
     unit = 1.0 / np.sqrt(np.maximum(np.diag(square), 1e-300))
     square = square * unit[:, None] * unit
@@ -124,7 +124,7 @@ def _left(
     sums: Statistics, columns: list[int], explanation: FittedHypothesis, size: Array, fold: NDArray[np.int64]
 ) -> Array:
     fitted = explanation.fitted
-    held = fitted.priors.beside(size**-2.0)
+    held = fitted.priors.extended_by(size**-2.0)
     return left_out(sums.columns(columns), np.concatenate([fitted.theta, np.zeros(len(size))]), held, fold)
 
 

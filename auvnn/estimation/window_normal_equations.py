@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.estimation.force_columns import pushed
-from auvnn.estimation.force_sums import LOOSE, beside_force, cost_beside_force
+from auvnn.estimation.force_sums import LOOSE, cost_with_force, sums_with_force
 from auvnn.estimation.sensitivity import Response, respond_by
-from auvnn.estimation.simulated_windows import simulate_windows
+from auvnn.estimation.window_simulation import simulate_windows
 from auvnn.metrics.coloured_noise import previous
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
@@ -156,7 +156,7 @@ def normal_equations(
     """
     weight = weights_of(sigma)
     loose = torch.diag(torch.as_tensor(1.0 / LOOSE))
-    # Channels that were not measured would only be multiplied by nought.
+    # Channels that were not measured would only be multiplied by zero.
     weighed = torch.nonzero(weight).flatten().tolist()
     parts: list[list[Array]] = []
     adjacent = (windows.mask[:, 1:] * windows.mask[:, :-1]).sum((0, 1))
@@ -175,7 +175,7 @@ def normal_equations(
         if hessian.shape[-1] != size:
             hessian = np.empty((len(windows), size, size))
         if answer.force is not None:
-            sums, solved, grown = beside_force(answer, weight, live, leverage=leverage)
+            sums, solved, grown = sums_with_force(answer, weight, live, leverage=leverage)
             volume.append(grown[0])
             spent.append(grown[1])
             hessian[here] = sums[:, 1:, 1:].numpy()
@@ -252,7 +252,7 @@ def _cost(response: Response, weight: Tensor) -> float:
     return (
         float(((response.error * weight) ** 2).sum())
         if response.force is None
-        else cost_beside_force(response, weight)
+        else cost_with_force(response, weight)
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from auvnn.estimation.nuisance import NormalEquations, carry_of
+from auvnn.estimation.nuisance_elimination import NormalEquations, carry_of
 
 UNITS = np.array([1e-6, 1.0, 1e7, 1e-2, 1e3])
 

@@ -1,4 +1,4 @@
-"""A model beside what needs no model: a plain regression, and holding the initial velocity."""
+"""A model compared with what needs no model: a plain regression, and holding the initial velocity."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from auvnn.models import GreyBox
 HORIZONS = ("5", "2", "1", "0.5", "10")
 
 
-def beside(
+def compare_with_baseline(
     rolled: Mapping[str, Rolled], kind: str, scale: Scale, log: Log, how: Derivative, *, left_out: bool = True
 ) -> dict[str, Any]:
     """Return `baseline` of the answers: what the regression and persistence reach over the windows of a free run.
@@ -56,7 +56,7 @@ def beside(
     }
 
 
-def stands(model: GreyBox, log: Log, how: Derivative) -> dict[str, Any]:
+def baseline_of(model: GreyBox, log: Log, how: Derivative) -> dict[str, Any]:
     """Return the same for a model as it is, over a log's windows of 5 s.
 
     Args:
@@ -66,7 +66,7 @@ def stands(model: GreyBox, log: Log, how: Derivative) -> dict[str, Any]:
     """
     scale = scale_of(log)
     rolled = {h: r for h in ("5",) if (r := roll(model, log, h, scale)) is not None}
-    return beside(rolled, model.actuation, scale, log, how)
+    return compare_with_baseline(rolled, model.actuation, scale, log, how)
 
 
 def standing(rollout: Mapping[str, Any], line: Mapping[str, Any]) -> list[str]:
@@ -74,7 +74,7 @@ def standing(rollout: Mapping[str, Any], line: Mapping[str, Any]) -> list[str]:
 
     Args:
         rollout: of the comparison, by horizon.
-        line: what `beside` returned.
+        line: what `compare_with_baseline` returned.
     """
     key = next((h for h in HORIZONS if (rollout.get(h) or {}).get("total") is not None), None)
     if key is None:
@@ -83,10 +83,10 @@ def standing(rollout: Mapping[str, Any], line: Mapping[str, Any]) -> list[str]:
     error, held, floor = found["total"], found.get("persistence"), found.get("noise_floor")
     out = [f"over {key} s of free running the error is {error:.3g} of the spread of the motion"]
     if held is not None and np.isfinite(held):
-        out.append(f"{_beside(error, held)} holding the initial velocity ({held:.3g})")
+        out.append(f"{_than(error, held)} holding the initial velocity ({held:.3g})")
     total = line.get("total") if line.get("horizon") == key else None
     if total is not None and np.isfinite(total):
-        out.append(f"{_beside(error, total)} a plain regression ({total:.3g})")
+        out.append(f"{_than(error, total)} a plain regression ({total:.3g})")
     if floor is not None and np.isfinite(floor):
         ratio = error / floor if floor > 0 else np.inf
         near = (
@@ -96,15 +96,15 @@ def standing(rollout: Mapping[str, Any], line: Mapping[str, Any]) -> list[str]:
     return out
 
 
-def _beside(error: float, other: float) -> str:
-    """Return in a word where an error stands beside another; within 5 % they are as good as each other."""
+def _than(error: float, other: float) -> str:
+    """Return in a word how an error compares with another; within 5 % they are as good as each other."""
     if error < 0.95 * other:
         return "better than"
     return "no better than" if error <= 1.05 * other else "WORSE than"
 
 
 def words(line: Mapping[str, Any]) -> list[str]:
-    """Return in one or two sentences where the model stands beside them; nothing where that is not known."""
+    """Return in one or two sentences how the model compares with them; nothing where that is not known."""
     if not line:
         return []
     total, held = line["total"], line["persistence"]["total"]

@@ -1,11 +1,11 @@
-"""Beside what needs no model: the regression is cross-validated on the log, and a model that loses is told so."""
+"""A model compared with what needs none: the regression is cross-validated on the log, and a loss is reported."""
 
 from __future__ import annotations
 
 import pytest
 
 from auvnn.comparison import compare
-from auvnn.comparison.beside import words
+from auvnn.comparison.baseline import words
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.regression import Regression
 from auvnn.metrics.rollouts import scale_of, scored

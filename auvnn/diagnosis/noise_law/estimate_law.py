@@ -25,7 +25,7 @@ from scipy.optimize import minimize
 from scipy.stats import chi2
 
 from auvnn.diagnosis.noise_law.sums import ForceSums
-from auvnn.estimation.normal_equations import Statistics
+from auvnn.estimation.window_normal_equations import Statistics
 from auvnn.metrics.force_law import ForceLaw, correlation
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ class Estimate:
         value: minus twice the log likelihood, priors of the parameters in it, up to what all laws of a log share.
         step: (P,) how the parameters move with the law.
         information: (P, P) of the parameters under the law, their priors left out.
-        p_values: (6,) of there being no force, each degree of freedom beside the others.
+        p_values: (6,) of there being no force, each degree of freedom in addition to the others.
         forces: (B, 6, K) the forces expected, N and N m.
     """
 

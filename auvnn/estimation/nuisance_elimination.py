@@ -55,12 +55,12 @@ class NormalEquations:
 
     @property
     def scaled(self) -> tuple[Array, Array]:
-        """S in units in which its diagonal is one, and these units, (P,); nought where S says nothing."""
+        """S in units in which its diagonal is one, and these units, (P,); zero where S says nothing."""
         unit = unit_of(self.square)
         return self.square * unit[:, None] * unit, unit
 
     def solve(self, *, damping: float = 0.0, rcond: float = 1e-12) -> Array:
-        """Return x, (P,), by least squares; nought where S says nothing.
+        """Return x, (P,), by least squares; zero where S says nothing.
 
         Args:
             damping: added to the scaled diagonal (Levenberg and Marquardt).
@@ -84,7 +84,7 @@ class NormalEquations:
         return bounded_step(even, self.right * unit, low * scale, high * scale) * unit
 
     def covariance(self) -> Array:
-        """Return the inverse of S, (P, P); nought where S says nothing."""
+        """Return the inverse of S, (P, P); zero where S says nothing."""
         even, unit = self.scaled
         return np.linalg.pinv(even, hermitian=True) * unit[:, None] * unit
 
