@@ -95,7 +95,20 @@ class FreeRunFit:
             priors: other ones than the fit's.
         """
         priors = priors or self.priors
-        low, high = limits(model, self.names, priors)
+        return self.step(keep, *limits(model, self.names, priors), priors)
+
+    def step(
+        self, keep: NDArray[np.bool_] | slice, low: Array, high: Array, priors: Priors | None = None
+    ) -> Array:
+        """Return the same within given bounds, (P,).
+
+        Args:
+            keep: (B,) windows that are fitted.
+            low: lower bounds of the parameters, (P,).
+            high: upper bounds, (P,).
+            priors: other ones than the fit's.
+        """
+        priors = priors or self.priors
         hessian = self.hessian[keep].sum(0) + self.weight * priors.square
         slope = self.slope[keep].sum(0) - self.weight * priors.pull(self.theta)
         return np.clip(self.theta + newton_step(hessian, slope, self.theta, low, high, 0.0), low, high)
