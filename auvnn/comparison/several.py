@@ -17,7 +17,7 @@ from auvnn.comparison.predictions import write_predictions
 from auvnn.errors import ConfigError, InputError
 from auvnn.metrics.rollouts import HORIZONS
 from auvnn.models import GreyBox
-from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
+from auvnn.models.load_arguments import GivenLog, GivenModel, as_log, as_model
 from auvnn.threads import on_one_thread
 
 Models = Sequence[GivenModel] | Mapping[str, GivenModel]

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from auvnn.checks.blind import blind
 from auvnn.checks.doubts import doubts
+from auvnn.checks.unmeasured import blind
 from auvnn.comparison.baseline import baseline_of
 from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.answers.tolerance import Tolerance
@@ -27,7 +27,7 @@ from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
-from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
+from auvnn.models.load_arguments import GivenLog, GivenModel, as_log, as_model
 from auvnn.progress import Counted
 from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects

@@ -14,9 +14,9 @@ import numpy as np
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs.channels import SCALARS, VELOCITY
 from auvnn.logs.clock_origin import from_their_beginning
+from auvnn.logs.notebook_view import ShownLog
 from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.run import MIN_SAMPLES, Run
-from auvnn.logs.shown import ShownLog
 
 if TYPE_CHECKING:
     from auvnn.logs.quality.quality import Quality

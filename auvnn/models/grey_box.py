@@ -19,8 +19,8 @@ from auvnn.models.actuation.actuators import Actuators
 from auvnn.models.equations_of_motion import EquationsOfMotion
 from auvnn.models.inputs import Inputs
 from auvnn.models.joint_covariance import JointCovariance, with_joint
+from auvnn.models.notebook_view import ShownModel
 from auvnn.models.saving import PASSIVE, REGION, SUBNETWORKS, save
-from auvnn.models.shown import ShownModel
 from auvnn.models.stated_drag import StatedDrag
 from auvnn.physics.drag import element_transform
 from auvnn.physics.fins import fin_frame

@@ -18,7 +18,7 @@ from auvnn.errors import ConfigError
 from auvnn.estimation.priors import set_parameters
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.logs import Log
-from auvnn.logs.without import without as lacking
+from auvnn.logs.without_sensors import without as lacking
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.unmeasured import completed
 from auvnn.metrics.windows import cut_windows

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from auvnn import diagnose
-from auvnn.diagnosis.fitters import fitter_for
-from auvnn.diagnosis.hypotheses.bake import with_fitted_parameters
+from auvnn.diagnosis.cross_validation.fitters import fitter_for
+from auvnn.diagnosis.hypotheses.put_into_model import with_fitted_parameters
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.logs import Log, Run
 from auvnn.metrics.free_run import predict

@@ -14,7 +14,7 @@ _STYLE = {"error": "red", "warning": "yellow"}
 
 def _looked(job: Job) -> list[dict[str, object]]:
     """Say what the topics of recordings hold and which mapping would read them; write it where that was asked."""
-    from auvnn.logs.look import look, write_mapping
+    from auvnn.logs.inspect_file import look, write_mapping
     from auvnn.logs.readers import choose
     from auvnn.logs.readers.recordings import RecordingReader
 

@@ -20,7 +20,7 @@ class _Truth:
 
 
 def _run(job: Job) -> Answering:
-    from auvnn.logs.without import without
+    from auvnn.logs.without_sensors import without
     from auvnn.logs.writing import write_commands
     from auvnn.simulation import simulate
 

@@ -105,7 +105,7 @@ class Diagnosis(Answer):
     def judged_words(self) -> list[str]:
         """What each name costs and what is left, as plain sentences."""
         from auvnn.diagnosis.answers import judged_words
-        from auvnn.diagnosis.answers.moved import moved_words
+        from auvnn.diagnosis.answers.moved_coefficients import moved_words
 
         told = judged_words.predicts(self) if self.verdict == "partial" else judged_words.costs(self)
         return [*told, *judged_words.left(self), *moved_words(self.moved)]

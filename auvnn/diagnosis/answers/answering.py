@@ -10,10 +10,10 @@ import numpy as np
 from auvnn.diagnosis.advise import advise
 from auvnn.diagnosis.answers.answer import Diagnosis, OneOf
 from auvnn.diagnosis.answers.bounds import reservations
+from auvnn.diagnosis.answers.effect_costs import Worth, names_by_worth, worth
 from auvnn.diagnosis.answers.joint import joint
-from auvnn.diagnosis.answers.moved import moved
+from auvnn.diagnosis.answers.moved_coefficients import moved
 from auvnn.diagnosis.answers.table import fill_candidate
-from auvnn.diagnosis.answers.worth import Worth, names_by_worth, worth
 from auvnn.diagnosis.hypotheses.candidates import HORIZON, WARMUP
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import has_stated_uncertainty

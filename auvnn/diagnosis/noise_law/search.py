@@ -30,9 +30,9 @@ from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.diagnosis.selection.predictive_density import cross_validated_log_density
 from auvnn.diagnosis.stages.state import Setting
+from auvnn.estimation.initial_states import fit_initial_states
 from auvnn.estimation.prediction_error import SINGULAR, FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
-from auvnn.estimation.sufficient_statistics import fit_initial_states
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.metrics.force_law import ForceLaw, cell_for
 from auvnn.metrics.rollouts import roll, scale_of

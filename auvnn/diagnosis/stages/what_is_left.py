@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from auvnn.diagnosis.answers.worth import small
+from auvnn.diagnosis.answers.effect_costs import small
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.residuals.additive_force import additive_force_test
 from auvnn.diagnosis.residuals.variance_component import Unnamed, variance_component_test, white

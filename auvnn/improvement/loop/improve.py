@@ -23,7 +23,7 @@ from auvnn.improvement.loop.state import State, fitted
 from auvnn.improvement.loop.trials import FAILURES
 from auvnn.logs import Log
 from auvnn.logs.leakage import leakage
-from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
+from auvnn.models.load_arguments import GivenLog, GivenModel, as_log, as_model
 from auvnn.threads import on_one_thread
 
 # Names that are fitted in one round of the search by prediction; how many of them may fail before it ends.

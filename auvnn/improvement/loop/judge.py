@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.left_out_errors import LeftOut
+from auvnn.diagnosis.cross_validation.errors import LeftOut
 from auvnn.errors import InputError
 from auvnn.improvement.free_run import Task, predicted
 from auvnn.logs import Log

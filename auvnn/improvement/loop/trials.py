@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from auvnn.diagnosis.left_out_errors import gain
+from auvnn.diagnosis.cross_validation.errors import gain
 from auvnn.errors import AuvnnError
 from auvnn.improvement.loop import learned
 from auvnn.improvement.loop.answer import CAUSE, PREDICTS, Step

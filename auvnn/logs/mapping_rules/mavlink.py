@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from auvnn.logs.known.rule import Rule, pwm_channels, triple
+from auvnn.logs.mapping_rules.rule import Rule, pwm_channels, triple
 
 _SERVO = (
     "{topic}: thrusters in the order of the motors, 1500 us neutral, 400 us full; give your thruster's span"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from auvnn.logs.channels import ACCELERATION, EULER, POSITION, QUATERNION, VELOCITY, WRENCH, is_canonical
-from auvnn.logs.known.rule import Rule
+from auvnn.logs.mapping_rules.rule import Rule
 from auvnn.logs.recording import Recording, Topic
 
 

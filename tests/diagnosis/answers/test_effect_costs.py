@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis import diagnose
-from auvnn.diagnosis.answers.moved import moved_words
+from auvnn.diagnosis.answers.moved_coefficients import moved_words
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.errors import ConfigError
 from auvnn.models import GreyBox

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.fitters import ByWindows, Fitter, at, fitter_for
-from auvnn.diagnosis.hypotheses.bake import with_fitted_parameters
+from auvnn.diagnosis.cross_validation.errors import Gain, LeftOut, gain
+from auvnn.diagnosis.cross_validation.fitters import ByWindows, Fitter, at, fitter_for
+from auvnn.diagnosis.cross_validation.folds import MOST_FOLDS, Fold, folds_of
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.put_into_model import with_fitted_parameters
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, lay_out
-from auvnn.diagnosis.left_out_errors import Gain, LeftOut, gain
-from auvnn.diagnosis.left_out_folds import MOST_FOLDS, Fold, folds_of
 from auvnn.errors import InputError
 from auvnn.estimation.prediction_error import SINGULAR, FitError
 from auvnn.logs import Log

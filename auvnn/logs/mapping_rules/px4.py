@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from auvnn.logs.known.rule import Rule, numbered_columns, pwm_channels, triple
+from auvnn.logs.mapping_rules.rule import Rule, numbered_columns, pwm_channels, triple
 from auvnn.logs.recording import Recording, Topic
 
 _Q = triple("qw qx qy qz", "q[0] q[1] q[2] q[3]")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from auvnn.logs.known.rule import Rule
+from auvnn.logs.mapping_rules.rule import Rule
 from auvnn.logs.recording import Recording, Topic
 
 

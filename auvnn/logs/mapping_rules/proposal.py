@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from auvnn.logs.channels import EULER, POSITION, QUATERNION, VELOCITY, is_canonical
-from auvnn.logs.known.rule import BLOCKS, Rule
+from auvnn.logs.mapping_rules.rule import BLOCKS, Rule
 from auvnn.logs.reading.mapping_file.suggest import likely
 from auvnn.logs.recording import Recording, Topic
 

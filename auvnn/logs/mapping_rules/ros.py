@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from auvnn.logs.channels import is_canonical
-from auvnn.logs.known.rule import Lie, Rule, numbered_columns, pwm_channels, triple
+from auvnn.logs.mapping_rules.rule import Lie, Rule, numbered_columns, pwm_channels, triple
 from auvnn.logs.recording import Recording, Topic
 
 _XYZ = ("x", "y", "z")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from auvnn.logs.known.moos import present
-from auvnn.logs.known.rule import Rule
+from auvnn.logs.mapping_rules.moos import present
+from auvnn.logs.mapping_rules.rule import Rule
 
 _KIND = "slocum"
 RULES = [

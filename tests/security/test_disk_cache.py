@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from auvnn.compiled import kept, toolchain
+from auvnn.compiled import disk_cache, toolchain
 from auvnn.compiled.recorder import CannotCompile
 
 SOURCE = "int answer(void) { return 42; }\n"
@@ -49,7 +49,7 @@ def planted(folder: Path, marker: Path) -> Path:
 
 
 def test_sound_code_is_used_again(cache):
-    assert build() == 0.0 and kept.load(code(cache))
+    assert build() == 0.0 and disk_cache.load(code(cache))
     assert {p.suffix for p in cache.iterdir()} == {".so", ".sha256"}
 
 
@@ -79,10 +79,10 @@ def test_what_was_planted_is_never_run(cache, tmp_path, monkeypatch, how):
         digest.chmod(0o606)
     if how == "owner":
         monkeypatch.setattr(os, "getuid", lambda: 4711)
-        assert kept.load(target) is None and not kept.looks_sound(target)
+        assert disk_cache.load(target) is None and not disk_cache.looks_sound(target)
         return
     assert build() > 0.0
-    assert not marker.exists() and kept.load(target) and not target.is_symlink()
+    assert not marker.exists() and disk_cache.load(target) and not target.is_symlink()
 
 
 @pytest.mark.parametrize("share", [0.4])
@@ -100,9 +100,9 @@ def test_a_flipped_bit_anywhere_is_seen(cache):
     content = target.read_bytes()
     for place in range(0, len(content), max(1, len(content) // 200)):
         target.write_bytes(content[:place] + bytes([content[place] ^ 4]) + content[place + 1 :])
-        assert kept.load(target) is None
+        assert disk_cache.load(target) is None
     target.write_bytes(content)
-    assert kept.load(target)
+    assert disk_cache.load(target)
 
 
 def test_a_kill_between_hash_and_code_costs_one_more_compilation(cache):

@@ -11,10 +11,10 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.catalogue import unknown_name
+from auvnn.diagnosis.cross_validation.folds import Fold
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, priors
-from auvnn.diagnosis.left_out_folds import Fold
 from auvnn.diagnosis.one_step.fit import fit_hypothesis_one_step
 from auvnn.diagnosis.score_tests.shape_search import searched_start
 from auvnn.errors import ConfigError

@@ -8,9 +8,9 @@ from __future__ import annotations
 from functools import lru_cache
 from importlib import import_module
 
-from auvnn.logs.known.proposal import Proposal
-from auvnn.logs.known.proposal import propose as _propose
-from auvnn.logs.known.rule import Lie, Rule
+from auvnn.logs.mapping_rules.proposal import Proposal
+from auvnn.logs.mapping_rules.proposal import propose as _propose
+from auvnn.logs.mapping_rules.rule import Lie, Rule
 from auvnn.logs.recording import Recording, Topic
 
 __all__ = ["Proposal", "Rule", "lies", "propose"]
@@ -23,7 +23,7 @@ def _all() -> tuple[tuple[Rule, ...], tuple[Lie, ...]]:
     rules: list[Rule] = []
     lies: list[Lie] = []
     for family in _FAMILIES:
-        module = import_module(f"auvnn.logs.known.{family}")
+        module = import_module(f"auvnn.logs.mapping_rules.{family}")
         rules += module.RULES
         lies += getattr(module, "LIES", ())
     return tuple(rules), tuple(lies)

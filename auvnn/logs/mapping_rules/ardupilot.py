@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from auvnn.logs.known.rule import Rule, pwm_channels, triple
+from auvnn.logs.mapping_rules.rule import Rule, pwm_channels, triple
 from auvnn.logs.recording import Recording, Topic
 
 _PWM = (

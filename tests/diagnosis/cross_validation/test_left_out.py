@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from auvnn.diagnosis.left_out import each_name, left_out, left_out_by
-from auvnn.diagnosis.left_out_errors import gain
-from auvnn.diagnosis.left_out_folds import folds_of
+from auvnn.diagnosis.cross_validation.errors import gain
+from auvnn.diagnosis.cross_validation.folds import folds_of
+from auvnn.diagnosis.cross_validation.left_out import each_name, left_out, left_out_by
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.diagnosis.cross_validation.errors import Gain, LeftOut, gain
+from auvnn.diagnosis.cross_validation.left_out import left_out_found
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.left_out import left_out_found
-from auvnn.diagnosis.left_out_errors import Gain, LeftOut, gain
 from auvnn.diagnosis.residuals.forces import AXES, actuators_of, forces_of, share_of
 from auvnn.diagnosis.residuals.variance_component import Unnamed
 from auvnn.diagnosis.stages.state import Setting, State

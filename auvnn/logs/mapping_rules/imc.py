@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from auvnn.logs.known.rule import Rule, triple
+from auvnn.logs.mapping_rules.rule import Rule, triple
 from auvnn.logs.recording import Recording, Topic
 
 _STATE = "^EstimatedState$"

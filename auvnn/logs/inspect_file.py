@@ -10,7 +10,7 @@ from typing import Any
 from auvnn.config import dump_yaml
 from auvnn.errors import InputError
 from auvnn.logs.channels import is_canonical
-from auvnn.logs.known import Proposal, propose
+from auvnn.logs.mapping_rules import Proposal, propose
 from auvnn.logs.readers import choose
 from auvnn.logs.readers.recordings import RecordingReader
 from auvnn.logs.reading.repairs.repair import Repair
