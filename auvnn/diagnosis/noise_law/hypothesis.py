@@ -11,9 +11,11 @@ from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, correlation_root, scales, shapes
-from auvnn.diagnosis.noise_law.estimate_law import Estimate, Likelihood, estimate
+from auvnn.diagnosis.noise_law.estimate_law import Estimate, estimate
+from auvnn.diagnosis.noise_law.law_likelihood import Likelihood
 from auvnn.diagnosis.noise_law.sums import ForceSums
 from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS
+from auvnn.diagnosis.selection.predictive_density import cross_validated_log_density
 from auvnn.effects import effect_class
 from auvnn.estimation.priors import limits
 from auvnn.metrics.force_law import ForceLaw
@@ -152,3 +154,15 @@ def tied(layout: Layout, good: list[Hypothesis]) -> list[Hypothesis]:
     rest = [h for h in rest if h.misfit - best.misfit < chi2.isf(ALPHA_REFUTED, mine)]
     plainer = effect_class(best.name).plainer
     return sorted([best, *rest], key=lambda h: h.name not in plainer)
+
+
+def predicts_better(after: Hypothesis, before: Hypothesis, least: float) -> bool:
+    """Whether runs left out are predicted better, by so many standard errors of the gain.
+
+    Args:
+        after: hypothesis that is to predict better.
+        before: hypothesis that it is compared with.
+        least: standard errors that the gain must exceed.
+    """
+    gain = cross_validated_log_density(before.weighed) - cross_validated_log_density(after.weighed)
+    return float(gain.sum()) > least * float(np.sqrt(len(gain)) * gain.std(ddof=1))

@@ -17,7 +17,8 @@ from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.command_holding import cost_at_best
-from auvnn.diagnosis.noise_law.estimate_law import Likelihood, estimate
+from auvnn.diagnosis.noise_law.estimate_law import estimate
+from auvnn.diagnosis.noise_law.law_likelihood import Likelihood
 from auvnn.diagnosis.noise_law.sums import force_sums
 from auvnn.diagnosis.residuals.variance_component import white
 from auvnn.diagnosis.selection.model_comparison import ODDS

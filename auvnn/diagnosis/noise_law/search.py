@@ -22,13 +22,19 @@ from torch import Tensor
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, folds, left_out
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, shapes
 from auvnn.diagnosis.noise_law.estimate_law import estimate
-from auvnn.diagnosis.noise_law.hypothesis import Hypothesis, WithForce, judged, p_value_of, tied
+from auvnn.diagnosis.noise_law.hypothesis import (
+    Hypothesis,
+    WithForce,
+    judged,
+    p_value_of,
+    predicts_better,
+    tied,
+)
 from auvnn.diagnosis.noise_law.sums import CELL, force_sums
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.selection.model_comparison import ODDS
-from auvnn.diagnosis.selection.predictive_density import cross_validated_log_density
 from auvnn.diagnosis.stages.state import Setting
 from auvnn.estimation.initial_states import fit_initial_states
 from auvnn.estimation.prediction_error import SINGULAR, FitError
@@ -77,6 +83,7 @@ class ForceSearch:
         self.sigma = self.weights = np.full(18, np.inf)
         self.cell = CELL
         self.ignores_cost = asked.tolerance.strict
+        self._first_look: tuple[Hypothesis, Tested, list[Hypothesis]] | None = None
 
     def begin(self, first: FittedHypothesis, sigma: Array) -> Hypothesis | None:
         """Return the explanation without any name under the law of the force; None where no variance is above zero.
@@ -134,16 +141,17 @@ class ForceSearch:
                 break
             self.say(f"testing {len(remaining)} effects together with the force")
             base = [*self.base, *[c for c in chosen if c not in self.base]]
-            tested = NullTests(self.layout, replace(self.windows, law=law), self.say)(
-                current.weighed, remaining, base, chosen
-            )
+            # A second search begins with the same look.
+            seen = self._first_look if not chosen else None
+            known = seen[1:] if seen is not None and seen[0] is null else None
+            tested = known[0] if known else self._tests(law)(current.weighed, remaining, base, chosen)
             # Beside what was found the variance is no longer inflated by it: the tests say whether to go on.
             if chosen and tested.p_value >= ALPHA:
                 break
             odds = max(ODDS, FURTHER_SHARE * (current.evidence - null.evidence))
-            leading = self._leading(tested, current, base, chosen, fitted, WORTH_A_FIT * odds)
-            found = [h for h in (self._judged_or_none(e, law) for e in leading) if h is not None]
-            found.sort(key=lambda h: -h.evidence)
+            found = known[1] if known else self._fitted(tested, current, base, chosen, fitted, odds)
+            if not chosen:
+                self._first_look = null, tested, found
             sure = {h.name: min(1.0, len(remaining) * p_value_of(self.layout, h, current)) for h in found}
             if not chosen:
                 tried = found
@@ -182,6 +190,19 @@ class ForceSearch:
             whole,
             null.estimate.law,
         )
+
+    def _fitted(
+        self, tested: Tested, current: Hypothesis, base: list[str], chosen: list[str],
+        fitted: Sequence[FittedHypothesis], odds: float,
+    ) -> list[Hypothesis]:  # fmt: skip
+        """Return the leading effects, fitted and judged, the most evident first."""
+        assert current.estimate.law is not None
+        leading = self._leading(tested, current, base, chosen, fitted, WORTH_A_FIT * odds)
+        found = [h for h in (self._judged_or_none(e, current.estimate.law) for e in leading) if h is not None]
+        return sorted(found, key=lambda h: -h.evidence)
+
+    def _tests(self, law: ForceLaw) -> NullTests:
+        return NullTests(self.layout, replace(self.windows, law=law), self.say)
 
     def _leading(
         self,
@@ -281,15 +302,3 @@ class ForceSearch:
         return replace(
             found, fitted=moved, left_out=left_out(sums, theta, judged_by, folds(self.windows.run))
         )
-
-
-def predicts_better(after: Hypothesis, before: Hypothesis, least: float) -> bool:
-    """Whether runs left out are predicted better, by so many standard errors of the gain.
-
-    Args:
-        after: hypothesis that is to predict better.
-        before: hypothesis that it is compared with.
-        least: standard errors that the gain must exceed.
-    """
-    gain = cross_validated_log_density(before.weighed) - cross_validated_log_density(after.weighed)
-    return float(gain.sum()) > least * float(np.sqrt(len(gain)) * gain.std(ddof=1))

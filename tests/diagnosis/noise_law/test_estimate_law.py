@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from auvnn.diagnosis.noise_law.estimate_law import Likelihood, boundary_p_value, estimate
+from auvnn.diagnosis.noise_law.estimate_law import boundary_p_value, estimate
+from auvnn.diagnosis.noise_law.law_likelihood import Likelihood
 from auvnn.diagnosis.noise_law.sums import ForceSums
 from auvnn.estimation.window_normal_equations import Statistics
 from auvnn.metrics.force_law import correlation
