@@ -181,7 +181,7 @@ def _warnings(asked: Setting, state: State) -> list[str]:
     if state.silent:
         them = "it" if len(state.silent) == 1 else "them"
         found.append(
-            f"{log.name} says nothing about {', '.join(state.silent)}: nothing in it depends on {them}"
+            f"the log says nothing about {', '.join(state.silent)}: nothing in it depends on {them}"
         )
     if not has_stated_uncertainty(asked.model):
         found.append("no coefficient of the model is uncertain: any error of theirs will be given a name")

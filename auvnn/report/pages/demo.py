@@ -72,6 +72,11 @@ class DemoPage(Page):
             plots += [p for p in PARTS[name].planned(inner) if p.name == wanted] if inner is not None else []
         return draw(plots).figures or super().figures(answer)
 
+    def story(self, view: View) -> list[str]:
+        """Return the lines of the command, the name of the step set apart."""
+        lines = (line.partition(" ")[::2] for line in view.texts("story"))
+        return [f"{step.capitalize()}: {rest.strip()}" if rest else step for step, rest in lines]
+
     def parts(self, view: View) -> list[tuple[Page, Any]]:
         """Return the four answers in the order of the loop."""
         found = [(PARTS[name], _inner(view, name)) for name in PARTS]

@@ -57,17 +57,6 @@ def error_against_horizon(
     if floor and any(finite(v) is not None for v in floor.values()):
         _line(ax, floor, end, _FLOOR, "noise alone", 2)
     ax.axhline(1.0, color=style.FAINT, lw=0.6)
-    ax.annotate(
-        "as large as the motion itself",
-        _clear(models, persistence, end),
-        xytext=(0, 2),
-        textcoords="offset points",
-        ha="center",
-        fontsize=7,
-        color="#505050",
-        bbox={"fc": "white", "ec": "none", "pad": 0.6},
-        zorder=20,
-    )
     ax.set_xscale("log")
     ticks = horizons + ([end] if full else [])
     ax.xaxis.set_major_locator(FixedLocator(ticks))
@@ -75,36 +64,13 @@ def error_against_horizon(
     ax.xaxis.set_minor_formatter(NullFormatter())
     ax.set_xticks(ticks, [f"{h:g}" for h in horizons] + (["whole\nrun"] if full else []), linespacing=0.85)
     ax.set_xlabel("free-running horizon (s)")
-    ax.set_ylabel("error / spread of the motion (nrmse)")
+    # Said at the axis: among the lines a label would cover some of them.
+    ax.set_ylabel("error / spread of the motion\n(nrmse; 1: as large as the motion)", fontsize=8)
     top = ax.get_ylim()[1]
     ax.set_ylim(0, max(top, 1.15))
     style.show_grid(ax, "y")
     figure.legend(loc="outside upper center", ncols=2)
     return figure
-
-
-def _clear(
-    models: Mapping[str, Mapping[str, float | None]],
-    persistence: Mapping[str, float | None] | None,
-    end: float,
-) -> tuple[float, float]:
-    """Return where on the line at one the label lies farthest from every line's marks."""
-    marks = []
-    for errors in (*models.values(), persistence or {}):
-        for horizon, error in errors.items():
-            x = end if horizon == "full" else _seconds(horizon)
-            if x is not None and (y := finite(error)) is not None:
-                marks.append((np.log10(x), y))
-    if not marks:
-        return end, 1.0
-    x, y = np.array(marks).T
-    low, high = x.min(), x.max()
-    tries = np.linspace(low + 0.22 * (high - low), high - 0.22 * (high - low), 9)
-    # The label is about half as wide as the panel, and reaches a little above the line.
-    gaps = [
-        np.hypot(np.maximum(np.abs(x - t) / max(high - low, 1e-9) - 0.24, 0.0), y - 1.05).min() for t in tries
-    ]
-    return float(10 ** tries[int(np.argmax(gaps))]), 1.0
 
 
 def _seconds(horizon: str) -> float | None:
