@@ -7,6 +7,7 @@ from typing import Any
 
 from auvnn.catalogue import unknown_name
 from auvnn.comparison.beside import beside
+from auvnn.comparison.compare import floor_of
 from auvnn.comparison.predictions import stitch
 from auvnn.diagnosis.answers.answer import OneOf
 from auvnn.diagnosis.answers.table import values

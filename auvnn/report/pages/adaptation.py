@@ -18,7 +18,9 @@ from auvnn.report.view import View
 from auvnn.report.words import count, finite, number, percent, plural
 
 
-MARKS = "Grey lines part runs; dotted lines are changes that were seen, by their numbers in the table of changes."
+MARKS = (
+    "Grey lines part runs; dotted lines are changes that were seen, by their numbers in the table of changes."
+)
 
 
 class AdaptationPage(Page):

@@ -66,7 +66,9 @@ class ImprovePage(Page):
         if floor is not None and errors:
             reached = errors[-1] <= 1.05 * floor
             left = (
-                "nothing more can be gained on these data" if reached else "what lies between is not explained"
+                "nothing more can be gained on these data"
+                if reached
+                else "what lies between is not explained"
             )
             out.append(f"Sensor noise alone gives {percent(floor)}: {left}.")
         out.append(f"It ended because {view.text('stopped', 'it was done')}.")

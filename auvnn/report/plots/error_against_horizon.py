@@ -65,7 +65,7 @@ def error_against_horizon(
     ax.set_xticks(ticks, [f"{h:g}" for h in horizons] + (["whole\nrun"] if full else []), linespacing=0.85)
     ax.set_xlabel("free-running horizon (s)")
     # Said at the axis: among the lines a label would cover some of them.
-    ax.set_ylabel("error / spread of the motion\n(nrmse; 1: as large as the motion)", fontsize=8)
+    ax.set_ylabel("error / spread of the motion\n(nrmse; 1: as the motion)")
     top = ax.get_ylim()[1]
     ax.set_ylim(0, max(top, 1.15))
     style.show_grid(ax, "y")
