@@ -48,7 +48,7 @@ _PROSE = (
 
 
 def prose(text: str) -> str:
-    """Return a sentence of an answer, which is plain ASCII, with the signs that a page has: ±, →, 10⁻⁷, a space before %."""
+    """Return a sentence of an answer, which is plain ASCII, with the signs of a page: ±, →, 10⁻⁷, a space before %."""
     for pattern, sign in _PROSE:
         text = pattern.sub(sign, text)
     return text

@@ -56,7 +56,7 @@ def empty(folder: Path) -> bool:
 
 def test_a_report_that_is_not_drawn_in_time_refuses_and_writes_nothing(session, tmp_path, monkeypatch):
     monkeypatch.setattr(saving, "PATIENCE", 0.0)
-    with pytest.raises(InputError, match="still being drawn .* nothing was saved; press Save again"):
+    with pytest.raises(InputError, match=r"still being drawn .* nothing was saved; press Save again"):
         saving.save(session, tmp_path / "mine")
     assert empty(tmp_path / "mine") and not session.saved and not session.saving
 

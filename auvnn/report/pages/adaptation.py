@@ -17,7 +17,6 @@ from auvnn.report.plots.adaptation import movement, skipped, with_and_without
 from auvnn.report.view import View
 from auvnn.report.words import count, finite, number, percent, plural
 
-
 MARKS = (
     "Grey lines part runs; dotted lines are changes that were seen, by their numbers in the table of changes."
 )

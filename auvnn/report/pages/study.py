@@ -175,8 +175,8 @@ def _noisy(m: Mapping[str, float | None]) -> list[str]:
     for name in _online(m):
         out.append(
             f"Online learning {_way(name)}: off by {percent(m.get(f'{name}_tracking_rmse_over_range_worst'))} while the "
-            f"weights change. With the weights frozen, the error is {_beside(m[f'{name}_frozen_over_offline'])} the offline "
-            f"networks'; on held-out velocities the error of the damping is "
+            f"weights change. With the weights frozen, the error is {_beside(m[f'{name}_frozen_over_offline'])} the "
+            f"offline networks'; on held-out velocities the error of the damping is "
             f"{_beside(m.get(f'{name}_global_error_over_offline'))} theirs."
         )
     return out
