@@ -12,6 +12,7 @@ from auvnn.checks.blind import blind
 from auvnn.checks.doubts import doubts
 from auvnn.comparison.beside import stands
 from auvnn.diagnosis.answers.answer import Diagnosis
+from auvnn.diagnosis.answers.answering import answer
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.diagnosis.hypotheses.layout import lay_out
@@ -20,6 +21,7 @@ from auvnn.diagnosis.noise_law.answer import beside_what_is_left
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.state import Searched, Setting
+from auvnn.diagnosis.stages.what_is_left import settled
 from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.normal_equations import TRUST, motion
 from auvnn.estimation.prediction_error import SINGULAR
@@ -170,12 +172,20 @@ def searched(
         say=say,
     )
     try:
-        found, under_way = search(asked, windows)
+        state, told, words = search(asked, windows), {}, []
         if stochastic:
-            found, under_way = beside_what_is_left(found, under_way)
+            state, told, words = beside_what_is_left(asked, state)
+        state = settled(asked, state)
+        found = answer(asked, state)
     except (np.linalg.LinAlgError, SINGULAR) as problem:
         raise InputError(
             f"{log.name} cannot be diagnosed with {model.vehicle.name}: free running grows without bound, so that the "
             f"sums of its tests cannot be solved ({problem}); choose shorter windows with window=, and check the model"
         ) from None
-    return replace(found, baseline=stands(model, log, choose_derivative(log))), under_way
+    found = replace(
+        found,
+        baseline=stands(model, log, choose_derivative(log)),
+        stochastic=told,
+        warnings=[*found.warnings, *words],
+    )
+    return found, Searched(asked, state)
