@@ -149,7 +149,7 @@ def _change_words(change: Mapping[str, Any]) -> str:
     if not fitted or not change.get("effect"):
         return str(change.get("words", ""))
     values = common.parameter_words(fitted)
-    return f"at {number(change.get('time'), 4)} s a change of {change.get('kind')} ({change['effect']}: {values})"
+    return f"at {finite(change.get('time')) or 0.0:.5g} s a change of {change.get('kind')} ({change['effect']}: {values})"
 
 
 def _counts(view: View) -> dict[str, int]:
