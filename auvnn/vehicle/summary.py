@@ -31,7 +31,12 @@ def summary(vehicle: Vehicle) -> Text:
         ("quadratic damping", _damping(v.quadratic_damping, "N s2/m2, N m s2")),
     ]
     if v.damping_elements:
-        rows.append(("damping elements", f"{len(v.damping_elements)} part{'s' * (len(v.damping_elements) > 1)} at offset centres"))
+        rows.append(
+            (
+                "damping elements",
+                f"{len(v.damping_elements)} part{'s' * (len(v.damping_elements) > 1)} at offset centres",
+            )
+        )
     rows += [("thrusters", _thrusters(v)), ("fins", f"{v.n_fins}" if v.fins else "none")]
     rows.append(
         ("uncertainty", ", ".join(f"{k} {100 * s:g} %" for k, s in v.uncertainty.items() if s) or "none")

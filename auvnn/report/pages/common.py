@@ -179,9 +179,14 @@ def parameter_rows(fitted: Mapping[str, Any]) -> list[list[str]]:
             )
             ends = "–"
             if value is not None and std is not None:
-                ends = f"{number(value - 1.96 * std)} to {number(value + 1.96 * std)}"
+                ends = f"{_like(value - 1.96 * std, std)} to {_like(value + 1.96 * std, std)}"
             rows.append([effect, name, interval(value, std, unit), ends])
     return rows
+
+
+def _like(value: float, std: float) -> str:
+    """Return the end of an interval to two digits of the standard deviation, as the value beside it stands."""
+    return interval(value, std).partition(" ±")[0]
 
 
 def parameter_table(fitted: Mapping[str, Any]) -> HtmlTable:

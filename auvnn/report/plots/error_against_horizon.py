@@ -13,7 +13,8 @@ from auvnn.report import style
 from auvnn.report.panels import NoData
 from auvnn.report.words import finite, label
 
-_FLOOR = style.Look("#505050", "-", 0.9, "_")
+# Broad and pale: a model that reaches it lies on it, and both are seen.
+_FLOOR = style.Look("#b8b8b8", "-", 0.9, "None")
 # Beyond three models: still apart by colour, dashes and marker.
 _FURTHER = (
     style.Look("#009e73", "-", 1.1, "v"),
@@ -55,7 +56,7 @@ def error_against_horizon(
     if persistence:
         _line(ax, persistence, end, style.PERSISTENCE, "initial velocity held", 1)
     if floor and any(finite(v) is not None for v in floor.values()):
-        _line(ax, floor, end, _FLOOR, "noise alone", 2)
+        _line(ax, floor, end, _FLOOR, "noise alone", 0.8, width=3.5)
     ax.axhline(1.0, color=style.FAINT, lw=0.6)
     ax.set_xscale("log")
     ticks = horizons + ([end] if full else [])
@@ -82,15 +83,23 @@ def _seconds(horizon: str) -> float | None:
 
 
 def _line(
-    ax: Axes, errors: Mapping[str, float | None], end: float, look: style.Look, name: str, order: float
+    ax: Axes,
+    errors: Mapping[str, float | None],
+    end: float,
+    look: style.Look,
+    name: str,
+    order: float,
+    width: float = 1.2,
 ) -> None:
     known = {
         s: v for h, e in errors.items() if (s := _seconds(h)) is not None and (v := finite(e)) is not None
     }
     seconds = sorted(known)
     marks = {"color": look.color, "marker": look.marker, "mfc": "white", "mec": look.color, "mew": 0.9}
-    options = {"ls": look.dashes, "lw": 1.2, "label": label(name), "zorder": order}
+    options = {"ls": look.dashes, "lw": width, "label": label(name), "zorder": order}
     ax.plot(seconds, [known[s] for s in seconds], **options, **marks)
     whole = finite(errors.get("full"))
     if whole is not None:
-        ax.plot([end], [whole], ls="none", zorder=order, **marks)
+        # Where a line has no marks, a short stroke stands for the whole run.
+        stroke = {"marker": "_", "ms": 12, "mew": 3.5} if look is _FLOOR else {}
+        ax.plot([end], [whole], ls="none", zorder=order, **{**marks, **stroke})
