@@ -93,7 +93,7 @@ def config_dir() -> Path:
         # A stray top-level folder of the same name must not pass for ours.
         if (folder / "vehicle").is_dir():
             return folder
-    raise ConfigError(f"no configs found in {package} or beside it; reinstall auvnn")
+    raise ConfigError(f"no configs found in {package} or next to it; reinstall auvnn")
 
 
 def read_yaml(path: str | Path) -> dict[str, Any]:

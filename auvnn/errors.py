@@ -1,4 +1,4 @@
-"""The errors that auvnn raises: each says what is wrong, where, and how to mend it, in one line."""
+"""The errors that auvnn raises: each says what is wrong, where, and how to correct it, in one line."""
 
 from __future__ import annotations
 

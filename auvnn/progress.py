@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sized
 from typing import Any, TypeVar
 
 T = TypeVar("T")
-# Steps that are still to come, at least, while work goes on whose number of steps can only be foreseen roughly.
+# Steps that are still to come, at least, while work goes on whose number of steps can only be estimated beforehand.
 AHEAD = 2
 
 
@@ -18,7 +18,7 @@ class Progress(str):
     Attributes:
         done: steps done.
         total: steps in all.
-        rough: whether `total` is foreseen only roughly.
+        rough: whether `total` is known only roughly.
     """
 
     done: int
@@ -35,19 +35,19 @@ class Progress(str):
 class Counted:
     """Tells what is being done with a count: each call begins a step, and all before it are done.
 
-    How many steps a search takes shows only as it goes. `foreseen` is what such work usually takes; where it takes more,
+    How many steps a search takes shows only as it goes. `expected` is what such work usually takes; where it takes more,
     the total grows. Words that carry a count of their own, of work inside a step, are told with it and are no steps.
 
     Args:
         say: to whom.
-        foreseen: steps in all.
+        expected: steps in all.
         rough: whether there may be more or fewer.
     """
 
-    def __init__(self, say: Callable[[str], Any] | None, foreseen: int, *, rough: bool = False) -> None:
+    def __init__(self, say: Callable[[str], Any] | None, expected: int, *, rough: bool = False) -> None:
         """Begin with no step done."""
         self._say, self._rough = say, rough
-        self.done, self.total = -1, foreseen
+        self.done, self.total = -1, expected
 
     def __call__(self, words: str) -> None:
         """Begin the next step, or tell of work inside the step that has begun."""

@@ -17,7 +17,7 @@ def test_each_call_begins_a_step_and_the_last_one_is_the_last():
     assert found == [("a", 0, 3, False), ("b", 1, 3, False), ("c", 2, 3, False)]
 
 
-def test_what_is_foreseen_roughly_grows_and_never_ends_before_the_work_does():
+def test_what_is_expected_roughly_grows_and_never_ends_before_the_work_does():
     found = []
     say = Counted(heard(found), 2, rough=True)
     for k in range(6):

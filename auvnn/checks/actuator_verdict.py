@@ -171,7 +171,7 @@ def cures(findings: Sequence[str]) -> list[str]:
         )
     if any("turned round" in f for f in findings):
         out.append(
-            "an axis turned round: mend the directions of the thrusters in the model file (forward, starboard, down), or "
-            "give the velocity of that axis `scale: -1` in the mapping"
+            "an axis turned round: correct the directions of the thrusters in the model file (forward, starboard, "
+            "down), or give the velocity of that axis `scale: -1` in the mapping"
         )
     return out

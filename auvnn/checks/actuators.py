@@ -110,7 +110,7 @@ class ActuatorCheck:
             out.append(
                 f"nothing can be said of {', '.join(self.untold)}: not moved independently of the others"
             )
-        out += [f"{' and '.join(pair)} cannot be told from each other" for pair in self.alike]
+        out += [f"{' and '.join(pair)} cannot be distinguished" for pair in self.alike]
         if self.axes and (not self.findings or self.assignment.plain):
             shown = ", ".join(f"{a} {100 * g:.0f} %" for a, g in self.axes.items())
             out.append(f"driven together; by axis the log shows of the stated force or moment: {shown}")
@@ -183,7 +183,7 @@ def check_actuators(model: GreyBox, log: Log) -> ActuatorCheck:
         names, silent=[*dead, *(i for i in which if i not in told)]
     )
     words += [
-        f"{names[i]} gives {100 * gains[i]:.0f} % of the stated thrust, whatever it is told" for i in dead
+        f"{names[i]} gives {100 * gains[i]:.0f} % of the stated thrust, whatever its command" for i in dead
     ]
     confidence, misfit = found.confidence, float(np.sqrt(problem.distance(found.best)))
     changed = allocation[:, place] * np.array(sign) * np.where(np.isin(np.arange(len(place)), dead), 0.0, 1.0)

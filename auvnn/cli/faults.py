@@ -17,7 +17,7 @@ from auvnn.errors import AuvnnError, ConfigError, one_line
 
 OK, FAULT, BAD_INPUT, INTERRUPTED, UNHEARD, TERMINATED = 0, 1, 2, 130, 141, 143
 
-# What the user's own disk or path can do to us; any other OSError is ours to mend.
+# What the user's own disk or path can do to us; any other OSError is ours to fix.
 _USERS = {
     errno.EACCES, errno.EDQUOT, errno.EEXIST, errno.EFBIG, errno.EIO, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG,
     errno.ENOENT, errno.ENOSPC, errno.ENOTDIR, errno.EPERM, errno.EROFS,

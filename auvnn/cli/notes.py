@@ -1,7 +1,7 @@
 """What was noted while files were read, each thing once: the same note of several files is one line.
 
 Notes that change nothing about a result (level "info") are `check`'s to tell; the other commands count them. What was
-mended or is doubted is told by every command that computes with it.
+corrected or is doubted is told by every command that computes with it.
 """
 
 from __future__ import annotations
@@ -64,11 +64,11 @@ def once(notes: Iterable[N]) -> list[tuple[N, str]]:
 
 
 def noted(notes: Sequence[Note]) -> list[tuple[str, str]]:
-    """Return (level, words) of notes for a command that computes: mended and doubted things, and how many more."""
+    """Return (level, words) of notes for a command that computes: corrected and doubted things, and how many more."""
     found = once(notes)
     lines = [(first.level, words) for first, words in found if first.level != "info"]
     quiet = len(found) - len(lines)
     if quiet:
         many = "1 note" if quiet == 1 else f"{quiet} notes"
-        lines.append(("info", f"{many} on how it was read: auvnn check tells"))
+        lines.append(("info", f"{many} on how it was read: see auvnn check"))
     return lines

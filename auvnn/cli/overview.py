@@ -22,7 +22,7 @@ verbs       auvnn VERB key=value ...; auvnn VERB --help
 effects     that diagnose looks for, and add, remove and simulate take
 {_wrapped(EFFECTS.names())}
 
-vehicles    for model=, beside your own YAML file or model folder
+vehicles    for model=, or your own YAML file or model folder
 {_wrapped(vehicles)}
 
 pages       auvnn effects [NAME], an effect's equation and parameters; auvnn docs [PAGE], the documentation

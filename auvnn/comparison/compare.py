@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from auvnn.answers import PLOTTED, Answer, plain
 from auvnn.cards import Card, figure
-from auvnn.checks.blind import blind
 from auvnn.checks.doubts import doubts
-from auvnn.comparison.beside import beside, standing
+from auvnn.checks.unmeasured import blind
+from auvnn.comparison.baseline import compare_with_baseline, standing
 from auvnn.comparison.locate import AXES, failures, locate
 from auvnn.comparison.predictions import stitch, write_predictions
 from auvnn.errors import ConfigError
@@ -26,7 +26,7 @@ from auvnn.metrics.rollouts import HORIZONS, Rolled, Scale, rollout_table, scale
 from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
 from auvnn.models.free_running.excursions import region_of, words_of
-from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
+from auvnn.models.load_arguments import GivenLog, GivenModel, as_log, as_model
 from auvnn.threads import on_one_thread
 
 Array = NDArray[np.float64]
@@ -164,7 +164,7 @@ def compare(
         located,
         noise,
         None,
-        beside(rolled, model.actuation, scale, log, how),
+        compare_with_baseline(rolled, model.actuation, scale, log, how),
     )
 
 

@@ -10,14 +10,14 @@ from typing import Any, overload
 
 from auvnn.answers import DRAWERS, PLOTTED, Answer, plain, write_text
 from auvnn.cards import Card, figure
-from auvnn.comparison.beside import HORIZONS as MAIN
+from auvnn.comparison.baseline import HORIZONS as MAIN
 from auvnn.comparison.compare import Comparison
 from auvnn.comparison.compare import compare as compare_one
 from auvnn.comparison.predictions import write_predictions
 from auvnn.errors import ConfigError, InputError
 from auvnn.metrics.rollouts import HORIZONS
 from auvnn.models import GreyBox
-from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
+from auvnn.models.load_arguments import GivenLog, GivenModel, as_log, as_model
 from auvnn.threads import on_one_thread
 
 Models = Sequence[GivenModel] | Mapping[str, GivenModel]

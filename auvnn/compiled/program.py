@@ -227,7 +227,7 @@ def recorded(recorder: Recorder, run: Callable[[], Program], gradient: bool) -> 
         raise
     except (
         Exception
-    ) as error:  # What a user's code does under tracing cannot be foreseen; plain torch is at hand.
+    ) as error:  # What a user's code does under tracing cannot be known beforehand; plain torch is at hand.
         raise CannotCompile(
             f"tracing failed: {type(error).__name__}: {str(error).splitlines()[0][:200]}"
         ) from error

@@ -15,7 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from auvnn.compiled import kept
+from auvnn.compiled import disk_cache
 from auvnn.compiled.recorder import CannotCompile
 
 FLAGS = ("-O2", "-std=gnu11", "-march=native", "-fPIC", "-shared", "-fno-math-errno", "-fno-trapping-math")
@@ -80,7 +80,7 @@ def key(source: str, lanes: int) -> str:
 
 def is_kept(source: str, lanes: int) -> bool:
     """Return whether the code of a source is there already."""
-    return kept.looks_sound(cache_folder() / f"{key(source, lanes)}.so")
+    return disk_cache.looks_sound(cache_folder() / f"{key(source, lanes)}.so")
 
 
 def build(source: str, lanes: int) -> tuple[ctypes.CDLL, float]:
@@ -93,18 +93,18 @@ def build(source: str, lanes: int) -> tuple[ctypes.CDLL, float]:
     command = compiler()
     assert command is not None
     folder = cache_folder()
-    kept.private(folder)
+    disk_cache.private(folder)
     target, spent = folder / f"{name}.so", 0.0
     try:
-        loaded = kept.load(target)
+        loaded = disk_cache.load(target)
         if loaded is None:
             begin = time.perf_counter()
             _compile(command, source, lanes, target)
             spent = time.perf_counter() - begin
             _make_room(folder)
-            loaded = kept.load(target)
+            loaded = disk_cache.load(target)
     except OSError as error:
-        kept.forget(target)
+        disk_cache.forget(target)
         raise CannotCompile(f"compiled code cannot be loaded: {error}") from None
     if loaded is None:
         raise CannotCompile(f"{target}: is not what was compiled a moment ago; make {folder} private")
@@ -118,7 +118,7 @@ def _make_room(folder: Path) -> None:
     with contextlib.suppress(OSError):
         there = sorted(folder.glob("*.so"), key=lambda f: f.lstat().st_mtime)
         for old in there[:-MOST]:
-            kept.forget(old)
+            disk_cache.forget(old)
         for left in (*folder.glob(".loading-*"), *folder.glob("making-*")):
             if time.time() - left.lstat().st_mtime > LEFT:  # of a process that was killed
                 shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
@@ -140,7 +140,7 @@ def _compile(command: str, source: str, lanes: int, target: Path) -> None:
             if done.returncode:
                 first = next((line for line in done.stderr.splitlines() if "error" in line), "no message")
                 raise CannotCompile(f"{command} failed: {first.strip()[-200:]}")
-            kept.keep(made, target)
+            disk_cache.keep(made, target)
     except subprocess.TimeoutExpired:
         raise CannotCompile(f"{command} took longer than {TIMEOUT:g} s") from None
     except OSError as error:

@@ -21,8 +21,8 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout, priors
-from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, priors
+from auvnn.estimation.window_normal_equations import Statistics, linearise, normal_equations
 from auvnn.logs import Log, Run
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import cut_windows

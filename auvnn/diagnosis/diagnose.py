@@ -8,28 +8,28 @@ from typing import Any
 
 import numpy as np
 
-from auvnn.checks.blind import blind
 from auvnn.checks.doubts import doubts
-from auvnn.comparison.beside import stands
+from auvnn.checks.unmeasured import blind
+from auvnn.comparison.baseline import baseline_of
 from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.answers.answering import answer
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
-from auvnn.diagnosis.hypotheses.layout import lay_out
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
-from auvnn.diagnosis.noise_law.answer import beside_what_is_left
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.noise_law.answer import answer_with_force
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.state import Searched, Setting
 from auvnn.diagnosis.stages.what_is_left import settled
 from auvnn.errors import ConfigError, InputError
-from auvnn.estimation.normal_equations import TRUST, motion
 from auvnn.estimation.prediction_error import SINGULAR
+from auvnn.estimation.window_normal_equations import TRUST, motion
 from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
-from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
+from auvnn.models.load_arguments import GivenLog, GivenModel, as_log, as_model
 from auvnn.progress import Counted
 from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
@@ -71,7 +71,7 @@ def diagnose(
         advice: for an ambiguous answer, also work out which manoeuvre would tell the candidates apart.
         whiteness: also test what is left for correlations, before and after; no verdict depends on these tests.
         stochastic: where a force is left without a name, also ask how commands go between samples, and compare the
-            effects again beside a stochastic force whose law is estimated; takes as long again.
+            effects again together with a stochastic force whose law is estimated; takes as long again.
         force: go on with a log that contradicts itself: signs, units, axes.
         tolerance: what does not matter: a number for the cost in free running, with a fifth of it for the force as a
             share of the actuators', or a mapping with `cost` and `force`; by default 0.1 and 0.02. At 0 everything
@@ -174,7 +174,7 @@ def searched(
     try:
         state, told, words = search(asked, windows), {}, []
         if stochastic:
-            state, told, words = beside_what_is_left(asked, state)
+            state, told, words = answer_with_force(asked, state)
         state = settled(asked, state)
         found = answer(asked, state)
     except (np.linalg.LinAlgError, SINGULAR) as problem:
@@ -184,7 +184,7 @@ def searched(
         ) from None
     found = replace(
         found,
-        baseline=stands(model, log, choose_derivative(log)),
+        baseline=baseline_of(model, log, choose_derivative(log)),
         stochastic=told,
         warnings=[*found.warnings, *words],
     )

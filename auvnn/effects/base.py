@@ -14,7 +14,7 @@ from auvnn.effects.hooks import Body, Extent, Moment, Parameter, Response, Sense
 from auvnn.errors import ConfigError
 
 AXES = ("X", "Y", "Z", "K", "M", "N")
-# Standard deviation, in scales, of a parameter that is stated to be exact: what is not nought can be divided by.
+# Standard deviation, in scales, of a parameter that is stated to be exact: unlike zero, it can be divided by.
 EXACT = 1e-6
 
 
@@ -181,7 +181,7 @@ class Effect(nn.Module):
         """Keep the standard deviations of some parameters, in their units.
 
         Raises:
-            ConfigError: a name is unknown, or a value is no number from nought up.
+            ConfigError: a name is unknown, or a value is not a number of at least zero.
         """
         for key, value in given.items():
             if key not in self._index:

@@ -46,15 +46,20 @@ class FinEffect(Effect):
             return torch.zeros_like(self.kept("stall").to(moment.nu))
         return moment.fins.to(moment.nu)
 
-    def lift(self, moment: Moment, angles: Tensor, share: Tensor | float = 1.0) -> Tensor:
+    def lift(
+        self, moment: Moment, angles: Tensor, share: Tensor | float = 1.0, stall: Tensor | None = None
+    ) -> Tensor:
         """Return the lift's wrench at fin angles, each fin's by its share, (..., 6).
 
         Args:
             moment: state and water at the fins.
             angles: of the fins, rad, (..., m).
             share: of each fin's area that lifts, broadcast to (..., m).
+            stall: angle at which each fin stalls, rad, (m,); as stated by default.
         """
-        frame, area, slope, stall, density = (
+        frame, area, slope, stated, density = (
             self.kept(n).to(moment.nu) for n in ("frame", "area", "lift_slope", "stall", "density")
         )
-        return fin_wrench(moment.nu_r, angles, frame, share * area, slope, stall, density)
+        return fin_wrench(
+            moment.nu_r, angles, frame, share * area, slope, stated if stall is None else stall, density
+        )

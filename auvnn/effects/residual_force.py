@@ -72,7 +72,7 @@ class ResidualForce(Effect):
         Args:
             vehicle: the known numbers.
             actuation: "thrusters" or "wrench".
-            values: weights by name; those that are not given are nought.
+            values: weights by name; those that are not given are zero.
             inputs: what the force may depend on, of `INPUTS`.
 
         Raises:

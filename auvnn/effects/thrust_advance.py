@@ -50,6 +50,6 @@ class ThrustAdvance(InflowEffect):
         """Take the loss off."""
         inflow, share = self.inflow(moment).to(thrust), self.share(moment).to(thrust)
         loss, speed = self.theta.to(thrust).unbind(-1)
-        # J / (1 + |J|) without dividing by a command that may be nought.
+        # J / (1 + |J|) without dividing by a command that may be zero.
         ratio = inflow * torch.sign(share) / (share.abs() * speed + inflow.abs() + 1e-9 * speed)
         return thrust * (1.0 - loss * ratio)

@@ -51,7 +51,7 @@ class OperatingPoint(nn.Module):
             what: which of them.
             position: m, (3,).
             quaternion: attitude, (4,).
-            turn: small rotation of the body axes, rad, (3,); nought, but differentiated by.
+            turn: small rotation of the body axes, rad, (3,); zero, but differentiated by.
             nu: (6,).
             thrust: (n,).
             time: s.

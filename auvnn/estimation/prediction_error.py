@@ -19,7 +19,10 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.errors import InputError
-from auvnn.estimation.normal_equations import (
+from auvnn.estimation.nuisance_elimination import NormalEquations
+from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
+from auvnn.estimation.sensitivity import Response
+from auvnn.estimation.window_normal_equations import (
     TRUST,
     Statistics,
     cost_of,
@@ -30,9 +33,6 @@ from auvnn.estimation.normal_equations import (
     runs_by_block,
     weights_of,
 )
-from auvnn.estimation.nuisance import NormalEquations
-from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
-from auvnn.estimation.sensitivity import Response
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox

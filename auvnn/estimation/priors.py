@@ -46,8 +46,8 @@ class Priors:
         away = theta - self.mean
         return float(self.precision @ away**2 if self.joint is None else away @ self.joint @ away)
 
-    def beside(self, precision: Array) -> Priors:
-        """Return the priors with further parameters of mean nought at the end, independent of these; without reach.
+    def extended_by(self, precision: Array) -> Priors:
+        """Return the priors with further parameters of mean zero at the end, independent of these; without reach.
 
         Args:
             precision: of the further ones, (K,).

@@ -10,10 +10,10 @@ TINY = 1e-300
 
 
 def unit_of(square: Array) -> Array:
-    """Return one over the root of each diagonal element, (P,), and nought where there is none.
+    """Return one over the root of each diagonal element, (P,), and zero where there is none.
 
     Sums that say nothing of a parameter, or less than nothing because a window of enormous errors has rounded them away,
-    must not blow it up: multiplied by nought it drops out, and no step is taken in it.
+    must not blow it up: multiplied by zero it drops out, and no step is taken in it.
 
     Args:
         square: (P, P), symmetric.

@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from auvnn.estimation.force_columns import PUSH, Cells
 from auvnn.estimation.point_slopes import OperatingPoint, differentiate
-from auvnn.estimation.simulated_windows import SimulatedWindows, simulate_windows
+from auvnn.estimation.stochastic_force.columns import PUSH, Cells
+from auvnn.estimation.window_simulation import SimulatedWindows, simulate_windows
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox, Inputs
 from auvnn.physics.attitude import quat_to_matrix, skew

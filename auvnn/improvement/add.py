@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from auvnn.catalogue import unknown_name
-from auvnn.comparison.beside import beside
+from auvnn.comparison.baseline import compare_with_baseline
 from auvnn.comparison.compare import floor_of
 from auvnn.comparison.predictions import stitch
 from auvnn.diagnosis.answers.answer import OneOf
 from auvnn.diagnosis.answers.table import values
-from auvnn.diagnosis.fitters import OBJECTIVES
+from auvnn.diagnosis.cross_validation.fitters import OBJECTIVES
 from auvnn.diagnosis.one_step.fit import left_out_gain
 from auvnn.effects import effect_class
 from auvnn.effects.registering import names_of
@@ -26,7 +26,7 @@ from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.rollouts import HORIZONS
 from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
-from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
+from auvnn.models.load_arguments import GivenLog, GivenModel, as_log, as_model
 from auvnn.progress import Progress
 from auvnn.threads import on_one_thread
 
@@ -186,7 +186,7 @@ def _assembled(
             for k, (step, candidate) in enumerate(fits.steps)
         ],
         by_effect=judged.by_effect,
-        baseline=beside(
+        baseline=compare_with_baseline(
             rolled[last],
             model.actuation,
             judged.scale,

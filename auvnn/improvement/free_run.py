@@ -21,9 +21,9 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.effects import Sensed
-from auvnn.estimation.normal_equations import linearise
-from auvnn.estimation.nuisance import NormalEquations
+from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
+from auvnn.estimation.window_normal_equations import linearise
 from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.rollouts import CUT, Scale
 from auvnn.metrics.windows import VELOCITY, Windows
@@ -95,12 +95,25 @@ class FreeRunFit:
             priors: other ones than the fit's.
         """
         priors = priors or self.priors
-        low, high = limits(model, self.names, priors)
+        return self.step(keep, *limits(model, self.names, priors), priors)
+
+    def step(
+        self, keep: NDArray[np.bool_] | slice, low: Array, high: Array, priors: Priors | None = None
+    ) -> Array:
+        """Return the same within given bounds, (P,).
+
+        Args:
+            keep: (B,) windows that are fitted.
+            low: lower bounds of the parameters, (P,).
+            high: upper bounds, (P,).
+            priors: other ones than the fit's.
+        """
+        priors = priors or self.priors
         hessian = self.hessian[keep].sum(0) + self.weight * priors.square
         slope = self.slope[keep].sum(0) - self.weight * priors.pull(self.theta)
         return np.clip(self.theta + newton_step(hessian, slope, self.theta, low, high, 0.0), low, high)
 
-    def foreseen(self, theta: Array, chosen: NDArray[np.bool_]) -> float:
+    def predicted_error(self, theta: Array, chosen: NDArray[np.bool_]) -> float:
         """Return the squared error of some windows at other parameters, to second order about the fit."""
         d = theta - self.theta
         return float(

@@ -10,7 +10,7 @@ import numpy as np
 
 from auvnn.diagnosis.answers.bounds import reservations
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.improvement.fits import REFITTED, Fits
 from auvnn.improvement.gains import paired_gain
 from auvnn.logs import Log
@@ -32,7 +32,7 @@ class Judged:
         key: the horizon of the gain, s.
         scale: what errors are measured by.
         gain: fall of the total from the refitted model to the one with all effects, and its standard error.
-        by_effect: effect to the same of its own, beside the others.
+        by_effect: effect to the same of its own, in addition to the others.
     """
 
     results: dict[str, dict[str, Any]]
@@ -44,7 +44,7 @@ class Judged:
 
     @property
     def accepted(self) -> bool:
-        """Whether all effects together pay, and each beside the others."""
+        """Whether all effects together pay, and each in addition to the others."""
         return _pays(*self.gain) and all(entry["accepted"] for entry in self.by_effect.values())
 
 
@@ -56,7 +56,7 @@ def judge(
     derivative: dict[str, Any] | None,
     thorough: bool,
 ) -> Judged:
-    """Run all models free on held-out data, and ask of each effect what it brings beside the others.
+    """Run all models free on held-out data, and ask of each effect what it brings in addition to the others.
 
     Args:
         fits: the models.
@@ -113,8 +113,8 @@ def words(layout: Layout, found: FittedHypothesis, judged: Judged) -> list[str]:
             if not entry["accepted"]:
                 own = entry["gain"]
                 out.append(
-                    f"{name} does not earn its place: beside the others it lets the held-out error fall by "
-                    f"{own['value']:.3g}, with an uncertainty of {own['std']:.3g}; leave it out"
+                    f"{name} does not improve the prediction: in addition to the others it lets the held-out error "
+                    f"fall by {own['value']:.3g}, with an uncertainty of {own['std']:.3g}; leave it out"
                 )
     out += reservations(layout, found, found.names)
     covariance = found.fitted.covariance()

@@ -16,12 +16,12 @@ from auvnn.diagnosis.hypotheses.candidates import (
     windows_for,
 )
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
-from auvnn.diagnosis.hypotheses.layout import lay_out
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
 from auvnn.diagnosis.score_tests.shape_search import searched_start
 from auvnn.errors import AuvnnError, InputError, one_line
-from auvnn.estimation.normal_equations import TRUST, motion
+from auvnn.estimation.window_normal_equations import TRUST, motion
 from auvnn.log_chunks.scan import WindowCut
 from auvnn.log_chunks.windows import plan_file, runs_of
 from auvnn.logs import Log

@@ -25,7 +25,7 @@ _DECIMALS = 6  # a float64 of today's date holds microseconds, and no more
 
 
 def origin_of(t: Array) -> float:
-    """Return the whole second from which stamps are counted: nought, or the second of the first one where it is a date.
+    """Return the whole second from which stamps are counted: zero, or the second of the first one where it is a date.
 
     Args:
         t: stamps in the order of the file, s, (N,); NaN and zeros before the clock started are passed over.
@@ -64,7 +64,7 @@ def note(origin: float, where: str, count: int) -> Repair:
 
 
 def from_their_beginning(runs: Iterable[Run], name: str) -> tuple[tuple[Run, ...], tuple[Repair, ...]]:
-    """Return the runs of a log on one clock that begins near nought, and what is to be told of it.
+    """Return the runs of a log on one clock that begins near zero, and what is to be told of it.
 
     Args:
         runs: stamped by one clock; they are returned as they are where it shows no dates.

@@ -14,9 +14,9 @@ import numpy as np
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs.channels import SCALARS, VELOCITY
 from auvnn.logs.clock_origin import from_their_beginning
+from auvnn.logs.notebook_view import ShownLog
 from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.run import MIN_SAMPLES, Run
-from auvnn.logs.shown import ShownLog
 
 if TYPE_CHECKING:
     from auvnn.logs.quality.quality import Quality
@@ -32,7 +32,7 @@ class Log(ShownLog):
         runs: the runs, with the same columns and different numbers; stamps of 1e7 s and more count from the earliest.
         name: what to call the log in words and file names.
         paths: the files it was read from; empty for a log made in memory.
-        repairs: what was mended or noted while reading.
+        repairs: what was corrected or noted while reading.
         sha256: of the files' bytes where it was read, of the samples where it was made in memory; where only the
             beginning of a file was read, of that.
         unknown: columns that are kept and not used.
@@ -150,7 +150,7 @@ class Log(ShownLog):
         Args:
             runs: in their order, each with a number of its own.
             name: of the log.
-            repairs: what was mended on the way here.
+            repairs: what was corrected on the way here.
         """
         return cls(tuple(runs), name=name, repairs=tuple(repairs))
 

@@ -3,7 +3,7 @@
 The noise of a channel is taken as a process of one correlation time, E[n(t) n(s)] = sigma^2 exp(-|t - s| / T). With
 rho = exp(-(t_k - t_j) / T) to the measurement j before it, (n_k - rho n_j) / sqrt(1 - rho^2) is independent of all that
 came before and has the standard deviation sigma again: errors and their derivatives are replaced by these
-innovations (prewhitening), and all that is made for white noise holds. Where T is nought nothing changes.
+innovations (prewhitening), and all that is made for white noise holds. Where T is zero nothing changes.
 
 Reference: Box, Jenkins and Reinsel (2008), Time Series Analysis, section 3.2; Jones (1980), Technometrics 22(3), for
 samples that are missing.
@@ -27,7 +27,7 @@ class NoiseColour:
     """Correlation times of the sensors' noise.
 
     Attributes:
-        time: (18,), s; nought where the noise is white.
+        time: (18,), s; zero where the noise is white.
     """
 
     time: NDArray[np.float64]

@@ -11,9 +11,9 @@ from auvnn.models.free_running.rollout import rollout
 from auvnn.models.free_running.trajectory import Divergence, Trajectory
 from auvnn.models.grey_box import GreyBox
 from auvnn.models.inputs import Inputs
+from auvnn.models.load_arguments import as_log, as_model
 from auvnn.models.loading import from_vehicle, load, remove
 from auvnn.models.saving import save
-from auvnn.models.taking import as_log, as_model
 
 __all__ = [
     "Divergence",

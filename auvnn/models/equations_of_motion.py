@@ -10,8 +10,8 @@ from torch import Tensor
 
 from auvnn.effects import Body, Moment
 from auvnn.errors import ConfigError
-from auvnn.models.accepting import as_tensor, own
 from auvnn.models.actuation.actuators import Actuators
+from auvnn.models.input_conversion import as_tensor, own
 from auvnn.models.inputs import Inputs
 from auvnn.models.sensors import Sensors
 from auvnn.physics.attitude import quat_to_matrix

@@ -19,8 +19,8 @@ from auvnn.models.actuation.actuators import Actuators
 from auvnn.models.equations_of_motion import EquationsOfMotion
 from auvnn.models.inputs import Inputs
 from auvnn.models.joint_covariance import JointCovariance, with_joint
+from auvnn.models.notebook_view import ShownModel
 from auvnn.models.saving import PASSIVE, REGION, SUBNETWORKS, save
-from auvnn.models.shown import ShownModel
 from auvnn.models.stated_drag import StatedDrag
 from auvnn.physics.drag import element_transform
 from auvnn.physics.fins import fin_frame
@@ -192,7 +192,7 @@ class GreyBox(ShownModel, EquationsOfMotion):
         """Return a model with other effects that shares its learned parts with this one: nothing is copied."""
         return with_joint(self._like(effects, self.vehicle, self.actuation, shared=True), self.joint)
 
-    def beside(self, *effects: Effect) -> GreyBox:
+    def extended_by(self, *effects: Effect) -> GreyBox:
         """Return the model with further effects, probes among them: its own are copied, learned parts shared."""
         return self.sharing([*self.copied_effects(), *effects])
 

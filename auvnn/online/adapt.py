@@ -16,7 +16,7 @@ from auvnn.damping.bank import Description
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Run
 from auvnn.models import GreyBox
-from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
+from auvnn.models.load_arguments import GivenLog, GivenModel, as_log, as_model
 from auvnn.online.adapter import Adapter
 from auvnn.online.frozen import frozen_errors
 from auvnn.online.guards import REASONS, Guards

@@ -13,7 +13,7 @@ from auvnn.online.adapter_parts import AdapterParts
 from auvnn.online.guards import REASONS
 from auvnn.online.intake import refusal, sample_of, turned
 from auvnn.online.residual import Residual, Sample
-from auvnn.online.schemes.base import Lesson
+from auvnn.online.schemes.base import Observation
 from auvnn.online.update import Update
 from auvnn.online.updates.trusted import Trusted
 
@@ -193,13 +193,13 @@ class Adapter(AdapterParts):
         }
         missing = -original * bank.output_scale
         std = self._noise.std()
-        lesson = Lesson(sample.t, dt, found.nu, target, error, slope, torch.tensor(std) ** 2)
+        observation = Observation(sample.t, dt, found.nu, target, error, slope, torch.tensor(std) ** 2)
         if not guards.enabled:
             self._watch(found, missing)
-            proposed = self.scheme.propose(self.weights, lesson)
+            proposed = self.scheme.propose(self.weights, observation)
             if proposed is None:
                 return self._no(sample.t, "no_news", **told)
-            return self._set(proposed, lesson, found, told)
+            return self._set(proposed, observation, found, told)
         if self.paused:
             return self._no(sample.t, "paused", **told)
         if sample.t < self._off_until:
@@ -219,7 +219,7 @@ class Adapter(AdapterParts):
             self._held = [*self._held[-MOST_HELD:], (found.sample, found.nu, missing)]
             return self._no(sample.t, "gated", **told)
         self._noise.add(error)
-        proven = self._trial.take(self.weights, target, found.nu, error, lesson.variance)
+        proven = self._trial.take(self.weights, target, found.nu, error, observation.variance)
         self.counts.proven += proven
         told["proven"] = proven
         held_back, self._held = self._held, []
@@ -231,24 +231,26 @@ class Adapter(AdapterParts):
             self.counts.believed += 1
             self.scheme.changed()
             told["believed"] = True
-        reverted, validated = self._judge(lesson)
+        reverted, validated = self._judge(observation)
         told |= {"reverted": reverted, "validated": validated}
         if reverted:
             value, slope = self.weights.jacobian(found.nu)
-            lesson = Lesson(sample.t, dt, found.nu, target, target - value, slope, lesson.variance)
+            observation = Observation(
+                sample.t, dt, found.nu, target, target - value, slope, observation.variance
+            )
         self._bounds.visit(self._model, found.nu)
-        proposed = self.scheme.propose(self.weights, lesson)
+        proposed = self.scheme.propose(self.weights, observation)
         if proposed is None:
             return self._no(sample.t, "no_news", **told)
-        return self._set(proposed, lesson, found, told)
+        return self._set(proposed, observation, found, told)
 
     def _watch(self, found: Residual, missing: Tensor) -> None:
         if self._monitor is not None:
             self._monitor.add(found.sample, found.nu, missing)
 
-    def _judge(self, lesson: Lesson) -> tuple[bool, bool]:
-        old = self._shadow.error(lesson.target, lesson.nu)
-        verdict = self._shadow.verdict(lesson.t, lesson.error, old, lesson.variance)
+    def _judge(self, observation: Observation) -> tuple[bool, bool]:
+        old = self._shadow.error(observation.target, observation.nu)
+        verdict = self._shadow.verdict(observation.t, observation.error, old, observation.variance)
         if verdict == "worse":
             self.weights.write(self._shadow.valid)
             self.scheme.load(self._shadow.scheme_state)
@@ -259,21 +261,23 @@ class Adapter(AdapterParts):
             self.counts.validated += 1
         return verdict == "worse", verdict == "valid"
 
-    def _set(self, proposed: Tensor, lesson: Lesson, found: Residual, told: dict[str, Any]) -> Update:
+    def _set(
+        self, proposed: Tensor, observation: Observation, found: Residual, told: dict[str, Any]
+    ) -> Update:
         before = self.weights.read()
         moved: Tensor | None = None
         if self.guards.enabled:
-            moved, shortened = self._bounds.admit(self.weights, proposed, lesson.nu, lesson.dt)
+            moved, shortened = self._bounds.admit(self.weights, proposed, observation.nu, observation.dt)
             self.counts.shortened += int(shortened)
             if moved is not None:
-                self._shadow.open(lesson.t)
+                self._shadow.open(observation.t)
         elif bool(torch.isfinite(proposed).all()):
             self.weights.write(proposed)
-            moved = self.weights.value(lesson.nu) - (lesson.target - lesson.error)
+            moved = self.weights.value(observation.nu) - (observation.target - observation.error)
         if moved is None:
-            return self._no(lesson.t, "limited", **told)
+            return self._no(observation.t, "limited", **told)
         return Update(
-            lesson.t, True, "learned from this sample", "adapted", **told,
+            observation.t, True, "learned from this sample", "adapted", **told,
             change=float((self.weights.read() - before).norm()),
             force_change=moved * self.weights.bank.output_scale,
         )  # fmt: skip

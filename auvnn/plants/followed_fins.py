@@ -22,7 +22,7 @@ class FollowedFins:
         self.state: Tensor | None = None
         self.starts: list[Tensor] = []
 
-    def beside(
+    def append_fins(
         self, mean: Tensor, slope: Tensor | None, fins: Tensor | None, h: float, first: bool
     ) -> tuple[Tensor, Tensor | None]:
         """Return mean and rise over a step, the fin angles after the thrust, and move on by the step.

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Wander:
-    """A wrench in body axes that no equation foretells, linear between evenly spaced knots.
+    """A wrench in body axes that no equation predicts, linear between evenly spaced knots.
 
     Attributes:
         spacing: s, between knots; the first is at time zero.
@@ -50,7 +50,7 @@ class Laws:
             a hull's u v is multiplied by cos2 of the angle between flow and axis.
         added_coriolis: share of the Coriolis and centripetal forces of the added mass that acts.
         relative: share of the water's motion that anything but the drag feels: inertia, fins, lift, thrusters.
-        wander: a wrench that nothing foretells.
+        wander: a wrench that nothing predicts.
     """
 
     exponent: Array | None = None

@@ -114,7 +114,7 @@ class _Scene(Stretch):
             )
         except ValueError as problem:
             words = f"plant mujoco cannot hold {task.vehicle.name}: {one_line(problem)}"
-            raise ConfigError(f"{words}; mend its mass and inertia, or use plant=numpy") from None
+            raise ConfigError(f"{words}; correct its mass and inertia, or use plant=numpy") from None
         model = self.model
         model.geom_fluid[:, 6:] = diagonal / task.vehicle.water_density
         model.opt.gravity[:] = [0.0, 0.0, task.vehicle.gravity]

@@ -202,7 +202,7 @@ class Stepper:
                 mean, slope, start = self._delayed(k, part, h)
             if part == 0:
                 self.thrusts.append(start)
-            mean, slope = self.followed.beside(mean, slope, fins, h, part == 0)
+            mean, slope = self.followed.append_fins(mean, slope, fins, h, part == 0)
             if last:
                 return
             if self.lag is not None:

@@ -16,7 +16,7 @@ from auvnn.effects.sizes import radius
 from auvnn.errors import ConfigError
 from auvnn.logs import Log
 from auvnn.models import GreyBox
-from auvnn.models.taking import GivenModel, as_model
+from auvnn.models.load_arguments import GivenModel, as_model
 from auvnn.plants import PLANTS, Motion, PlantTask
 from auvnn.plants.base import refuse
 from auvnn.plants.strangers import STRANGERS

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from auvnn.catalogue import unknown_name
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.diagnosis.hypotheses.layout import has_stated_uncertainty, lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import has_stated_uncertainty, lay_out
 from auvnn.diagnosis.score_tests.probes import extent_of
 from auvnn.effects import Effect, Parameter
 from auvnn.errors import ConfigError
-from auvnn.estimation.normal_equations import linearise, normal_equations
 from auvnn.estimation.priors import set_parameters
+from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.logs import Log
-from auvnn.logs.without import without as lacking
+from auvnn.logs.without_sensors import without as lacking
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.unmeasured import completed
 from auvnn.metrics.windows import cut_windows

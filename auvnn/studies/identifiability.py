@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from auvnn.damping.bank import DampingBank
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.diagnosis.hypotheses.layout import Layout, lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, lay_out
 from auvnn.effects import effect_class
-from auvnn.estimation.nuisance import carry_of
+from auvnn.estimation.nuisance_elimination import carry_of
 from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox

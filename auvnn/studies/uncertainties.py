@@ -2,7 +2,7 @@
 
 Damping, added mass and restoring are all badly known. For each manoeuvre of equal length the study works out
 
-- what free running tells: the information matrix of all parameters, the windows' initial states projected out,
+- what free running identifies: the information matrix of all parameters, the windows' initial states projected out,
   under the noise of good sensors. A parameter's standard error with everything else known, with all else
   uncertain too, and with damping not even of a known law but six networks, each against what was known before;
   what is correlated with what;
@@ -107,7 +107,7 @@ def uncertainties(
         logs[name] = simulate(vehicle, name, "none", None, seed, **how).log
     found: dict[str, dict[str, Any]] = {}
     for name, log in logs.items():
-        say(f"{name}: what free running tells")
+        say(f"{name}: what free running identifies")
         found[name] = information(vehicle, log, prior, networks)
         shares: dict[str, Any] = {}
         if networks:

@@ -171,7 +171,7 @@ class DampingProblem:
         if empty:
             raise InputError(
                 f"damping problem: no usable sample for {', '.join(empty)}: "
-                "mend the log, or give the form 'zero' there"
+                "correct the log, or give the form 'zero' there"
             )
 
 

@@ -123,5 +123,6 @@ def check_drives(vehicle: Any, where: str) -> None:
     if vehicle.thrusters and (glides or vehicle.reduced.attitude == "measured"):
         what = "reduced: {attitude: measured}" if not glides else "ballast and moving_mass"
         raise ModelError(
-            f"{where}: {what} cannot stand beside thrusters: leave them out, and log their force as tau_X ... tau_N"
+            f"{where}: {what} cannot be given together with thrusters: leave them out, and log their force as "
+            "tau_X ... tau_N"
         )

@@ -34,7 +34,9 @@ def summary(vehicle: Vehicle) -> Text:
         rows.append(
             (
                 "damping elements",
-                f"{len(v.damping_elements)} part{'s' * (len(v.damping_elements) > 1)} at offset centres",
+        count = len(v.damping_elements)
+        parts = "part at an offset centre" if count == 1 else "parts at offset centres"
+        rows.append(("damping elements", f"{count} {parts}"))
             )
         )
     rows += [("thrusters", _thrusters(v)), ("fins", f"{v.n_fins}" if v.fins else "none")]

@@ -81,7 +81,7 @@ def peer(hidden: str, minutes: float, rate: float) -> dict[str, Any]:
         gaps.append(gap[good])
     optimizer = pysindy.EnsembleOptimizer(pysindy.STLSQ(threshold=1e-3), bagging=True, n_models=100)
     names = [*"uvwpqr", *(f"tau_{a}" for a in "XYZKMN"), "d_x", "d_y", "d_z"]
-    # pysindy wants as many derivatives as states: those of the rest are nought.
+    # pysindy wants as many derivatives as states: those of the rest are zero.
     still = [np.concatenate([g, np.zeros((len(g), 9))], axis=1) for g in gaps]
     fit = pysindy.SINDy(optimizer=optimizer, feature_library=pysindy.PolynomialLibrary(degree=2))
     _, seconds = timed(lambda: fit.fit(states, 1.0 / rate, x_dot=still, feature_names=names))

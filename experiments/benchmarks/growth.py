@@ -85,7 +85,7 @@ def measure(what: str, path: Path, workers: int) -> dict[str, float]:
     torch.set_num_threads(1)
     import auvnn
     from auvnn.diagnosis.full_data.map_reduce import LinearisationPoint, MapReduce
-    from auvnn.diagnosis.hypotheses.layout import lay_out
+    from auvnn.diagnosis.hypotheses.stated_priors import lay_out
     from auvnn.effects import Extent
     from auvnn.executors import executor_for
     from auvnn.log_chunks.scan import WindowCut

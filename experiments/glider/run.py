@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from auvnn import diagnose
-from auvnn.diagnosis.fitters import fitter_for
-from auvnn.diagnosis.hypotheses.bake import with_fitted_parameters
-from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.cross_validation.fitters import fitter_for
+from auvnn.diagnosis.hypotheses.put_into_model import with_fitted_parameters
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.logs import Log, Run
 from auvnn.metrics.free_run import predict
 from auvnn.metrics.likely_states import likely_states
@@ -115,18 +115,18 @@ def scores(found: list[tuple[Run, np.ndarray, np.ndarray]]) -> dict[str, float]:
 
 
 def study(data: Path, out: Path, say: Callable[[str], None] = print) -> dict:
-    """Fit on the first half, foretell the second, ask what is missing; return the figures."""
+    """Fit on the first half, predict the second, ask what is missing; return the figures."""
     out.mkdir(parents=True, exist_ok=True)
     first, second = halves(data, out)
     model = load(HERE / "glider.yaml")
     result: dict = {"dives": [len(first.runs), len(second.runs)], "samples": [first.samples, second.samples]}
     result["as_given"] = scores(predicted_rate(model, second))
     made, values = fitted(model, first)
-    foretold = predicted_rate(made, second)
-    result["fitted"] = {**scores(foretold), "parameters": values}
+    predicted = predicted_rate(made, second)
+    result["fitted"] = {**scores(predicted), "parameters": values}
     np.savez(
-        out / "foretold.npz",
-        **{f"{k}_{run.number}": x for run, *two in foretold for k, x in zip(KEPT, two, strict=True)},
+        out / "predicted.npz",
+        **{f"{k}_{run.number}": x for run, *two in predicted for k, x in zip(KEPT, two, strict=True)},
     )
     _write(result, out)
     found = diagnose(model, first, whiteness=False, advice=False, costs=False, progress=say)

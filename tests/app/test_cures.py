@@ -73,7 +73,7 @@ def test_what_the_cures_offer():
         "scale: -1 for qx, qy and qz in the mapping": 1,
         "consider the effect ocean_current": 1,
         "record a run in which the vehicle moves": 0,
-        "mend with rates: deg (or angles: deg) in the mapping": 2,
+        "correct with rates: deg (or angles: deg) in the mapping": 2,
     }
     for cure, count in labels.items():
         assert len(buttons("z", "is odd", cure)) == count, cure

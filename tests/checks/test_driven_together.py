@@ -97,7 +97,7 @@ def test_an_axis_turned_round_is_said_of_the_axis():
     log = log_of(8, truth=from_vehicle(small_vehicle(thrusters=level)))
     found = check_actuators(from_vehicle(small_vehicle(thrusters=turned)), log)
     assert found.findings == ["all that drives X is turned round"] and found.sure
-    assert "mend the directions" in found.words[0]
+    assert "correct the directions" in found.words[0]
 
 
 def test_nothing_is_found_in_twenty_sound_logs():

@@ -23,7 +23,7 @@ def test_the_same_repair_of_three_files_is_one_line_and_notes_are_counted():
     assert found == [
         ("repair", f"a.csv, b.csv and 1 more: {FLIPS} (8, 24, 1)"),
         ("warning", "b.csv: time stamps repeated (2)"),
-        ("info", "1 note on how it was read: auvnn check tells"),
+        ("info", "1 note on how it was read: see auvnn check"),
     ]
 
 

@@ -153,7 +153,7 @@ def test_at_a_terminal_one_line_tells_what_is_done_and_to_come_and_the_time_left
     assert last_line(terminal) == "weights (0 of about 4 done, 50 s)"
 
 
-def test_more_steps_than_foreseen_keep_the_estimate(monkeypatch):
+def test_more_steps_than_expected_keep_the_estimate(monkeypatch):
     clock, terminal = Clock(), Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
     say = Speaker(clock=clock)

@@ -11,7 +11,7 @@ from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.advise import Advice, advise
 from auvnn.diagnosis.hypotheses.candidates import HORIZON, WARMUP, windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
-from auvnn.diagnosis.hypotheses.layout import lay_out, priors
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out, priors
 from auvnn.estimation.prediction_error import fit
 from auvnn.estimation.priors import Priors
 from auvnn.models import GreyBox

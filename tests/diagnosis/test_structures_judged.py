@@ -47,7 +47,7 @@ def test_its_learned_part_stays_however_it_is_built_again(name, options):
         "without what is absent": made.without_absent(),
         "rebuilt": made.rebuilt(made.copied_effects()),
         "sharing": made.sharing(made.members),
-        "with a probe beside it": made.beside(VarianceComponents(made, 5.0)),
+        "with a probe beside it": made.extended_by(VarianceComponents(made, 5.0)),
         "driven by a wrench and back": made.rebuilt([], actuation="wrench").rebuilt(
             [], actuation="thrusters"
         ),

@@ -136,7 +136,7 @@ def test_the_slope_at_the_null_is_that_of_a_short_lag(remus):
     model, at_null = speed(0.0)
     (slope,) = torch.autograd.grad(at_null, model.effect("fin_lag").theta)
     with torch.no_grad():
-        # Forward differences of two lengths, and what they foretell of none at all.
+        # Forward differences of two lengths, and what they predict of none at all.
         coarse, fine = ((speed(h)[1] - at_null) / h for h in (2e-4, 1e-4))
     assert slope.item() == pytest.approx(float(2 * fine - coarse), rel=1e-4)
 

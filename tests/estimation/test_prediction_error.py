@@ -10,11 +10,11 @@ import torch
 from scipy.optimize import least_squares, lsq_linear
 
 from auvnn.estimation import prediction_error
-from auvnn.estimation.normal_equations import LOOSE, Statistics, normal_equations, residual_std
 from auvnn.estimation.prediction_error import Fitted, fit
 from auvnn.estimation.priors import Priors, bounded_step, parameters_of, set_parameters
 from auvnn.estimation.sensitivity import Response
-from auvnn.estimation.simulated_windows import output_error
+from auvnn.estimation.window_normal_equations import LOOSE, Statistics, normal_equations, residual_std
+from auvnn.estimation.window_simulation import output_error
 from auvnn.logs import Log, Run
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import cut_windows

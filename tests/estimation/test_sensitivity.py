@@ -10,7 +10,7 @@ from torch.func import functional_call, vmap
 from auvnn.effects import EFFECTS
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.estimation.sensitivity import respond
-from auvnn.estimation.simulated_windows import output_error
+from auvnn.estimation.window_simulation import output_error
 from auvnn.logs import Log, Run
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import ACCELERATION, POSITION, cut_windows

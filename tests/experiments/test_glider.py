@@ -1,4 +1,4 @@
-"""The glider experiment: its files are sound, and the record is foretold where it is at hand."""
+"""The glider experiment: its files are sound, and the record is predicted where it is at hand."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_the_mapping_reads_what_a_glider_writes(tmp_path):
 
 
 def test_what_is_expected_holds_together():
-    """The README rests on these: depth rates foretold, no name, and a compressibility that the record cannot show."""
+    """The README rests on these: depth rates predicted, no name, and a compressibility that the record cannot show."""
     expected = json.loads((HERE / "expected.json").read_text())
     assert expected["fitted"]["depth_rate_r2"] >= 0.95 > expected["as_given"]["depth_rate_r2"]
     assert expected["diagnosis"]["verdict"] == "unknown" and not expected["diagnosis"]["missing"]
@@ -78,7 +78,7 @@ ABSENT = pytest.mark.skipif(
 
 @pytest.mark.data
 @ABSENT
-def test_mass_and_drag_of_one_half_foretell_the_other(study, tmp_path):
+def test_mass_and_drag_of_one_half_predict_the_other(study, tmp_path):
     expected = json.loads((HERE / "expected.json").read_text())
     first, second = study.halves(DATA, tmp_path)
     assert [len(first.runs), len(second.runs)] == expected["dives"]

@@ -48,7 +48,7 @@ def noted() -> Callable[..., str]:
         try:
             log = Log.read(path, mapping, **options)
         except AuvnnError as error:
-            pytest.fail(f"refused instead of mended: {error}")
+            pytest.fail(f"refused instead of corrected: {error}")
         found = [f for f in log.quality().findings if level in (None, f.level)]
         return "\n".join(f"{f.level}: {f.where}: {f.what}; {f.cure}" for f in found)
 

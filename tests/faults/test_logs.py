@@ -163,8 +163,8 @@ def test_row_45_degrees_for_radians_and_radians_for_degrees(refused, noted):
     fast = scaled(p=deg, q=deg, r=deg)
     assert "rad/s: in degrees? Mapping: rates: deg" in refused("check", f"log={put(fast)}")
     for mapping, cure in (
-        ({"rates": "deg"}, "mend with rates: rad (or angles: deg) in the mapping"),
-        ({"angles": "deg"}, "mend with rates: deg (or angles: rad) in the mapping"),
+        ({"rates": "deg"}, "correct with rates: rad (or angles: deg) in the mapping"),
+        ({"angles": "deg"}, "correct with rates: deg (or angles: rad) in the mapping"),
     ):
         found = noted(put(frame(RUN, euler=True)), mapping, level="error")
         assert all(f"error: {name}: {name} is" in found for name in "pqr") and found.count(cure) == 6
@@ -181,7 +181,9 @@ def test_row_46_another_frame_than_declared(noted, refused):
     for verb, more in (("diagnose", []), ("add", ["effect=ocean_current"]), ("train", [])):
         line = refused(verb, "model=four.yaml", "log=log.csv", *more)
         assert (
-            "opposite sign" in line and "mend with scale: -1 in the mapping" in line and "force=true" in line
+            "opposite sign" in line
+            and "correct with scale: -1 in the mapping" in line
+            and "force=true" in line
         )
     assert noted("log.csv", {"columns": {n: {"from": n, "scale": -1} for n in FLU}}, level="error") == ""
     up = frame(RUN).with_columns(-pl.col("z").alias("z")).drop("x", "y")

@@ -93,8 +93,8 @@ def test_row_33_a_sensor_with_another_clock(offset):
     assert float(finding.what.split("correlation ")[1].split()[0]) > 0.95 and "delay" in finding.cure
     low, high = (float(x) for x in finding.what.split("(")[1].split(")")[0].split(" to "))
     assert low <= offset <= high and high - low < 0.1
-    mended = read(log.runs[0], {"columns": {n: {"from": n, "delay": offset} for n in "uvw"}})
-    assert "clock" not in found(mended) and "error" not in found(mended)
+    corrected = read(log.runs[0], {"columns": {n: {"from": n, "delay": offset} for n in "uvw"}})
+    assert "clock" not in found(corrected) and "error" not in found(corrected)
 
 
 def test_row_33_a_clock_that_runs_too_fast():
@@ -288,7 +288,7 @@ def test_row_54_pressure_in_another_unit(factor, words, scale):
     log = with_z(factor * CLEAN.position[:, 2])
     text = found(log, "error")
     if factor > 0:
-        assert "error: z: z changes" in text and words in text and f"mend with scale: {scale}" in text
+        assert "error: z: z changes" in text and words in text and f"correct with scale: {scale}" in text
         assert "error: w" not in text, "the depth is at fault, not w"
         with pytest.raises(InputError, match="z changes"):
             log.quality().refuse_contradictions()

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import torch
 
-from auvnn.diagnosis.fitters import fitter_for
-from auvnn.diagnosis.hypotheses.bake import with_body
-from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.cross_validation.fitters import fitter_for
+from auvnn.diagnosis.hypotheses.put_into_model import with_body
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.errors import ConfigError, InputError
 from auvnn.improvement import add
 from auvnn.improvement.gains import paired_gain

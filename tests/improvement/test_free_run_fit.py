@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from auvnn.diagnosis.hypotheses.layout import lay_out, priors
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out, priors
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.improvement.free_run import Task, fit_free_run, normal_equations, predicted
 from auvnn.metrics.rollouts import scale_of

@@ -23,7 +23,7 @@ TODAY = 1_763_858_361.0
 
 @pytest.fixture(scope="module")
 def together() -> Log:
-    """Two runs of which each begins at nought: stamps every 0.05 s."""
+    """Two runs of which each begins at zero: stamps every 0.05 s."""
     hidden = {"payload": {"time": 9.0, "mass": 6.0, "z": 0.3, "buoyancy": 20.0}}
     return auvnn.simulate(
         auvnn.load("rov95"), "multisine", "realistic", hidden, 3, runs=2, duration=20.0, accelerations=False

@@ -98,7 +98,7 @@ def test_check_says_once_what_cannot_be_known_and_seals(auvnn, refused):
     table(make_run(400)).write_csv("a.csv")
     table(make_run(400, seed=1)).write_csv("b.csv")
     status, out, _ = auvnn("check", "log=[a.csv,b.csv]", "out=first")
-    assert status == 0 and out.count("no checksum in or beside a.csv, b.csv") == 1
+    assert status == 0 and out.count("no checksum in or next to a.csv, b.csv") == 1
     assert auvnn("check", "log=[a.csv,b.csv]", "seal=true", "out=second")[0] == 0
     status, out, _ = auvnn("check", "log=[a.csv,b.csv]", "out=third")
     assert status == 0 and "checksum" not in out

@@ -73,7 +73,7 @@ def log():
     return world()
 
 
-def test_a_linear_world_is_found_exactly_and_foreseen_by_another_integrator(log):
+def test_a_linear_world_is_found_exactly_and_predicted_by_another_integrator(log):
     found = Regression.of(log, "wrench", MEASURED)
     assert np.allclose(found.whole, coefficients(), atol=1e-6)
     windows = cut_windows(log, 5.0, 2.5, kind="wrench")

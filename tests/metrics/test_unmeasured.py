@@ -11,7 +11,7 @@ from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.prediction_error import fit
 from auvnn.estimation.priors import Priors
 from auvnn.logs import Log
-from auvnn.logs.without import without
+from auvnn.logs.without_sensors import without
 from auvnn.metrics.free_run import initial_states
 from auvnn.metrics.likely_states import likely_states
 from auvnn.metrics.rollouts import roll, scale_of

@@ -12,7 +12,7 @@ import torch
 from auvnn.errors import ConfigError, ModelError
 from auvnn.models import from_vehicle
 from auvnn.online import Adapter, Guards
-from auvnn.online.schemes.base import Lesson, OnlineScheme
+from auvnn.online.schemes.base import Observation, OnlineScheme
 from auvnn.online.updates.bounds import known_drag
 from tests.online.online_world import bare, driven, fed, parameters, vehicle, with_networks
 
@@ -26,7 +26,7 @@ class Wild(OnlineScheme):
     def __init__(self, step: float = 0.0) -> None:
         self.step = step
 
-    def propose(self, weights, lesson: Lesson):
+    def propose(self, weights, observation: Observation):
         return weights.read() + self.step
 
 
@@ -163,8 +163,8 @@ def test_row_109_drag_never_begins_to_add_energy(run):
     """A scheme that pushes all damping down: the whole drag still takes energy wherever the vehicle has been."""
 
     class Down(Wild):
-        def propose(self, weights, lesson):
-            return weights.read() - 0.5 * torch.sign(lesson.slope * lesson.nu[:, None])
+        def propose(self, weights, observation):
+            return weights.read() - 0.5 * torch.sign(observation.slope * observation.nu[:, None])
 
     adapter = Adapter(vehicle(), Down(), guards={"worse": 1.0}, watch=False)
     fed(adapter, run)
@@ -185,10 +185,10 @@ def test_row_110_an_update_that_makes_the_prediction_worse_is_taken_back(run):
     class Astray(Wild):
         """Learns nothing until it is told to go wrong, once."""
 
-        def propose(self, weights, lesson):
+        def propose(self, weights, observation):
             if not self.step:
                 return None
-            found, self.step = weights.read() + self.step * torch.sign(lesson.slope), 0.0
+            found, self.step = weights.read() + self.step * torch.sign(observation.slope), 0.0
             return found
 
     scheme = Astray()

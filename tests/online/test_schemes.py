@@ -9,13 +9,13 @@ import torch
 from auvnn.errors import ConfigError
 from auvnn.online import Adapter, frozen_errors
 from auvnn.online.residual import Predictor, Sample
-from auvnn.online.schemes.base import Lesson
+from auvnn.online.schemes.base import Observation
 from auvnn.online.schemes.rls import RLS
 from auvnn.online.updates.weights import Weights
 from tests.online.online_world import bare, driven, fed, vehicle, with_networks
 
 
-def lessons(weights: Weights, count: int, noise: float, seed: int = 0):
+def observations(weights: Weights, count: int, noise: float, seed: int = 0):
     """Yield (nu, target) of a law with another last layer, in the output scale."""
     generator = torch.Generator().manual_seed(seed)
     other = weights.read() + 0.01 * torch.randn(6, weights.width, generator=generator, dtype=torch.float64)
@@ -35,9 +35,9 @@ def test_rls_without_forgetting_is_batch_least_squares_with_a_prior():
     prior, start = scheme.state()["calm"].clone(), weights.read()
     hessian, slope_sum = torch.linalg.inv(prior), torch.zeros_like(start)
     variance = torch.full((6,), 0.1**2, dtype=torch.float64)
-    for k, (nu, target, slope) in enumerate(lessons(weights, 60, 0.1)):
+    for k, (nu, target, slope) in enumerate(observations(weights, 60, 0.1)):
         error = target - weights.value(nu)
-        found = scheme.propose(weights, Lesson(0.1 * k, 0.1, nu, target, error, slope, variance))
+        found = scheme.propose(weights, Observation(0.1 * k, 0.1, nu, target, error, slope, variance))
         if found is not None:
             weights.write(found)
         hessian = hessian + slope[:, :, None] * slope[:, None, :] / variance[:, None, None]

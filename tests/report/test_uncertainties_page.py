@@ -52,7 +52,7 @@ def test_the_page_says_what_was_found_and_draws_both_figures():
     # One of two is known on the paper's manoeuvre once networks are the damping, both without them.
     assert "identified with all uncertain at once: paper 2 of 2, multisine 2 of 2." in page.text
     assert "of those that are not damping: paper 0 of 1, multisine 1 of 1." in page.text
-    assert "swallow of an effect: paper 97 %, multisine 84 %." in page.text
+    assert "absorb of an effect: paper 97 %, multisine 84 %." in page.text
     assert "paper: 2 of 2 parameters are identified together" in page.text
 
 

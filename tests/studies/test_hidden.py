@@ -9,11 +9,11 @@ import pytest
 import torch
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.diagnosis.hypotheses.layout import has_stated_uncertainty, lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import has_stated_uncertainty, lay_out
 from auvnn.errors import ConfigError
-from auvnn.estimation.normal_equations import LOOSE
 from auvnn.estimation.priors import set_parameters
-from auvnn.estimation.simulated_windows import output_error
+from auvnn.estimation.window_normal_equations import LOOSE
+from auvnn.estimation.window_simulation import output_error
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.models import GreyBox, load
 from auvnn.simulation import simulate

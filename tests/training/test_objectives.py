@@ -12,7 +12,7 @@ import torch
 from auvnn.damping.bank import DampingBank
 from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.sensitivity import respond
-from auvnn.estimation.simulated_windows import output_error
+from auvnn.estimation.window_simulation import output_error
 from auvnn.metrics.free_run import initial_states
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.metrics.windows import cut_windows

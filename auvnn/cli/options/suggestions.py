@@ -1,4 +1,4 @@
-"""What somebody may have meant: overrides mended and keys that are alike."""
+"""What somebody may have meant: overrides corrected and keys that are alike."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from auvnn.errors import one_line
 _KEYED = re.compile(r"([A-Za-z_][\w./@]*)=(.*)", re.DOTALL)
 
 
-def mended(word: str) -> str:
+def corrected(word: str) -> str:
     """Quote a value that Hydra's grammar cannot take as it stands, such as a path with brackets in it."""
     match = _KEYED.fullmatch(word)
     if match is None or match[2][:1] in ("'", '"', "{"):

@@ -24,7 +24,7 @@ from auvnn.answers import write_text
 from auvnn.cli.faults import OK, outcome
 from auvnn.cli.options.compose import Composer
 from auvnn.cli.options.foreign import read_configs, write_configs
-from auvnn.cli.options.suggestions import mended, quoted
+from auvnn.cli.options.suggestions import corrected, quoted
 from auvnn.cli.options.words import Words
 from auvnn.cli.runs.folder import created, locked, refuse_taken, written
 from auvnn.cli.runs.job import Job, Verb, files
@@ -66,7 +66,7 @@ def _configs(given: str | None, stack: contextlib.ExitStack) -> tuple[dict[str, 
 
 def _run_verb(name: str, verb: Verb, words: Words, composer: Composer, configs: dict[str, str] | None) -> int:
     folder = [] if composer.folder is None else ["--config-dir", str(composer.folder)]
-    overrides = composer.checked([mended(w) for w in words.overrides], sweep=words.multirun)
+    overrides = composer.checked([corrected(w) for w in words.overrides], sweep=words.multirun)
     config = composer.compose(overrides)
     if words.shows:
         _hydra(name, [*words.flags, *folder, *overrides], lambda _: None)
@@ -164,8 +164,8 @@ def _run(verb: Verb, composer: Composer, config: DictConfig, out: Path) -> None:
             files({key: paths}, key)
     if options["dry_run"]:
         refuse_taken(out, overwrite=options["overwrite"])
-        if verb.foresee is not None:
-            verb.foresee(Job(options, out, out, say))
+        if verb.dry_run is not None:
+            verb.dry_run(Job(options, out, out, say))
         for key in verb.reads:
             if options[key] is not None:
                 say(f"would read   {key}={options[key]}")

@@ -8,7 +8,7 @@ from auvnn.cli.runs.job import Job, files
 from auvnn.errors import ConfigError
 
 
-def foreseen(job: Job, several: bool = False) -> None:
+def check_inputs(job: Job, several: bool = False) -> None:
     """Refuse what the verb itself would refuse, as far as that costs next to nothing.
 
     Read are the model, the mapping and the first rows of every log; names of effects and their parameters are looked up.

@@ -39,14 +39,14 @@ class Verb:
         reads: options that name a model, a log or another file, in the order in which they are read.
         writes: files and folders that it leaves in `out`.
         run: does it.
-        foresee: refuses, in a dry run, what `run` would refuse.
+        dry_run: refuses, before anything is computed, what `run` would refuse.
     """
 
     summary: str
     reads: tuple[str, ...]
     writes: tuple[str, ...]
     run: Callable[[Job], Answering]
-    foresee: Callable[[Job], None] | None = None
+    dry_run: Callable[[Job], None] | None = None
 
 
 @dataclass
@@ -109,11 +109,11 @@ class Job:
         return model
 
     def log(self, key: str = "log", *, repairs: bool = True, partial: bool = False) -> Log:
-        """Read the log of `log=`, or of another option, and say what was mended in it.
+        """Read the log of `log=`, or of another option, and say what was corrected in it.
 
         Args:
             key: the option.
-            repairs: whether to say what was mended.
+            repairs: whether to say what was corrected.
             partial: whether it may lack attitude or velocities altogether.
         """
         from auvnn.logs import Log

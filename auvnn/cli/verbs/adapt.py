@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from auvnn.cli.runs.dry import foreseen
+from auvnn.cli.runs.dry import check_inputs
 from auvnn.cli.runs.job import Answering, Job, Verb
 
 
@@ -46,5 +46,5 @@ VERB = Verb(
     reads=("log", "mapping", "model"),
     writes=("adaptation.json", "model/", "state/", "report.html", "figures/"),
     run=_run,
-    foresee=foreseen,
+    dry_run=check_inputs,
 )

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from auvnn.cli.runs.dry import foreseen
+from auvnn.cli.runs.dry import check_inputs
 from auvnn.cli.runs.job import Answering, Job, Verb
 
 
 def _run(job: Job) -> Answering:
-    from auvnn.comparison.beside import words
+    from auvnn.comparison.baseline import words
     from auvnn.diagnosis.answers.words import parameters
     from auvnn.improvement import add
 
@@ -37,9 +37,12 @@ def _run(job: Job) -> Answering:
     if data["accepted"] and minded:
         verdict = f"accepted, but mind: {'; '.join(dict.fromkeys(minded))}"
     for name, entry in data["by_effect"].items() if len(data["by_effect"]) > 1 else ():
-        own, pays = entry["gain"], "earns its place" if entry["accepted"] else "does not earn its place"
+        own, pays = (
+            entry["gain"],
+            "improves the prediction" if entry["accepted"] else "does not improve the prediction",
+        )
         fall = f"{own['value']:.4g} +- {own['std']:.2g}" if own["std"] else "unknown"
-        say(f"effect    {name} {pays} beside the others (fall of the held-out error: {fall})")
+        say(f"effect    {name} {pays} in addition to the others (fall of the held-out error: {fall})")
     say(f"result    {verdict} (fall from the refitted model: {gain})", style="bold")
     return better
 
@@ -49,5 +52,5 @@ VERB = Verb(
     reads=("log", "mapping", "model", "test"),
     writes=("improvement.json", "model/", "report.html", "figures/"),
     run=_run,
-    foresee=foreseen,
+    dry_run=check_inputs,
 )

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from auvnn.cli.notes import once
-from auvnn.cli.runs.dry import foreseen
+from auvnn.cli.runs.dry import check_inputs
 from auvnn.cli.runs.job import Answering, Job, Verb, files
 
 _STYLE = {"error": "red", "warning": "yellow"}
@@ -14,7 +14,7 @@ _STYLE = {"error": "red", "warning": "yellow"}
 
 def _looked(job: Job) -> list[dict[str, object]]:
     """Say what the topics of recordings hold and which mapping would read them; write it where that was asked."""
-    from auvnn.logs.look import look, write_mapping
+    from auvnn.logs.inspect_file import look, write_mapping
     from auvnn.logs.readers import choose
     from auvnn.logs.readers.recordings import RecordingReader
 
@@ -54,9 +54,9 @@ def _run(job: Job) -> Answering:
     quality = log.quality()
     if looked:
         quality = replace(quality, files=looked)
-    from auvnn.checks import blind, check_actuators
+    from auvnn.checks import check_actuators, unmeasured
 
-    quality = quality.with_notes("not measured", blind.words(log, job["model"] is not None))
+    quality = quality.with_notes("not measured", unmeasured.words(log, job["model"] is not None))
     if job["model"] is not None and not log.unmeasured:
         quality = quality.with_actuators(check_actuators(job.model(log), log))
     quality.write(job.folder)
@@ -75,5 +75,5 @@ def _run(job: Job) -> Answering:
 
 VERB = Verb(
     "quality report of a log: what was read, repaired, implausible, excited", ("log", "mapping", "model"),
-    ("quality.json", "report.html", "figures/"), _run, foresee=foreseen,
+    ("quality.json", "report.html", "figures/"), _run, dry_run=check_inputs,
 )  # fmt: skip

@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from auvnn.cli.results import horizons
-from auvnn.cli.runs.dry import foreseen
+from auvnn.cli.runs.dry import check_inputs
 from auvnn.cli.runs.job import Answering, Job, Verb
 
 
@@ -37,7 +37,7 @@ def _run(job: Job) -> Answering:
 
 def _say(job: Job, comparison: Any, warn: bool = True) -> None:
     """Say of one model what its report says first, then the numbers."""
-    from auvnn.comparison.beside import standing, words
+    from auvnn.comparison.baseline import standing, words
 
     data = comparison.to_dict()
     job.say(f"assumed   accelerations: {data['derivative']['method']}")
@@ -60,5 +60,5 @@ VERB = Verb(
     reads=("log", "mapping", "model"),
     writes=("comparison.json", "predictions.parquet", "report.html", "figures/"),
     run=_run,
-    foresee=partial(foreseen, several=True),
+    dry_run=partial(check_inputs, several=True),
 )

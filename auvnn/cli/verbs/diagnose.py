@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from auvnn.cli.runs.dry import foreseen
+from auvnn.cli.runs.dry import check_inputs
 from auvnn.cli.runs.job import Answering, Job, Verb, files
 from auvnn.errors import ConfigError
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def _run(job: Job) -> Answering:
-    from auvnn.comparison.beside import words
+    from auvnn.comparison.baseline import words
     from auvnn.logs.reading.portions import is_large
 
     parted = job["stream"]
@@ -73,5 +73,5 @@ VERB = Verb(
     reads=("log", "mapping", "model"),
     writes=("diagnosis.json", "report.html", "figures/"),
     run=_run,
-    foresee=foreseen,
+    dry_run=check_inputs,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from auvnn.cli.runs.dry import foreseen
+from auvnn.cli.runs.dry import check_inputs
 from auvnn.cli.runs.job import Answering, Job, Verb, files
 
 
@@ -31,5 +31,5 @@ VERB = Verb(
     reads=("log", "mapping", "model"),
     writes=("fleet.json", "report.html", "figures/"),
     run=_run,
-    foresee=foreseen,
+    dry_run=check_inputs,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from auvnn.cli.runs.dry import foreseen
+from auvnn.cli.runs.dry import check_inputs
 from auvnn.cli.runs.job import Answering, Job, Verb
 from auvnn.errors import ConfigError
 
@@ -45,5 +45,5 @@ VERB = Verb(
     reads=("log", "mapping", "model", "test"),
     writes=("improve.json", "model/", "history/", "report.html", "figures/"),
     run=_run,
-    foresee=foreseen,
+    dry_run=check_inputs,
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from auvnn.cli.runs.dry import foreseen
+from auvnn.cli.runs.dry import check_inputs
 from auvnn.cli.runs.job import Answering, Job, Verb
 
 
@@ -35,5 +35,5 @@ VERB = Verb(
     reads=("model",),
     writes=("model/",),
     run=_run,
-    foresee=foreseen,
+    dry_run=check_inputs,
 )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from auvnn.answers import plain, write_text
-from auvnn.cli.runs.dry import foreseen
+from auvnn.cli.runs.dry import check_inputs
 from auvnn.cli.runs.job import Answering, Job, Verb
 
 
@@ -20,7 +20,7 @@ class _Truth:
 
 
 def _run(job: Job) -> Answering:
-    from auvnn.logs.without import without
+    from auvnn.logs.without_sensors import without
     from auvnn.logs.writing import write_commands
     from auvnn.simulation import simulate
 
@@ -35,7 +35,7 @@ def _run(job: Job) -> Answering:
     without(made.log, job.names("without") if job["without"] else []).write(job.folder / "log.parquet")
     if job["commands"]:
         write_commands(made.log, job.folder / "commands.csv")
-        job.say("result    commands.csv holds what the vehicle is told to do, row by row")
+        job.say("result    commands.csv holds the commands of the vehicle, row by row")
     truth = _Truth(made.truth)
     write_text(job.folder / "truth.json", json.dumps(truth.to_dict(), indent=1, allow_nan=False))
     for name, values in made.truth["hidden"].items():
@@ -69,5 +69,5 @@ VERB = Verb(
     reads=("model",),
     writes=("log.parquet", "truth.json"),
     run=_run,
-    foresee=foreseen,
+    dry_run=check_inputs,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from auvnn.cli.runs.dry import foreseen
+from auvnn.cli.runs.dry import check_inputs
 from auvnn.cli.runs.folder import WORK
 from auvnn.cli.runs.job import Answering, Job, Verb, files
 from auvnn.cli.runs.working import take_away
@@ -75,5 +75,5 @@ def _options(job: Job) -> dict[str, Any]:
 
 VERB = Verb(
     "train the damping subnetworks on a log", ("log", "mapping", "model", "test"),
-    ("training.json", "model/", "report.html", "figures/"), _run, foresee=foreseen,
+    ("training.json", "model/", "report.html", "figures/"), _run, dry_run=check_inputs,
 )  # fmt: skip

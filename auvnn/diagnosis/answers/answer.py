@@ -29,7 +29,7 @@ class Diagnosis(Answer):
         missing: names to add, those that matter first; of an ambiguous verdict the rivals, as `OneOf`.
         matters: name to what it costs, how large its force is, and whether that is beyond the tolerance.
         nearest: names that explain a part and are not the cause; of a partial verdict those that predict.
-        joint: of a partial verdict, what each of these does beside the others.
+        joint: of a partial verdict, what each of these does in addition to the others.
         left: degree of freedom to the force without a name, and the smallest that this log would have shown.
         small_remainder: whether a force is left that does not matter.
         moved: stated coefficients that were moved by more than two of their standard deviations.
@@ -105,7 +105,7 @@ class Diagnosis(Answer):
     def judged_words(self) -> list[str]:
         """What each name costs and what is left, as plain sentences."""
         from auvnn.diagnosis.answers import judged_words
-        from auvnn.diagnosis.answers.moved import moved_words
+        from auvnn.diagnosis.answers.moved_coefficients import moved_words
 
         told = judged_words.predicts(self) if self.verdict == "partial" else judged_words.costs(self)
         return [*told, *judged_words.left(self), *moved_words(self.moved)]

@@ -10,13 +10,13 @@ import numpy as np
 from auvnn.diagnosis.advise import advise
 from auvnn.diagnosis.answers.answer import Diagnosis, OneOf
 from auvnn.diagnosis.answers.bounds import reservations
+from auvnn.diagnosis.answers.effect_costs import Worth, names_by_worth, worth
 from auvnn.diagnosis.answers.joint import joint
-from auvnn.diagnosis.answers.moved import moved
+from auvnn.diagnosis.answers.moved_coefficients import moved
 from auvnn.diagnosis.answers.table import fill_candidate
-from auvnn.diagnosis.answers.worth import Worth, names_by_worth, worth
 from auvnn.diagnosis.hypotheses.candidates import HORIZON, WARMUP
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import has_stated_uncertainty
+from auvnn.diagnosis.hypotheses.stated_priors import has_stated_uncertainty
 from auvnn.diagnosis.residuals.additive_force import additive_force_test
 from auvnn.diagnosis.residuals.attribution import attribute_residual
 from auvnn.diagnosis.residuals.variance_component import white
@@ -37,8 +37,8 @@ def answer(asked: Setting, state: State) -> Diagnosis:
     standing = [s for s in state.steps if s["verdict"] != "withdrawn" and not {*s["effects"]} <= gone]
     leading = standing[0] if standing else state.steps[-1]
     verdict = leading["verdict"]
-    beside = _beside(asked, state)
-    found = _worth(asked, state, beside, notes)
+    without = _fits_without(asked, state)
+    found = _worth(asked, state, without, notes)
     given = names_by_worth(given, found.names)
     # Of a leading group one member is to be added; what was found after it stands in the steps.
     missing = OneOf(leading["effects"]) if verdict == "ambiguous" else given
@@ -48,7 +48,7 @@ def answer(asked: Setting, state: State) -> Diagnosis:
         verdict=verdict,
         missing=missing,
         steps=[dict(s) for s in state.steps],
-        candidates=_candidates(asked, state, given, beside),
+        candidates=_candidates(asked, state, given, without),
         unexplained=_unexplained(state, verdict),
         depends_on=_depends(asked, state, verdict, notes),
         next_experiment=_next(asked, state, notes),
@@ -74,7 +74,7 @@ def answer(asked: Setting, state: State) -> Diagnosis:
     )
 
 
-def _beside(asked: Setting, state: State) -> dict[str, FittedHypothesis]:
+def _fits_without(asked: Setting, state: State) -> dict[str, FittedHypothesis]:
     """Return the fit without each name of the answer, everything else refitted."""
     found = {}
     for name in state.current.effects:
@@ -85,23 +85,23 @@ def _beside(asked: Setting, state: State) -> dict[str, FittedHypothesis]:
     return found
 
 
-def _worth(asked: Setting, state: State, beside: Mapping[str, FittedHypothesis], notes: list[str]) -> Worth:
+def _worth(asked: Setting, state: State, without: Mapping[str, FittedHypothesis], notes: list[str]) -> Worth:
     try:
-        return worth(asked, state, beside)
+        return worth(asked, state, without)
     except (np.linalg.LinAlgError, FloatingPointError):
         notes.append("what the names cost could not be worked out: free running leaves what is finite")
         return Worth()
 
 
 def _candidates(
-    asked: Setting, state: State, given: list[str], beside: Mapping[str, FittedHypothesis]
+    asked: Setting, state: State, given: list[str], without: Mapping[str, FittedHypothesis]
 ) -> list[dict[str, Any]]:
     """Return the table of candidates, those given first, then by their evidence."""
     table = dict(state.table)
     # What was tried alone at first has other values beside what was found since.
     for explanation in (e for group in state.groups for e in group):
         table = fill_candidate(asked.layout, table, explanation, state.first)
-    table = fill_candidate(asked.layout, table, state.current, state.first, beside)
+    table = fill_candidate(asked.layout, table, state.current, state.first, without)
     for name, reason in state.failed.items():
         if name not in state.current.effects:
             table[name] = {**table[name], "reason": reason}

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.answers.words import number
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout, shapes
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, shapes
 
 Array = NDArray[np.float64]
 # Share of a name's trace that other parameters must be able to imitate to be told; parameters that are told; and the

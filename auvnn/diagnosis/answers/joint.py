@@ -1,4 +1,4 @@
-"""What each of several names does beside the others, for names that predict without being the cause."""
+"""What each of several names does in addition to the others, for names that predict without being the cause."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from auvnn.diagnosis.answers.confounded import confounded_with
+from auvnn.diagnosis.answers.effect_costs import Worth
 from auvnn.diagnosis.answers.table import values
-from auvnn.diagnosis.answers.worth import Worth
 from auvnn.diagnosis.residuals.forces import AXES
 from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
 from auvnn.diagnosis.stages.state import Setting, State
@@ -32,7 +32,7 @@ def joint(asked: Setting, state: State, found: Worth) -> dict[str, dict[str, Any
     told = values(asked.layout, last, last.effects)
     out = {}
     for name in last.effects:
-        less = variance_component_test(found.beside[name], state.windows, noise).energy
+        less = variance_component_test(found.without[name], state.windows, noise).energy
         back = np.maximum(less, 0.0) - np.maximum(left, 0.0)
         with np.errstate(invalid="ignore", divide="ignore"):
             share = np.where(energy > 0.01 * energy.sum(), np.clip(back / energy, 0.0, 1.0), 0.0)

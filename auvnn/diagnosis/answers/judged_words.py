@@ -60,7 +60,7 @@ def predicts(diagnosis: Diagnosis) -> list[str]:
             gain = entry["gain"]
             verb = "lowers" if gain["value"] > 0 else "raises"
             words += (
-                f", and beside the others {verb} the error of free running on runs left out by "
+                f", and in addition to the others {verb} the error of free running on runs left out by "
                 f"{abs(gain['value']):.3g} +- {gain['std']:.2g}"
             )
         out.append(words + ".")
@@ -90,7 +90,9 @@ def left(diagnosis: Diagnosis) -> list[str]:
         told = _listed([f"{_size(by_axis[a]['rms'], a)} in {MOTIONS[a]}" for a in acting[:NAMED]])
         cost = diagnosis.left.get("cost")
         more = (
-            f"; the error of free running is {_change(cost)} beside the noise floor" if _known(cost) else ""
+            f"; the error of free running is {_change(cost)} compared with the noise floor"
+            if _known(cost)
+            else ""
         )
         return [f"What is left amounts to a force of {told} rms{more}."]
     return []

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.answers.describe_parameters import describe_parameters
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, standard_errors
-from auvnn.diagnosis.hypotheses.layout import Layout
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.residuals.autocorrelation import excess_variance
 from auvnn.diagnosis.score_tests.score import Score
 
@@ -71,7 +71,7 @@ def fill_candidate(
     table: Mapping[str, dict[str, Any]],
     explanation: FittedHypothesis,
     before: FittedHypothesis,
-    beside: Mapping[str, FittedHypothesis] | None = None,
+    without: Mapping[str, FittedHypothesis] | None = None,
 ) -> dict[str, dict[str, Any]]:
     """Return the table with the one-step figures of an explanation's effects replaced by those of its own fit.
 
@@ -80,7 +80,7 @@ def fill_candidate(
         table: the candidates.
         explanation: the fit.
         before: the fit without any effect.
-        beside: of several effects, the fits without each: what an effect does is what it does beside the others.
+        without: of several effects, the fits without each: what an effect does is what it does in addition to the others.
     """
     found, out = values(layout, explanation, explanation.effects), dict(table)
     whole = max(excess_variance(before, before), 1e-12)
@@ -88,13 +88,13 @@ def fill_candidate(
     for name in explanation.effects:
         own: dict[str, Any] = {"parameters": found[name]}
         count = before.left_out_count.sum()
-        if beside is None or name not in beside or beside[name] is before:
+        if without is None or name not in without or without[name] is before:
             own["cv_before"] = before.cv
         else:
-            own["cv_before"] = float(np.sqrt(max(_scaled_left_out(beside[name], before), 0.0) / count))
+            own["cv_before"] = float(np.sqrt(max(_scaled_left_out(without[name], before), 0.0) / count))
         own["cv_after"] = float(np.sqrt(max(after, 0.0) / count))
-        if beside is not None and name in beside:
-            fall = excess_variance(beside[name], before) - excess_variance(explanation, before)
+        if without is not None and name in without:
+            fall = excess_variance(without[name], before) - excess_variance(explanation, before)
             own["explained"] = float(np.clip(fall / whole, 0.0, 1.0))
         out[name] = {**out[name], **own}
     return out

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from auvnn.diagnosis.answers import judged_words
-from auvnn.diagnosis.answers.moved import moved_words
+from auvnn.diagnosis.answers.moved_coefficients import moved_words
 from auvnn.diagnosis.noise_law.words import stochastic_words
 from auvnn.effects import EFFECTS
 

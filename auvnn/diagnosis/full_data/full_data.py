@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.answers.describe_parameters import describe_parameters
 from auvnn.diagnosis.full_data.map_reduce import LinearisationPoint, MapReduce
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import DETERMINED, Layout
+from auvnn.diagnosis.hypotheses.stated_priors import DETERMINED, Layout
 from auvnn.diagnosis.residuals.autocorrelation import slower_than_white
 from auvnn.diagnosis.score_tests.probes import Probed
 from auvnn.diagnosis.score_tests.score import Score, following, projection, score_from_sums
 from auvnn.diagnosis.score_tests.variance_inflation import ratio
 from auvnn.effects import Extent
-from auvnn.estimation.nuisance import NormalEquations
+from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
 from auvnn.estimation.sufficient_statistics import Combination, WindowSums
 from auvnn.log_chunks.scan import WindowCut

@@ -33,7 +33,7 @@ from auvnn.diagnosis.diagnose import searched
 from auvnn.diagnosis.full_data.full_data import Refit, ScoreTests, refit, score_tests
 from auvnn.diagnosis.full_data.map_reduce import LinearisationPoint, MapReduce
 from auvnn.diagnosis.hypotheses.candidates import HORIZON, WARMUP, check_window_length
-from auvnn.diagnosis.hypotheses.layout import Layout, lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, lay_out
 from auvnn.diagnosis.score_tests.null_tests import bonferroni
 from auvnn.diagnosis.stages.state import Searched
 from auvnn.errors import ConfigError, InputError

@@ -8,13 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.hypotheses.layout import DETERMINED, Layout, correlation_root, priors, scales, shapes
 from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
+from auvnn.diagnosis.hypotheses.stated_priors import (
+    DETERMINED,
+    Layout,
+    correlation_root,
+    priors,
+    scales,
+    shapes,
+)
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
-from auvnn.estimation.normal_equations import Statistics
-from auvnn.estimation.nuisance import NormalEquations
+from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.prediction_error import Fitted
 from auvnn.estimation.priors import Priors
+from auvnn.estimation.window_normal_equations import Statistics
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
@@ -68,7 +75,7 @@ def plausible(
 ) -> Priors:
     """Return the priors of a fit with the effects asked for within what is plausible of them.
 
-    What is left out may be all that says anything of a parameter. It is then not foreseen anywhere, but where the
+    What is left out may be all that says anything of a parameter. It is then not predicted anywhere, but where the
     evidence looks for it too; a shape near where it was found.
 
     Args:

@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from auvnn.estimation.simulated_windows import window_error
+from auvnn.estimation.window_simulation import window_error
 from auvnn.metrics.free_run import predict
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox

@@ -12,11 +12,11 @@ import numpy as np
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.command_holding import Holding, holding, squared_error
-from auvnn.diagnosis.noise_law.foretold import Foretold, foretold
-from auvnn.diagnosis.noise_law.hypothesis import BesideForce, under_its_law
-from auvnn.diagnosis.noise_law.law import ALPHA_BOUNDARY
+from auvnn.diagnosis.noise_law.estimate_law import ALPHA_BOUNDARY
+from auvnn.diagnosis.noise_law.hypothesis import WithForce, under_its_law
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
 from auvnn.diagnosis.noise_law.noise_colour import Colour, noise_colour
+from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction, predicted_by_inputs
 from auvnn.diagnosis.noise_law.search import UNSOLVED, ForceSearch
 from auvnn.diagnosis.noise_law.words import left
 from auvnn.diagnosis.residuals.forces import actuators_of, share_of
@@ -26,21 +26,21 @@ from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.diagnosis.stages.what_is_left import settled
 from auvnn.metrics.force_law import ForceLaw
 
-# Share of a degree of freedom's force that measured inputs may foretell (lower 95 % limit) before it is no noise.
-FORETOLD = 0.1
+# Share of a degree of freedom's force that measured inputs may predict (lower 95 % limit) before it is no noise.
+PREDICTABLE = 0.1
 # Share of the force beyond which a name has left most of it.
 MOST = 0.5
 # A stochastic force beyond this share of the actuators' is no disturbance: the model lacks what moves the vehicle.
 LARGEST, SECOND = 0.5, 1.0
 UNDECIDED = (
-    "names were not compared beside a stochastic force: with one, free running grows without bound; "
+    "names were not compared together with a stochastic force: with one, free running grows without bound; "
     "choose shorter windows with window="
 )
 # Standard errors of a one-sided limit that holds in 19 of 20 logs.
 ONE_SIDED = 1.645
 
 
-def beside_what_is_left(asked: Setting, state: State) -> tuple[State, dict[str, Any], list[str]]:
+def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, Any], list[str]]:
     """Return where the search stands once what is left has been asked for, what was found of it, and words.
 
     Args:
@@ -68,14 +68,14 @@ def beside_what_is_left(asked: Setting, state: State) -> tuple[State, dict[str, 
         # With all names nothing significant is left: those that predict alone decide whether there is.
         state = settled(asked, state)
     try:
-        beside = _beside_force(asked, state)
+        beside = _with_force(asked, state)
     except UNSOLVED:
         # The first answer stands: it did not need what could not be solved here.
         return state, told, [UNDECIDED]
     if beside is None:
         return state, told, []
-    state, law, foreknown = beside
-    return state, {**told, "force": left(law)}, [] if foreknown is None else [_words(foreknown)]
+    state, law, predicted = beside
+    return state, {**told, "force": left(law)}, [] if predicted is None else [_words(predicted)]
 
 
 def _held(state: State) -> tuple[FittedHypothesis, Holding]:
@@ -93,8 +93,8 @@ def _held(state: State) -> tuple[FittedHypothesis, Holding]:
     return state.first, Holding("held", 0.0, 0.0, 0.0)
 
 
-def _beside_force(asked: Setting, state: State) -> tuple[State, ForceLaw | None, Foretold | None] | None:
-    """Return where a search beside the stochastic force ends, the law, and what measured inputs foretell of it.
+def _with_force(asked: Setting, state: State) -> tuple[State, ForceLaw | None, InputPrediction | None] | None:
+    """Return where a search beside the stochastic force ends, the law, and what measured inputs predict of it.
 
     None where there is no such force.
     """
@@ -107,14 +107,14 @@ def _beside_force(asked: Setting, state: State) -> tuple[State, ForceLaw | None,
         return None
     alone = fitted_alone(asked, state)
     result = beside.run(null, alone, asked.most)
-    told = _foretold(asked, result)
-    if told is not None and not asked.tolerance.strict:
-        # What inputs foretell has a cause: one that costs little is taken where nothing is foretold beside it.
+    predicted = _predictable(asked, result)
+    if predicted is not None and not asked.tolerance.strict:
+        # What inputs predict has a cause: one that costs little is taken where nothing is predicted beside it.
         beside.ignores_cost = True
         again = beside.run(null, alone, asked.most)
-        if _foretold(asked, again) is None:
-            result, told = again, None
-    return _state(asked, state, result, chance=told is None), result.estimate.law, told
+        if _predictable(asked, again) is None:
+            result, predicted = again, None
+    return _state(asked, state, result, chance=predicted is None), result.estimate.law, predicted
 
 
 def _leaves_force(asked: Setting, state: State, end: FittedHypothesis) -> bool:
@@ -122,15 +122,15 @@ def _leaves_force(asked: Setting, state: State, end: FittedHypothesis) -> bool:
     return variance_component_test(end, state.windows, noise).p_value < ALPHA_BOUNDARY
 
 
-def _foretold(asked: Setting, result: BesideForce) -> Foretold | None:
-    """Return what measured inputs foretell of the force, None where that is little."""
-    asked.say("asking how much of the force measured inputs foretell")
-    told = foretold(under_its_law(result.last), result.windows)
-    return None if told is None or told.least <= FORETOLD else told
+def _predictable(asked: Setting, result: WithForce) -> InputPrediction | None:
+    """Return what measured inputs predict of the force, None where that is little."""
+    asked.say("asking how much of the force measured inputs predict")
+    predicted = predicted_by_inputs(under_its_law(result.last), result.windows)
+    return None if predicted is None or predicted.least <= PREDICTABLE else predicted
 
 
-def _state(asked: Setting, state: State, result: BesideForce, *, chance: bool) -> State:
-    """Return the state with what was found beside the force in the place of what the first search found."""
+def _state(asked: Setting, state: State, result: WithForce, *, chance: bool) -> State:
+    """Return the state with what was found together with the force in the place of what the first search found."""
     law, windows = result.estimate.law, state.windows
     small = chance and negligible(asked, state, law)
     table = state.table
@@ -146,7 +146,7 @@ def _state(asked: Setting, state: State, result: BesideForce, *, chance: bool) -
         "effects": [],
         "p_value": state.p_value,
     }
-    # What is left beside the names is stochastic, and told as such; or it has no name, and is unknown.
+    # What is left beside the names is stochastic, and reported as such; or it has no name, and is unknown.
     steps = [*named, end] if small or not (chance and named) else named
     before = [e for s in state.steps for e in s["effects"]]
     return state.but(
@@ -207,14 +207,14 @@ def negligible(asked: Setting, state: State, law: ForceLaw | None) -> bool:
     return bool(np.isfinite(share).all() and (share < asked.tolerance.force).all())
 
 
-def _words(told: Foretold) -> str:
+def _words(predicted: InputPrediction) -> str:
     return (
-        f"{told.input} predicts {told.share:.0%} of the force in {told.axis} that is left "
-        f"(at least {told.least:.0%}): it is not stochastic, and has no name"
+        f"{predicted.input} predicts {predicted.share:.0%} of the force in {predicted.axis} that is left "
+        f"(at least {predicted.least:.0%}): it is not stochastic, and has no name"
     )
 
 
-def _share_left(result: BesideForce) -> float:
+def _share_left(result: WithForce) -> float:
     """Return the stochastic force's share of what was above noise before any name."""
     before, law = result.first_law, result.estimate.law
     if law is None or before is None:

@@ -6,7 +6,7 @@ delay. What moves the vehicle over an interval is the mean of the command, and t
 
     (1 - share) u_k + share u_(k+1):
 
-a share of nought holds the command, one half is the straight line, anything between nought and one a command that
+a share of zero holds the command, one half is the straight line, anything between zero and one a command that
 changes so much of an interval before its sample. Where the command bends much within an interval, the straight line
 falls short: `smooth` is the mean of the cubic through four samples, over the interval that the share moves in the same
 way. Commands that change later than logged are another matter: that is `actuation_delay`. The log is asked by the
@@ -27,7 +27,7 @@ from torch import Tensor
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.diagnosis.selection.model_comparison import ODDS
-from auvnn.estimation.normal_equations import linearise, normal_equations
+from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ class Holding:
     Attributes:
         name: "held", "linear", "ahead" or "smooth".
         share: of the next sample's command in an interval's mean.
-        odds: logarithm of the odds against holding; nought where it is held.
+        odds: logarithm of the odds against holding; zero where it is held.
         gain: fall of the weighted squared error, for the variance that the windows show.
     """
 
@@ -102,7 +102,7 @@ def cubic_weights(share: float) -> tuple[float, ...]:
 def holding(first: FittedHypothesis, windows: Windows) -> Holding:
     """Ask how commands go from sample to sample.
 
-    The squared error is taken as a parabola of the share, through nought, one half and one.
+    The squared error is taken as a parabola of the share, through zero, one half and one.
 
     Args:
         first: a fit of commands that are held.
@@ -133,7 +133,7 @@ def holding(first: FittedHypothesis, windows: Windows) -> Holding:
 
 
 def _vertex(name: str, costs: tuple[float, float, float], plain: float) -> Holding | None:
-    """Return the share at which a parabola through the costs at nought, one half and one is least, None without one."""
+    """Return the share at which a parabola through the costs at zero, one half and one is least, None without one."""
     bend = 2.0 * (costs[0] - 2.0 * costs[1] + costs[2])
     if not bend > 0.0:
         return None

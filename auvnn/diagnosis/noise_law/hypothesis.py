@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout, correlation_root, scales, shapes
-from auvnn.diagnosis.noise_law.law import Estimate, Likelihood, estimate
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, correlation_root, scales, shapes
+from auvnn.diagnosis.noise_law.estimate_law import Estimate, Likelihood, estimate
 from auvnn.diagnosis.noise_law.sums import ForceSums
 from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS
 from auvnn.effects import effect_class
@@ -52,8 +52,8 @@ class Hypothesis:
 
 
 @dataclass(frozen=True)
-class BesideForce:
-    """What was found beside a stochastic force.
+class WithForce:
+    """What was found together with a stochastic force.
 
     Attributes:
         steps: of the search.

@@ -1,4 +1,4 @@
-"""What the first search has found, each effect by itself: candidates of the search beside a stochastic force.
+"""What the first search has found, each effect by itself: candidates of the search together with a stochastic force.
 
 An effect of another shape (a wave's period, the moment of a payload) is seldom where its slope at the null points. The
 first search may have found it beside others only; its values there are where a fit by itself begins.

@@ -1,10 +1,10 @@
-"""Names beside a stochastic force: explanations are compared again, each with the law that is most likely with it.
+"""Names together with a stochastic force: explanations are compared again, each with the law that is most likely with it.
 
 Where no force is left, nothing here is asked and the answer is that of the search without one. Else the law of the
 force is estimated at the fit without any name. An effect that is absent from the model inflates the variance that then
 hides it: those that lead with the variance at zero, which the first search has fitted in full, are therefore compared
 with those that lead under the law. Each explanation is judged by its marginal likelihood at its own law, forces and
-initial states integrated out and its parameters following the law, and by how well it foresees runs left out.
+initial states integrated out and its parameters following the law, and by how well it predicts runs left out.
 
 Reference: Kristensen, Madsen and Joergensen (2004), Automatica 40(2) 225-237.
 """
@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, folds, left_out
-from auvnn.diagnosis.hypotheses.layout import Layout, initial_guess, shapes
-from auvnn.diagnosis.noise_law.hypothesis import BesideForce, Hypothesis, judged, p_value_of, tied
-from auvnn.diagnosis.noise_law.law import estimate
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, shapes
+from auvnn.diagnosis.noise_law.estimate_law import estimate
+from auvnn.diagnosis.noise_law.hypothesis import Hypothesis, WithForce, judged, p_value_of, tied
 from auvnn.diagnosis.noise_law.sums import CELL, force_sums
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.score_tests.score import Score
@@ -30,10 +30,10 @@ from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.diagnosis.selection.predictive_density import cross_validated_log_density
 from auvnn.diagnosis.stages.state import Setting
-from auvnn.estimation.normal_equations import linearise, normal_equations
+from auvnn.estimation.initial_states import fit_initial_states
 from auvnn.estimation.prediction_error import SINGULAR, FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
-from auvnn.estimation.sufficient_statistics import fit_initial_states
+from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.metrics.force_law import ForceLaw, cell_for
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.metrics.windows import Windows
@@ -45,7 +45,7 @@ UNSOLVED = (FitError, np.linalg.LinAlgError, SINGULAR)
 # A name is given where chance would seldom do as well among all effects that were asked for; a further one on
 # stronger grounds, because each time chance gets another turn.
 ALPHA_NAME, ALPHA_FURTHER = 0.01, 0.001
-# Standard errors by which runs left out must be foreseen better.
+# Standard errors by which runs left out must be predicted better.
 GAIN, GAIN_FURTHER = 1.0, 2.0
 # Fitted in full beside those that the first search has fitted: so many of those that lead under the law.
 LEADERS = 3
@@ -62,7 +62,7 @@ FIRST_COST, FURTHER_COST, FURTHER_SHARE = 0.5, 1.0, 0.1
 
 
 class ForceSearch:
-    """The search beside a stochastic force, of one log.
+    """The search together with a stochastic force, of one log.
 
     Args:
         asked: what is asked.
@@ -112,7 +112,7 @@ class ForceSearch:
         except UNSOLVED:
             return None
 
-    def run(self, null: Hypothesis, fitted: Sequence[FittedHypothesis], most: int) -> BesideForce:
+    def run(self, null: Hypothesis, fitted: Sequence[FittedHypothesis], most: int) -> WithForce:
         """Search for one effect after the other.
 
         Args:
@@ -132,7 +132,7 @@ class ForceSearch:
             remaining = [n for n in self.usable if n not in chosen and n not in grouped]
             if not remaining:
                 break
-            self.say(f"testing {len(remaining)} effects beside the force")
+            self.say(f"testing {len(remaining)} effects together with the force")
             base = [*self.base, *[c for c in chosen if c not in self.base]]
             tested = NullTests(self.layout, replace(self.windows, law=law), self.say)(
                 current.weighed, remaining, base, chosen
@@ -155,7 +155,7 @@ class ForceSearch:
                 for h in found
                 if h.evidence > current.evidence + odds
                 and sure[h.name] < level
-                and foresees(h, current, least)
+                and predicts_better(h, current, least)
                 and (self.ignores_cost or self._cost(h, current) > cost * self.tolerance.cost)
             ]
             if not good:
@@ -172,7 +172,7 @@ class ForceSearch:
             chosen.append(group[0].name)
         law = current.estimate.law
         assert law is not None
-        return BesideForce(
+        return WithForce(
             steps,
             groups,
             current.explanation,
@@ -214,7 +214,7 @@ class ForceSearch:
         self, name: str, score: Score, at: Layout, current: Hypothesis, base: list[str], chosen: list[str]
     ) -> FittedHypothesis | None:
         """Return an effect fitted from what its test estimates, or from nearer its null; None where every fit fails."""
-        self.say(f"fitting {name} beside the force")
+        self.say(f"fitting {name} together with the force")
         known, start = parameters_of(at.model, [name]), initial_guess(self.layout, name, score.estimate)
         shape = shapes(self.layout, name)
         for share in (1.0, 0.1):
@@ -283,11 +283,11 @@ class ForceSearch:
         )
 
 
-def foresees(after: Hypothesis, before: Hypothesis, least: float) -> bool:
-    """Whether runs left out are foreseen better, by so many standard errors of the gain.
+def predicts_better(after: Hypothesis, before: Hypothesis, least: float) -> bool:
+    """Whether runs left out are predicted better, by so many standard errors of the gain.
 
     Args:
-        after: hypothesis that is to foresee better.
+        after: hypothesis that is to predict better.
         before: hypothesis that it is compared with.
         least: standard errors that the gain must exceed.
     """

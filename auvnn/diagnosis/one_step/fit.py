@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FOLDS, FittedHypothesis, left_out
-from auvnn.diagnosis.hypotheses.layout import Layout, priors
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, priors
 from auvnn.estimation.one_step_error import fit_one_step
 from auvnn.estimation.prediction_error import Fitted
 from auvnn.estimation.priors import set_parameters

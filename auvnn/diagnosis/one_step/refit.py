@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.hypotheses.layout import FREE, Layout, lay_out, priors, scales
+from auvnn.diagnosis.hypotheses.stated_priors import FREE, Layout, lay_out, priors, scales
 from auvnn.diagnosis.one_step.slopes import AccelerationSlopes, extent_of_log
 from auvnn.diagnosis.one_step.weighted_fit import left_out, parts, solve, weights
 from auvnn.effects import effect_class
 from auvnn.errors import InputError
-from auvnn.estimation.nuisance import carry_of
+from auvnn.estimation.nuisance_elimination import carry_of
 from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
 from auvnn.logs import Log
 from auvnn.metrics.derivative import Derivative

@@ -17,12 +17,12 @@ from scipy.linalg import block_diag
 from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout, shapes
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, shapes
 from auvnn.diagnosis.residuals.input_forces import AXES, InputForces
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
-from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
-from auvnn.estimation.nuisance import NormalEquations
+from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.sensitivity import Response
+from auvnn.estimation.window_normal_equations import Statistics, linearise, normal_equations
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
@@ -110,7 +110,7 @@ def _by_part(
     """
     fitted = explanation.fitted
     model, known = fitted.model, len(fitted.theta)
-    asked = model.beside(probe)
+    asked = model.extended_by(probe)
     columns = [np.concatenate([np.arange(known), known + probe.columns(i)]) for i in range(6)]
     begin = 0
     for answer in linearise(asked, windows, fitted.initial, [*explanation.names, str(probe.name)]):
@@ -219,7 +219,7 @@ def _need(sums: _ForceSums, layout: Layout, own: NDArray[np.int64], scale: Array
         return 0.0
     wanted, null = wanted[kept], null[kept]
     free = np.concatenate([inside, own])
-    # Of the force as little is assumed as keeps what the log does not see at nought.
+    # Of the force as little is assumed as keeps what the log does not see at zero.
     precision = np.asarray(block_diag(sums.precision, np.diag(1e-4 * scale**-2.0)))
     pull = np.concatenate([sums.pull, np.zeros(len(own))])
     known = sums.held(free, precision, pull).part(free)

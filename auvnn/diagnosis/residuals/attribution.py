@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out
 from auvnn.diagnosis.residuals.autocorrelation import excess_variance
 from auvnn.diagnosis.residuals.input_forces import AXES, InputForces
-from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
+from auvnn.estimation.window_normal_equations import Statistics, linearise, normal_equations
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ def attribute_residual(explanation: FittedHypothesis, windows: Windows) -> dict[
         return found
     probe = InputForces(fitted.model, windows)
     model = fitted.model
-    asked = model.beside(probe)
+    asked = model.extended_by(probe)
     names = [*explanation.names, str(probe.name)]
     sums, _, _ = normal_equations(windows, linearise(asked, windows, fitted.initial, names), fitted.sigma)
     sums = sums.finite()
@@ -72,5 +72,5 @@ def _left(
     fitted = explanation.fitted
     known = len(fitted.theta)
     own = np.array([c - known for c in columns if c >= known], dtype=int)
-    held = fitted.priors.beside(scale[own] ** -2.0)
+    held = fitted.priors.extended_by(scale[own] ** -2.0)
     return left_out(sums.columns(columns), np.concatenate([fitted.theta, np.zeros(len(own))]), held, fold)

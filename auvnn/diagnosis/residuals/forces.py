@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.estimation.simulated_windows import Thrust, substeps_of
+from auvnn.estimation.window_simulation import Thrust, substeps_of
 from auvnn.metrics.free_run import predict
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox

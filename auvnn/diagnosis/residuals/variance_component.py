@@ -2,7 +2,7 @@
 
 Effects that have a name are tested one by one; what has none may hide from all of them. Here nothing is assumed of a
 force but that it is smooth: in every window and degree of freedom it is a Fourier series of its own, and the score test
-for the variance of its coefficients asks whether they are all nought. No measured input is asked to explain it.
+for the variance of its coefficients asks whether they are all zero. No measured input is asked to explain it.
 Reference: Verbeke and Molenberghs (2003), Biometrics 59(2) 254-262 (score tests of variances); Satterthwaite (1946),
 Biometrics Bulletin 2(6) 110-114 (the approximate distribution of a sum of weighted squares).
 """
@@ -21,7 +21,7 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.residuals.input_forces import AXES
 from auvnn.diagnosis.residuals.unnamed_size import Size, sizes, taken_out
 from auvnn.effects import Body, Effect, Moment, Parameter
-from auvnn.estimation.normal_equations import linearise, normal_equations
+from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 
@@ -116,7 +116,7 @@ def variance_component_test(explanation: FittedHypothesis, windows: Windows, sig
     model = fitted.model
     times = windows.times[:, windows.warmup :]
     probe = VarianceComponents(model, float((times[:, -1] - times[:, 0]).max()))
-    asked = model.beside(probe)
+    asked = model.extended_by(probe)
     names = [*explanation.names, str(probe.name)]
     sums, _, _ = normal_equations(windows, linearise(asked, windows, fitted.initial, names), sigma)
     sums = sums.finite()

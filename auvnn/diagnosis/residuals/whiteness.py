@@ -20,9 +20,9 @@ from torch import Tensor
 
 from auvnn.comparison.locate import AXES
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.estimation.normal_equations import LOOSE
 from auvnn.estimation.sensitivity import respond
-from auvnn.estimation.simulated_windows import simulate_windows
+from auvnn.estimation.window_normal_equations import LOOSE
+from auvnn.estimation.window_simulation import simulate_windows
 from auvnn.metrics.windows import VELOCITY, Windows
 from auvnn.models import GreyBox
 
@@ -106,7 +106,7 @@ def residual_tests(explanation: FittedHypothesis, windows: Windows, draws: int =
     count = int(min(LAGS, length // 2, max(2, round(LONGEST / max(step, 1e-9)))))
     generator = torch.Generator().manual_seed(0)
     weight = torch.as_tensor(np.where(np.isfinite(fitted.sigma), 1.0 / fitted.sigma, 0.0))
-    # A channel that does not count would only be multiplied by nought.
+    # A channel that does not count would only be multiplied by zero.
     live = torch.nonzero(weight).flatten()
     weight = weight[live]
     loose = torch.diag(torch.as_tensor(1.0 / LOOSE))

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.score_tests.probes import Probed, extent_of, probed
 from auvnn.diagnosis.score_tests.score import Score, similarity
 from auvnn.diagnosis.score_tests.shape_search import ShapeSearch
 from auvnn.diagnosis.selection.choose import ALPHA
-from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
 from auvnn.estimation.priors import set_parameters
+from auvnn.estimation.window_normal_equations import Statistics, linearise, normal_equations
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]

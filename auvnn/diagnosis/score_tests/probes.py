@@ -21,11 +21,11 @@ from torch import Tensor, nn
 from torch.func import functional_call
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout, one_sided, shapes
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, one_sided, shapes
 from auvnn.diagnosis.score_tests.score import Score, score
 from auvnn.effects import Body, Effect, Extent, Moment, Sensed, effect_class
 from auvnn.estimation.linear_effects import LinearEffect
-from auvnn.estimation.normal_equations import Statistics, linearise, normal_equations
+from auvnn.estimation.window_normal_equations import Statistics, linearise, normal_equations
 from auvnn.metrics.windows import POSITION, Windows
 from auvnn.models import GreyBox
 

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from auvnn.diagnosis.hypotheses.layout import DETERMINED, FREE, Layout, priors, scales
+from auvnn.diagnosis.hypotheses.stated_priors import DETERMINED, FREE, Layout, priors, scales
 from auvnn.diagnosis.score_tests.variance_inflation import TINY, variance_inflation
-from auvnn.estimation.normal_equations import Statistics
-from auvnn.estimation.nuisance import NormalEquations, carry_of
+from auvnn.estimation.nuisance_elimination import NormalEquations, carry_of
 from auvnn.estimation.priors import parameters_of
+from auvnn.estimation.window_normal_equations import Statistics
 
 Array = NDArray[np.float64]
 # Information on a parameter in units of its plausible scale that leaves it no better known than its prior does.

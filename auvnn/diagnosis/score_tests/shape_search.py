@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout, initial_guess
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess
 from auvnn.diagnosis.score_tests.probes import Probed, extent_of, narrowed, null_is_no_start, probed
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.effects import Extent, effect_class

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, log_evidence
-from auvnn.diagnosis.hypotheses.layout import Layout, initial_guess, shapes
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, shapes
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.model_comparison import ALPHA_NEEDED, ODDS, ModelComparison
 from auvnn.diagnosis.selection.predictive_density import improves_predictive_density

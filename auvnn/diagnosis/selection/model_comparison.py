@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, log_evidence
-from auvnn.diagnosis.hypotheses.layout import Layout
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.effects import effect_class
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters

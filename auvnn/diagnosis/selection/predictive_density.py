@@ -6,24 +6,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds
-from auvnn.estimation.nuisance import NormalEquations
+from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.priors import limits
 
 Array = NDArray[np.float64]
 
 
 def improves_predictive_density(after: FittedHypothesis, before: FittedHypothesis) -> bool:
-    """Whether what was left out is foreseen better by more than the gain's own uncertainty."""
+    """Whether what was left out is predicted better by more than the gain's own uncertainty."""
     gain = cross_validated_log_density(before) - cross_validated_log_density(after)
     return float(gain.sum()) > float(np.sqrt(len(gain)) * gain.std(ddof=1))
 
 
 def cross_validated_log_density(explanation: FittedHypothesis) -> Array:
-    """Return how well each window was foreseen: minus twice its log predictive density, up to a constant, (B,).
+    """Return how well each window was predicted: minus twice its log predictive density, up to a constant, (B,).
 
-    A fold of runs is left out, its windows foreseen one after the other, each from the other folds and from those
+    A fold of runs is left out, its windows predicted one after the other, each from the other folds and from those
     before it: the terms of a fold sum to its joint density. What the others leave open of the parameters is part of
-    what they foresee, so that one window that alone says something of a parameter is neither held against an effect
+    what they predict, so that one window that alone says something of a parameter is neither held against an effect
     nor taken for it: with a guess put in place of what they leave open, it outweighed the gain in all others.
 
     References: Geisser and Eddy (1979), JASA 74(365) 153-160 (predictive densities of what is left out); Dawid (1984),

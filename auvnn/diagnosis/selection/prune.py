@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, log_evidence
-from auvnn.diagnosis.hypotheses.layout import Layout
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
 from auvnn.estimation.prediction_error import FitError

@@ -1,4 +1,4 @@
-"""Names that predict without being the cause: which of them stay in the fit, and what each is worth beside the others."""
+"""Names that predict without being the cause: which of them stay in the fit, and what each adds to the others."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.estimation.prediction_error import FitError
 
 # Share of the error's excess over the noise floor that names must remove together; and standard errors that each must
-# gain beside the others.
+# gain in addition to the others.
 JOINTLY, EACH = 0.2, 2.0
 
 
 def kept(asked: Setting, state: State, names: Sequence[str]) -> FittedHypothesis | None:
-    """Return the joint fit of those names that earn their place, or None where they do not together.
+    """Return the joint fit of those names that improve the prediction, or None where they do not together.
 
-    Each must foresee what is left out better by more than two standard errors beside the others, with no parameter at a
-    bound, in a fit that has settled. One that does not is taken out, the least first, and the others are fitted again.
+    Each must predict what is left out better by more than two standard errors in addition to the others, in a fit that
+    has settled, with no parameter at a bound. One that does not is taken out, the least first, and the others are fitted
+    again.
 
     Args:
         asked: what was asked.
@@ -81,7 +82,7 @@ def without(asked: Setting, state: State, found: FittedHypothesis, name: str) ->
 
 
 def _errors(found: FittedHypothesis, other: FittedHypothesis) -> float:
-    """Return by how many of its standard errors a fit foresees what is left out better than another one."""
+    """Return by how many of its standard errors a fit predicts what is left out better than another one."""
     gain = cross_validated_log_density(other) - cross_validated_log_density(found)
     spread = float(np.sqrt(len(gain)) * gain.std(ddof=1))
     return float(gain.sum()) / spread if spread > 0 else 0.0

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.layout import Layout
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.residuals.additive_force import AdditiveForce
 from auvnn.diagnosis.residuals.variance_component import Unnamed
 from auvnn.diagnosis.score_tests.null_tests import NullTests

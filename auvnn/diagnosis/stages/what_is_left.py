@@ -1,16 +1,16 @@
 """The last stage of a search: is a force left that nobody has named, and what does that make of the names?
 
 Nothing is adequate, and no name the whole cause, while a force is left that is beyond doubt and matters. Where the names
-that were given leave much of it, or none of them is needed beside the force of a measured input that is left, they are
-not given as causes: they are kept for what they predict where each of them earns its place, and else are the nearest
-that the catalogue has. One of several that is not needed beside that force is withdrawn.
+that were given leave much of it, or none of them is needed together with the force of a measured input that is left, they
+are not given as causes: they are kept for what they predict where each of them improves the prediction, and else are the
+nearest that the catalogue has. One of several that is not needed together with that force is withdrawn.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from auvnn.diagnosis.answers.worth import small
+from auvnn.diagnosis.answers.effect_costs import small
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.residuals.additive_force import additive_force_test
 from auvnn.diagnosis.residuals.variance_component import Unnamed, variance_component_test, white

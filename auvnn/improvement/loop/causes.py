@@ -41,7 +41,7 @@ class Causes(Trials):
 
     def compare(self) -> None:
         """Say where the model as given stands beside the plain regression and persistence."""
-        self.say("running the model as given, and a plain regression beside it")
+        self.say("running the model as given, and a plain regression for comparison")
         self.regression = self.judge.regression(self.how)
         given = self.state.left
         self.told(
@@ -51,7 +51,7 @@ class Causes(Trials):
         )
 
     def refit(self) -> None:
-        """Refit the coefficients, by every objective, and keep the one that foresees best what was left out."""
+        """Refit the coefficients, by every objective, and keep the one that predicts best what was left out."""
         found: list[State] = []
         one_step = self._try(
             lambda: fitted_one_step(self.model, self.judge, Recipe(objective="one_step"), self.how),
@@ -75,7 +75,7 @@ class Causes(Trials):
         self.ground = min(by_rollout, key=lambda s: s.left.total) if by_rollout else None
         for state in found:
             if state is not best:
-                self._note(state, REFITTED, REFITTED, False, f"{best.recipe.words()} foresees more")
+                self._note(state, REFITTED, REFITTED, False, f"{best.recipe.words()} predicts better")
         self._take(best, REFITTED, REFITTED, "its stated uncertainties")
 
     def diagnose(self) -> None:

@@ -23,7 +23,7 @@ from auvnn.improvement.loop.state import State, fitted
 from auvnn.improvement.loop.trials import FAILURES
 from auvnn.logs import Log
 from auvnn.logs.leakage import leakage
-from auvnn.models.taking import GivenLog, GivenModel, as_log, as_model
+from auvnn.models.load_arguments import GivenLog, GivenModel, as_log, as_model
 from auvnn.threads import on_one_thread
 
 # Names that are fitted in one round of the search by prediction; how many of them may fail before it ends.
@@ -122,7 +122,7 @@ class Walk(Causes):
     """
 
     def predict(self) -> None:
-        """Look for names that foresee better, whatever they stand for, until none pays."""
+        """Look for names that predict better, whatever they stand for, until none pays."""
         names = wanted(self.model, self.judge, self.state.recipe)
         if self.effects is not None:
             names = [n for n in names if n in self.effects]
@@ -133,7 +133,7 @@ class Walk(Causes):
             if not shortlist:
                 return
             begin = self._before()
-            self.say("looking through the catalogue for what foresees better")
+            self.say("looking through the catalogue for what predicts better")
             promised = promises(self.model, self.judge, begin or self.state, shortlist, self.say)
             # Later rounds look again only at what promised anything.
             shortlist = [p.effect for p in promised if p.fall > PROMISE] or shortlist[:0]
@@ -156,7 +156,7 @@ class Walk(Causes):
             best, state = min(found, key=lambda item: item[1].left.total)
             for p, other in found:
                 if p is not best:
-                    self._note(other, p.effect, PREDICTS, False, f"{best.effect} foresees more")
+                    self._note(other, p.effect, PREDICTS, False, f"{best.effect} predicts better")
             reason = "came near in the diagnosis" if best.effect in near else "promised most of the catalogue"
             if not self._take(state, best.effect, PREDICTS, reason):
                 return
@@ -192,7 +192,7 @@ class Walk(Causes):
         for other, state in found:
             if other is not choice:
                 self._note(
-                    state, name, LEARNED, False, f"of {other.words}; of {choice.words} it foresees more"
+                    state, name, LEARNED, False, f"of {other.words}; of {choice.words} it predicts better"
                 )
         held = choice.recipe.ridge[name]
         self._take(best, name, LEARNED, f"of {choice.words}, held within {held:g} of its scale")
@@ -211,13 +211,13 @@ class Walk(Causes):
         if not self.late():
             again = self._try(
                 lambda: fitted(self.model, self.judge, state.recipe, state, steps=4),
-                "fitting the coefficients beside the subnetworks",
+                "fitting the coefficients together with the subnetworks",
             )
         best = min((s for s in (state, again) if s is not None), key=lambda s: s.left.total)
         self._take(best, networks.FORM, LEARNED, "damping subnetworks, trained one step ahead")
 
     def polish(self) -> None:
-        """Fit what has been taken over other lengths of windows, and keep what foresees best."""
+        """Fit what has been taken over other lengths of windows, and keep what predicts best."""
         if self.state.fit is None or not self.steps or self.late():
             return
         own = self.state.recipe

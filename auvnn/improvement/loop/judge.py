@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.left_out_errors import LeftOut
+from auvnn.diagnosis.cross_validation.errors import LeftOut
 from auvnn.errors import InputError
 from auvnn.improvement.free_run import Task, predicted
 from auvnn.logs import Log
@@ -121,6 +121,6 @@ class Judge:
         return self.scored(predicted(model, self.windows), (), "nothing was fitted")
 
     def regression(self, how: Derivative) -> LeftOut:
-        """Return the errors of the plain regression, each fold foreseen by the others."""
+        """Return the errors of the plain regression, each fold predicted by the others."""
         found = Regression.of(self.log, self.kind, how, self.folds)
         return self.scored(found.predict(self.windows, left_out=True), (), "refitted without each fold")

@@ -12,18 +12,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.hypotheses.layout import Layout
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.effects import Effect, effect_class
 from auvnn.effects.residual_force import INPUTS, ResidualForce
-from auvnn.estimation.priors import limits, set_parameters
-from auvnn.improvement.free_run import FreeRunFit, newton_step, normal_equations
+from auvnn.estimation.priors import Priors, limits
 from auvnn.improvement.loop.judge import Judge
-from auvnn.improvement.loop.screen import PROMISE, WINDOWS
+from auvnn.improvement.loop.linearised import Index, Linearised
+from auvnn.improvement.loop.screen import PROMISE
 from auvnn.improvement.loop.state import Recipe, State, held_by, laid_out, starting
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 # How many of its scales a learned parameter may be away from nothing: what is tried.
 RIDGES = (10.0, 3.0, 1.0, 0.3, 0.1, 0.03)
 # Inputs of the residual force that are tried.
@@ -75,21 +74,14 @@ def choose(base: GreyBox, judge: Judge, state: State, kind: str) -> list[Choice]
     recipe = _with(base, state.recipe, name, None, 1.0)
     layout, names, held = laid_out(base, recipe)
     begin = starting(layout, names, held, state, probes=False)
-    model = layout.model.rebuilt(layout.model.copied_effects())
-    set_parameters(model, names, begin)
-    task, own, free = judge.task(state.recipe.seconds)
-    if len(task.windows) > WINDOWS:
-        chosen = np.linspace(0, len(task.windows) - 1, WINDOWS).round().astype(int)
-        task, own, free = replace(task, windows=task.windows.pick(chosen)), own[chosen], free[chosen]
-    sums = (begin, *normal_equations(model, task, names))
-    weight = 1.0 if state.fit is None else state.fit.weight
+    about = Linearised.at(layout, names, begin, judge, state)
 
-    def foreseen(columns: Index, trial: Recipe) -> float:
-        return _foreseen(layout, trial, names, columns, sums, weight, own, free, judge)
+    def left_out(columns: Index, trial: Recipe) -> float:
+        return _left_out(about, layout, trial, names, columns)
 
     own_columns = layout.places(names)[name]
     others = np.setdiff1d(np.arange(len(begin)), own_columns)
-    before = foreseen(others, recipe)
+    before = left_out(others, recipe)
     found: list[tuple[int, Choice]] = []
     for inputs in SUBSETS if kind == "residual_force" else (None,):
         mine = _columns(layout.model.effect(name), own_columns, inputs)
@@ -97,7 +89,7 @@ def choose(base: GreyBox, judge: Judge, state: State, kind: str) -> list[Choice]
             continue
         for ridge in RIDGES:
             trial = _with(base, state.recipe, name, inputs, ridge)
-            fall = (before - foreseen(np.sort(np.concatenate([others, mine])), trial)) / max(before, 1e-300)
+            fall = (before - left_out(np.sort(np.concatenate([others, mine])), trial)) / max(before, 1e-300)
             if fall > PROMISE:
                 words = " and ".join(inputs) if inputs else "velocity"
                 found.append((len(mine), Choice(trial, float(fall), words)))
@@ -133,45 +125,12 @@ def _columns(effect: Effect, columns: Index, inputs: Sequence[str] | None) -> In
     return columns[np.array(wanted)]
 
 
-def _foreseen(
-    layout: Layout,
-    recipe: Recipe,
-    names: Sequence[str],
-    index: Index,
-    sums: tuple[Array, Array, Array, Array],
-    weight: float,
-    own: NDArray[np.int64],
-    free: NDArray[np.bool_],
-    judge: Judge,
-) -> float:
-    """Return the squared error of all folds, each foreseen by the others, some columns free."""
-    begin, hessian, slope, cost = sums
+def _left_out(about: Linearised, layout: Layout, recipe: Recipe, names: Sequence[str], index: Index) -> float:
+    """Return the squared error of all folds, each predicted by the others, some columns of the named effects free."""
     held = held_by(layout, names, recipe)
-    total = 0.0
-    precision, mean = held.precision[index], held.mean[index]
     low, high = limits(layout.model, names, held)
-    fit = FreeRunFit(
-        tuple(names),
-        begin[index],
-        held,
-        hessian[:, index[:, None], index],
-        slope[:, index],
-        cost,
-        weight,
-        True,
-    )
-    for k, fold in enumerate(judge.folds.numbers):
-        mine, keep = own == fold, free[:, k]
-        if not mine.any():
-            continue
-        theta = fit.theta
-        if keep.any():
-            square = fit.hessian[keep].sum(0) + weight * np.diag(precision)
-            downhill = fit.slope[keep].sum(0) - weight * precision * (theta - mean)
-            # Within the bounds, as the fit itself will be: what is promised beyond them cannot be had.
-            theta = theta + newton_step(square, downhill, theta, low[index], high[index], 0.0)
-        total += max(fit.foreseen(theta, mine), 0.0)
-    return total
+    fit = about.fit(names, index, Priors(held.mean[index], held.precision[index]))
+    return about.left_out(fit, low[index], high[index])
 
 
 def used(state: State, share: float = 0.05) -> dict[str, list[str]]:

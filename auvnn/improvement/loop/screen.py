@@ -1,26 +1,24 @@
-"""Which effects are worth a fit: all of the catalogue at once, linearised, by what they foresee of what is left out."""
+"""Which effects are worth a fit: all of the catalogue at once, linearised, by what they predict of what is left out."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
-from auvnn.diagnosis.hypotheses.layout import lay_out, shapes
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, lay_out, shapes
 from auvnn.diagnosis.score_tests.probes import null_is_no_start
-from auvnn.estimation.priors import set_parameters
-from auvnn.improvement.free_run import FreeRunFit, normal_equations
+from auvnn.estimation.priors import limits
 from auvnn.improvement.loop.judge import Judge
+from auvnn.improvement.loop.linearised import Index, Linearised
 from auvnn.improvement.loop.state import Recipe, State, held_by, laid_out, starting
 from auvnn.models import GreyBox
 from auvnn.progress import Progress
 
 Array = NDArray[np.float64]
-# Windows that candidates are looked at on, at most.
-WINDOWS = 120
 # Effects that go by the time since the start of a run.
 COURSES = ("payload", "flooding", "biofouling", "waves")
 # Share of the error by which a candidate must promise to lower it, to be fitted at all.
@@ -66,7 +64,7 @@ def promises(
 ) -> list[Promise]:
     """Return what each of several effects promises beside a state, best first.
 
-    Each is linearised where its fit would begin, everything else free beside it; a fold is foreseen by the others.
+    Each is linearised where its fit would begin, everything else free beside it; a fold is predicted by the others.
 
     Args:
         base: the model as given.
@@ -96,56 +94,31 @@ def _group(base: GreyBox, judge: Judge, state: State, group: Sequence[str]) -> l
     recipe = replace(state.recipe, effects=(*state.recipe.effects, *group))
     layout, names, held = laid_out(base, recipe)
     begin = starting(layout, names, held, state, probes=len(group) == 1)
-    model = layout.model.rebuilt(layout.model.copied_effects())
-    set_parameters(model, names, begin)
-    task, own, free = judge.task(state.recipe.seconds)
-    if len(task.windows) > WINDOWS:
-        chosen = np.linspace(0, len(task.windows) - 1, WINDOWS).round().astype(int)
-        task, own, free = replace(task, windows=task.windows.pick(chosen)), own[chosen], free[chosen]
-    hessian, slope, cost = normal_equations(model, task, names)
-    weight = 1.0 if state.fit is None else state.fit.weight
+    about = Linearised.at(layout, names, begin, judge, state)
     places = layout.places(names)
     without = [n for n in names if n not in group or n in layout.nuisance]
-    before = _foreseen(
-        layout, state.recipe, without, places, (begin, hessian, slope, cost), weight, own, free, judge
-    )[0]
+    before = _left_out(about, layout, state.recipe, without, places)[0]
     found = []
     for name in group:
         columns = [*without, *([] if name in without else [name])]
         own_recipe = replace(state.recipe, effects=(*state.recipe.effects, name))
-        after, theta = _foreseen(
-            layout, own_recipe, columns, places, (begin, hessian, slope, cost), weight, own, free, judge
-        )
+        after, theta = _left_out(about, layout, own_recipe, columns, places)
         # The fit of this effect alone has its own columns, in its own order.
         alone, order, alone_held = laid_out(base, own_recipe)
         start = starting(alone, order, alone_held, state, probes=True)
         at = alone.places(order)
         if not shapes(layout, name).any():
             start[at[name]] = theta[layout.places(columns)[name]]
-        reference = cost.sum() if len(group) == 1 else before
+        reference = about.cost.sum() if len(group) == 1 else before
         found.append(Promise(name, float((reference - after) / max(before, 1e-300)), start))
     return found
 
 
-def _foreseen(layout, recipe, columns, places, sums, weight, own, free, judge) -> tuple[float, Array]:
-    """Return the squared error of all folds, each foreseen by the others, and the fit to all."""
-    begin, hessian, slope, cost = sums
-    index = np.concatenate([places[n] for n in columns]) if columns else np.zeros(0, dtype=int)
-    held = held_by(layout, columns, recipe)
-    fit = FreeRunFit(
-        tuple(columns),
-        begin[index],
-        held,
-        hessian[:, index[:, None], index],
-        slope[:, index],
-        cost,
-        weight,
-        True,
-    )
-    total = 0.0
-    for k, fold in enumerate(judge.folds.numbers):
-        mine = own == fold
-        if mine.any():
-            theta = fit.newton(layout.model, free[:, k]) if free[:, k].any() else fit.theta
-            total += max(fit.foreseen(theta, mine), 0.0)
-    return total, fit.newton(layout.model, slice(None))
+def _left_out(
+    about: Linearised, layout: Layout, recipe: Recipe, names: Sequence[str], places: Mapping[str, Index]
+) -> tuple[float, Array]:
+    """Return the squared error of all folds, each predicted by the others, and the fit to all."""
+    index = np.concatenate([places[n] for n in names]) if names else np.zeros(0, dtype=int)
+    held = held_by(layout, names, recipe)
+    fit = about.fit(names, index, held)
+    return about.left_out(fit, *limits(layout.model, names, held)), fit.newton(layout.model, slice(None))

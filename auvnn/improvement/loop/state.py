@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.damping.bank import DampingBank
-from auvnn.diagnosis.fitters import newton
-from auvnn.diagnosis.hypotheses.bake import holding
-from auvnn.diagnosis.hypotheses.layout import Layout, lay_out, priors, scales
-from auvnn.diagnosis.left_out_errors import LeftOut
+from auvnn.diagnosis.cross_validation.errors import LeftOut
+from auvnn.diagnosis.cross_validation.fitters import newton
+from auvnn.diagnosis.hypotheses.put_into_model import holding
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, lay_out, priors, scales
 from auvnn.diagnosis.one_step.fit import fit_hypothesis_one_step
 from auvnn.effects import Effect
 from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters

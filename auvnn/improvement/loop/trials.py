@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from auvnn.diagnosis.left_out_errors import gain
+from auvnn.diagnosis.cross_validation.errors import gain
 from auvnn.errors import AuvnnError
 from auvnn.improvement.loop import learned
 from auvnn.improvement.loop.answer import CAUSE, PREDICTS, Step
@@ -32,7 +32,7 @@ from auvnn.progress import Counted
 FAILURES = (FloatingPointError, np.linalg.LinAlgError, RuntimeError, ValueError, ArithmeticError, AuvnnError)
 # Steps that are told of: a comparison, three refits, a diagnosis, four rounds of a look at the catalogue and three fits,
 # twice a learned term with two fits, other windows, and the judgement.
-FORESEEN = 30
+EXPECTED = 30
 
 
 class Trials:
@@ -59,7 +59,7 @@ class Trials:
     ) -> None:
         """Cut the log and look at the model as given."""
         self.began, self.limit = time.monotonic(), seconds
-        self.say, self.tell = Counted(progress, FORESEEN, rough=True), tell or (lambda words: None)
+        self.say, self.tell = Counted(progress, EXPECTED, rough=True), tell or (lambda words: None)
         self.model, self.log = model, log
         self.how = choose_derivative(log, derivative)
         self.judge = Judge.of(log, model.actuation)
@@ -95,7 +95,7 @@ class Trials:
         return starting(layout, names, held, state, probes=False)
 
     def _add_best(self, group: Sequence[str], kind: str, reason: str, *, rivals: bool = False) -> bool:
-        """Fit each of a group, take the one that foresees best if it pays, and say so."""
+        """Fit each of a group, take the one that predicts best if it pays, and say so."""
         found = []
         for name in group:
             if (
@@ -118,7 +118,7 @@ class Trials:
         others = ", ".join(n for n in group if n != name)
         for other, state in found:
             if other != name:
-                self._note(state, other, kind, False, f"{name} foresees more")
+                self._note(state, other, kind, False, f"{name} predicts better")
         return self._take(
             best, name, kind, f"{reason}, one of a tie with {others}" if rivals and others else reason
         )

@@ -1,8 +1,8 @@
-"""Whether commands change between the samples of a log: neighbours then foretell little of each of them.
+"""Whether commands change between the samples of a log: neighbours then predict little of each of them.
 
 A command that is sampled often enough lies near the cubic through two samples on either side of it,
 (-u[k-2] + 4 u[k-1] + 4 u[k+1] - u[k+2]) / 6. What is left of it, as a share of the command's standard deviation, is small
-for whatever is band-limited well below half the sampling rate, nought where a command is constant, and one for white
+for whatever is band-limited well below half the sampling rate, zero where a command is constant, and one for white
 noise. The median is taken, so that steps here and there count for nothing, and commands that are held over several
 samples are no question at all: what changes them is as slow as the log shows.
 
@@ -37,7 +37,7 @@ FEWEST = 50
 EVEN = 0.2
 
 
-def unforetold(run: Run, y: Array) -> tuple[float, float]:
+def unpredicted(run: Run, y: Array) -> tuple[float, float]:
     """Return what neighbours leave of a command as a share of its standard deviation, and the share of changes.
 
     Args:
@@ -64,7 +64,7 @@ def unforetold(run: Run, y: Array) -> tuple[float, float]:
 
 
 def between_samples(log: Log) -> list[Finding]:
-    """Return a note where commands change from sample to sample by what their neighbours do not foretell.
+    """Return a note where commands change from sample to sample by what their neighbours do not predict.
 
     Args:
         log: that is judged.
@@ -73,7 +73,7 @@ def between_samples(log: Log) -> list[Finding]:
     for run in log.runs:
         for name, y in run.columns():
             if name.startswith(("thruster_", "tau_", "fin_")) and name not in run.extra:
-                share, changing = unforetold(run, np.asarray(y, dtype=float))
+                share, changing = unpredicted(run, np.asarray(y, dtype=float))
                 if share > CLEAR and changing > CHANGING:
                     worst[name] = max(worst.get(name, 0.0), min(share, 1.0))
     if not worst:
@@ -83,7 +83,7 @@ def between_samples(log: Log) -> list[Finding]:
     shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
     largest = 100.0 * max(worst.values())
     what = (
-        f"{shown}: the samples before and after foretell a command only to {largest:.0f} % of its standard deviation: "
+        f"{shown}: the samples before and after predict a command only to {largest:.0f} % of its standard deviation: "
         f"it is decided at the log's {rate:.3g} Hz or faster, and where it is faster the log lacks what happens between"
     )
     cure = (

@@ -12,7 +12,7 @@ class Finding:
     """One thing worth knowing.
 
     Args:
-        level: "error" forbids fitting, "warning" asks for care, "repair" was mended, "info" is a note.
+        level: "error" forbids fitting, "warning" asks for care, "repair" was corrected, "info" is a note.
         where: channel, run or file, or a word for the subject ("excitation", "time").
         what: what is the case.
         cure: what to do about it, "" where nothing need be done.

@@ -1,4 +1,4 @@
-"""What a person should know about a log, in plain words: where, what, and how to mend it."""
+"""What a person should know about a log, in plain words: where, what, and how to correct it."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def _frozen(log: Log, channels: dict[str, Channel]) -> list[Finding]:
             if others:
                 what = f"never changes from {channels[name].low:.4g} while {', '.join(others)} do"
                 found.append(
-                    Finding("warning", name, what, "if it was not measured, say so; else mend the sensor")
+                    Finding("warning", name, what, "if it was not measured, say so; else repair the sensor")
                 )
     candidates = [n for n in VELOCITY if channels[n].frozen_share > 0.0 and channels[n].noise_std > 0.0]
     for name in candidates:

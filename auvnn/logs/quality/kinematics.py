@@ -192,10 +192,10 @@ def _judge(
         sign = " with the opposite sign" if scale < 0.0 else ""
         for factor, unit in units:
             if abs(abs(scale) / factor - 1.0) < _SCALE_TOLERANCE:
-                cure = f"mend with scale: {np.sign(scale) / factor:.6g} in the mapping"
+                cure = f"correct with scale: {np.sign(scale) / factor:.6g} in the mapping"
                 if source == "attitude":
                     turned = ("deg", "rad") if factor > 1.0 else ("rad", "deg")
-                    cure = "mend with rates: {} (or angles: {}) in the mapping".format(*turned)
+                    cure = "correct with rates: {} (or angles: {}) in the mapping".format(*turned)
                 verdict = f"{name} is {abs(scale):.3g} times {of}{sign}: in {unit}; {cure}"
                 return Agreement(**facts, verdict=verdict, level="error", cure=cure)
         if scale < 0.0 and source == "position" and not _SIGN[0] < -scale < _SIGN[1]:
@@ -203,7 +203,7 @@ def _judge(
             verdict = f"{name} runs against {of} in {share}, {-scale:.2f} times as large; {cure}"
             return Agreement(**facts, verdict=verdict, level="warning", cure=cure)
         if scale < 0.0:
-            cure = "mend with scale: -1 in the mapping"
+            cure = "correct with scale: -1 in the mapping"
             verdict = f"{name} has the opposite sign of {of} in {share}: scale {scale:.2f}; {cure}"
             return Agreement(**facts, verdict=verdict, level="error", cure=cure)
         if abs(scale - 1.0) <= _SCALE_TOLERANCE:

@@ -211,6 +211,6 @@ def _assess(log: Log) -> Quality:
     found = findings.collect(log, channels, agreement, directions, order, clocks, depth)
     if log.unsealed:
         few = ", ".join(path.name for path in log.unsealed[:3]) + (", ..." if len(log.unsealed) > 3 else "")
-        words = f"no checksum in or beside {few}: damage that leaves numbers readable cannot be seen"
+        words = f"no checksum in or next to {few}: damage that leaves numbers readable cannot be seen"
         found.append(Finding("info", "checksum", words, "seal the log as it is: auvnn check seal=true"))
     return Quality(log, channels, found, agreement, directions, condition, runs)

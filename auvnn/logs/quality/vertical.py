@@ -28,7 +28,7 @@ _SLOWEST = 0.02  # m/s: slower vertical motion says nothing
 _SAMPLES = 100
 _METRE = 1025.0 * 9.81 / 1e5  # bar per metre of sea water
 
-# Slope of dz/dt on the vertical velocity, what it means, and the scale that mends it.
+# Slope of dz/dt on the vertical velocity, what it means, and the scale that corrects it.
 _UNITS = (
     (0.01, "a pressure in hPa (mbar) was read as Pa", 100.0),
     (100.0, "a pressure in Pa was read as hPa, or a depth in cm", 0.01),
@@ -87,9 +87,9 @@ def check_vertical(log: Log) -> Vertical | None:
         constant = np.nanstd(dz) < 1e-9 * max(float(np.nanstd(down)), 1e-9)
         return _unrelated(0.0, 0.0) if constant else None
     if abs(correlation) >= _CLEAR:
-        for factor, words, mend in _UNITS:
+        for factor, words, correct in _UNITS:
             if abs(abs(scale) / factor - 1.0) < _TOLERANCE:
-                cure = f"mend with scale: {np.sign(scale) * mend:.6g} for z in the mapping"
+                cure = f"correct with scale: {np.sign(scale) * correct:.6g} for z in the mapping"
                 verdict = f"z changes {abs(scale):.4g} times as fast as the vertical velocity: {words}"
                 return Vertical(scale, correlation, "error", verdict, cure)
         if scale < 0.0:

@@ -45,7 +45,7 @@ class Table:
         rows: N.
         text: columns that are not numbers.
         seconds: names of columns that already hold seconds, because the file stored dates or durations.
-        repairs: what the reader mended or noted.
+        repairs: what the reader corrected or noted.
         rest: what is left of the mapping to be done with the rows; None for the mapping that was given.
         sha256: of the file's bytes, where the reader had all of them; empty elsewhere.
         checked: whether the file carries checksums of all its numbers, and they were compared.

@@ -110,7 +110,7 @@ def to_table(frame: pl.DataFrame, where: str, text: dict[str, Text] | None = Non
         if note:
             count, _, words = note.partition("\0")
             what = f"cells of '{name}' that are no numbers read as missing (the first: {words})"
-            table.repairs.append(Repair(what, where, int(count), "warning", "mend the cells in the file"))
+            table.repairs.append(Repair(what, where, int(count), "warning", "correct the cells in the file"))
         values = _array(series, name, table)
         if values is None:
             continue

@@ -73,7 +73,9 @@ def _records(stream: BinaryIO, size: int, most: int | None, state: _State, notes
         if length > size - place - 9 or kind == 0:
             lost = 100.0 * (size - place) / size
             words = f"cut short or damaged at byte {place}: the last {lost:.2g} % of the file left out"
-            notes.append(Repair(words, where, 1, "warning", "copy it again, or mend it with `mcap recover`"))
+            notes.append(
+                Repair(words, where, 1, "warning", "copy it again, or repair it with `mcap recover`")
+            )
             break
         if kind not in (_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK) or length > LIMIT:
             stream.seek(length, 1)

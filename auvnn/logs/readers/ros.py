@@ -205,7 +205,7 @@ def _joined(parts: list[dict[str, Any]], sizes: list[int], name: str) -> np.ndar
 
 
 def _clocks(topics: dict[str, Topic], where: str, notes: Notes) -> None:
-    """Put topics that are stamped by another computer's clock beside the others, by when they were recorded."""
+    """Put topics that are stamped by another computer's clock in addition to the others, by when they were recorded."""
     for topic in topics.values():
         if topic.arrival is None or topic.t is topic.arrival or not np.isfinite(topic.t).any():
             continue

@@ -47,7 +47,7 @@ class Ros1Reader(RosReader):
                 stream.seek(0)
                 if stream.read(len(MAGIC)) != MAGIC:
                     raise InputError(
-                        f"{where}: is a ROS bag of another version than 2.0: `rosbag fix` can mend that"
+                        f"{where}: is a ROS bag of another version than 2.0: `rosbag fix` can repair that"
                     )
                 end = size if most is None else min(size, most)
                 while (place := stream.tell()) < end:

@@ -1,4 +1,4 @@
-"""From one table to runs: told apart, in order of time, mended and checked."""
+"""From one table to runs: told apart, in order of time, corrected and checked."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class FileClock:
 
     Attributes:
         first: the file's first stamp as it stands there, from which integers are counted.
-        origin: s, taken off stamps that are dates; nought for others.
+        origin: s, taken off stamps that are dates; zero for others.
     """
 
     first: Any
@@ -74,7 +74,7 @@ class FileClock:
 def collect(
     table: Table, plan: Mapping, file: Path, collector: Collector, clock_from: FileClock | None = None
 ) -> None:
-    """Turn a table into runs: told apart, in order of time, mended and checked.
+    """Turn a table into runs: told apart, in order of time, corrected and checked.
 
     Args:
         table: columns under canonical names.
@@ -222,7 +222,7 @@ def _run(
     )
     run, notes = in_world.settle(run, plan, where)
     repairs.extend(notes)
-    for mend in (plausible.check_plausible, masks.apply):
-        run, notes = mend(run, where)
+    for correct in (plausible.check_plausible, masks.apply):
+        run, notes = correct(run, where)
         repairs.extend(notes)
     return run

@@ -29,7 +29,7 @@ class Portion:
     Attributes:
         t: stamps in the order of the file, on the clock of its runs, s, (N,); NaN where one is missing.
         label: run number of each row, (N,); ones where the file has none.
-        runs: in the order of the file; mended as on reading a whole log, with what these rows say alone.
+        runs: in the order of the file; corrected as on reading a whole log, with what these rows say alone.
     """
 
     t: Array

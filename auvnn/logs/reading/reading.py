@@ -1,4 +1,4 @@
-"""From files to runs: read, map, order in time, mend, check; every step is counted."""
+"""From files to runs: read, map, order in time, correct, check; every step is counted."""
 
 from __future__ import annotations
 

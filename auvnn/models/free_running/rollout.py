@@ -11,7 +11,6 @@ from torch import Tensor
 
 from auvnn.effects import Effect
 from auvnn.errors import ConfigError
-from auvnn.models.accepting import as_inputs, as_tensor, as_times, own
 from auvnn.models.actuation.actuators import Drive
 from auvnn.models.engine import compiled_run
 from auvnn.models.free_running.excursions import extrapolated
@@ -22,6 +21,7 @@ from auvnn.models.free_running.stiffness import MAX_STEPS, MOST_CUT, UNSTABLE, f
 from auvnn.models.free_running.stiffness import words as stiff_words
 from auvnn.models.free_running.tableaus import TABLEAUS
 from auvnn.models.free_running.trajectory import Divergence, Trajectory
+from auvnn.models.input_conversion import as_inputs, as_tensor, as_times, own
 from auvnn.models.inputs import Inputs
 from auvnn.physics.kinematics import eta6_to_eta7
 

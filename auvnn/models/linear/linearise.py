@@ -11,9 +11,9 @@ from torch import Tensor
 from torch.autograd import forward_ad
 
 from auvnn.errors import ConfigError
-from auvnn.models.accepting import as_tensor
-from auvnn.models.accepting import own as own_tensor
 from auvnn.models.free_running.rate import SIZE
+from auvnn.models.input_conversion import as_tensor
+from auvnn.models.input_conversion import own as own_tensor
 from auvnn.models.linear.state_space import NAMES, StateSpace
 from auvnn.physics.attitude import quat_to_euler
 from auvnn.physics.kinematics import eta6_to_eta7

@@ -1,4 +1,4 @@
-"""What every online scheme promises: one lesson in, a proposal for the weights out, and a state of tensors."""
+"""What every online scheme promises: one observation in, a proposal for the weights out, and a state of tensors."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from auvnn.online.updates.weights import Weights
 
 
 @dataclass(frozen=True)
-class Lesson:
+class Observation:
     """One sample as the schemes see it; forces in units of the bank's output scale.
 
     Attributes:
@@ -38,7 +38,7 @@ class Lesson:
 
 
 class OnlineScheme:
-    """Moves the weights by one lesson at a time, in bounded time and memory.
+    """Moves the weights by one observation at a time, in bounded time and memory.
 
     A scheme only proposes: guards may shorten, refuse or take back its step. All that it remembers is in
     `state()`, so that a restored scheme goes on bit for bit.
@@ -54,8 +54,8 @@ class OnlineScheme:
     def start(self, weights: Weights, known: Tensor | None = None) -> None:
         """Begin with a bank's weights; `known` is the model's other drag at `anchors`, in the output scale."""
 
-    def propose(self, weights: Weights, lesson: Lesson) -> Tensor | None:
-        """Return the weights (6, P) that the lesson asks for, or None where it has nothing new to say."""
+    def propose(self, weights: Weights, observation: Observation) -> Tensor | None:
+        """Return the weights (6, P) that the observation asks for, or None where it has nothing new to say."""
         raise TypeError(f"{type(self).__name__} does not say how it learns: write its propose()")
 
     def accept(self, weights: Tensor) -> None:

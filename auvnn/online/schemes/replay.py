@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from auvnn.damping.base import positive_int
-from auvnn.online.schemes.base import Lesson, OnlineScheme, number
+from auvnn.online.schemes.base import Observation, OnlineScheme, number
 from auvnn.online.updates.weights import Weights
 
 # How exactly the damping vanishes at rest, of the force scale.
@@ -71,16 +71,16 @@ class ExperienceReplay(OnlineScheme):
         """Empty the memory: its targets belong to the vehicle as it was."""
         self._empty()
 
-    def propose(self, weights: Weights, lesson: Lesson) -> Tensor:
+    def propose(self, weights: Weights, observation: Observation) -> Tensor:
         """Return the weights after one projection."""
         rows = self._drawn()
-        slopes, errors = lesson.slope[None], lesson.error[None]
-        variance = lesson.variance[None]
+        slopes, errors = observation.slope[None], observation.error[None]
+        variance = observation.variance[None]
         if len(rows):
             values, more = weights.jacobians(self._nu[rows])
             slopes = torch.cat([slopes, more])
             errors = torch.cat([errors, self._target[rows] - values])
-            variance = torch.cat([variance, lesson.variance / self._count[rows, None]])
+            variance = torch.cat([variance, observation.variance / self._count[rows, None]])
         # Damping vanishes at rest: this is known beforehand and never leaves the batch.
         still, more = weights.jacobians(torch.zeros(1, 6, dtype=slopes.dtype))
         slopes, errors = torch.cat([slopes, more]), torch.cat([errors, -still])
@@ -89,7 +89,7 @@ class ExperienceReplay(OnlineScheme):
         size = gram.diagonal(dim1=-2, dim2=-1).mean(-1, keepdim=True)
         gram = gram + torch.diag_embed(variance.T + self.ridge * size + 1e-12)
         solved = torch.linalg.solve(gram, errors.T[:, :, None])[..., 0]
-        self._keep(lesson, weights.bank.input_scale)
+        self._keep(observation, weights.bank.input_scale)
         return weights.read() + self.learning_rate * torch.einsum("am,map->ap", solved, slopes)
 
     def _drawn(self) -> Tensor:
@@ -101,15 +101,15 @@ class ExperienceReplay(OnlineScheme):
         self._turn = int(rows[-1] + 1) % cells
         return rows
 
-    def _keep(self, lesson: Lesson, scale: Tensor) -> None:
+    def _keep(self, observation: Observation, scale: Tensor) -> None:
         if len(self._nu):
-            apart = ((self._nu - lesson.nu) / scale).square().sum(1)
+            apart = ((self._nu - observation.nu) / scale).square().sum(1)
             nearest = int(apart.argmin())
             if float(apart[nearest]) < self.near**2:
-                self._join(nearest, lesson.nu, lesson.target, 1.0)
+                self._join(nearest, observation.nu, observation.target, 1.0)
                 return
-        self._nu = torch.cat([self._nu, lesson.nu[None]])
-        self._target = torch.cat([self._target, lesson.target[None]])
+        self._nu = torch.cat([self._nu, observation.nu[None]])
+        self._target = torch.cat([self._target, observation.target[None]])
         self._count = torch.cat([self._count, self._count.new_ones(1)])
         if len(self._nu) > self.memory:
             self._merge(scale)

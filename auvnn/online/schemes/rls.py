@@ -9,15 +9,15 @@ import torch
 from scipy import stats
 from torch import Tensor
 
-from auvnn.online.schemes.base import Lesson, OnlineScheme, anchors, number
+from auvnn.online.schemes.base import Observation, OnlineScheme, anchors, number
 from auvnn.online.updates.weights import Weights
 
 # Chance of a wake-up at a sample without cause, each degree of freedom.
 FALSE_ALARM = 1e-8
 # Wake-ups are judged over this many seconds, and follow one another no faster.
 WATCH = 1.0
-# Lessons that say less than this of their own noise are no news.
-NEWS = 1e-5
+# Observations that say less than this of their own noise are not worth an update.
+NEGLIGIBLE = 1e-5
 
 
 class RLS(OnlineScheme):
@@ -119,17 +119,17 @@ class RLS(OnlineScheme):
         self._covariance = self._covariance + self._wide
         self._watch()
 
-    def propose(self, weights: Weights, lesson: Lesson) -> Tensor | None:
+    def propose(self, weights: Weights, observation: Observation) -> Tensor | None:
         """Return the weights after one update of the filter."""
-        slope, error = lesson.slope, lesson.error
-        self._wake(lesson)
+        slope, error = observation.slope, observation.error
+        self._wake(observation)
         towards = torch.einsum("apq,aq->ap", self._covariance, slope)
         known = (towards * slope).sum(-1)
-        if bool((known < NEWS * lesson.variance).all()):
+        if bool((known < NEGLIGIBLE * observation.variance).all()):
             return None
-        gain = towards / (known + lesson.variance)[:, None]
+        gain = towards / (known + observation.variance)[:, None]
         covariance = self._covariance - gain[:, :, None] * towards[:, None, :]
-        kept = float(torch.exp(torch.tensor(-lesson.dt / self.forgetting)))
+        kept = float(torch.exp(torch.tensor(-observation.dt / self.forgetting)))
         covariance = torch.linalg.inv(kept * torch.linalg.inv(covariance) + (1.0 - kept) * self._information)
         self._covariance = 0.5 * (covariance + covariance.mT)
         found = weights.read() + gain * error[:, None]
@@ -139,21 +139,21 @@ class RLS(OnlineScheme):
             found = found - gain * (self._still * found).sum(-1, keepdim=True)
         return found
 
-    def _wake(self, lesson: Lesson) -> None:
+    def _wake(self, observation: Observation) -> None:
         """Widen the axes whose innovations of the last second no chance explains."""
-        spread = (lesson.slope * torch.einsum("apq,aq->ap", self._covariance, lesson.slope)).sum(-1)
-        weight = 1.0 / (spread + lesson.variance)
-        kept = float(torch.exp(torch.tensor(-lesson.dt / WATCH)))
-        self._evidence = kept * self._evidence + (weight * lesson.error)[:, None] * lesson.slope
-        outer = lesson.slope[:, :, None] * lesson.slope[:, None, :]
+        spread = (observation.slope * torch.einsum("apq,aq->ap", self._covariance, observation.slope)).sum(-1)
+        weight = 1.0 / (spread + observation.variance)
+        kept = float(torch.exp(torch.tensor(-observation.dt / WATCH)))
+        self._evidence = kept * self._evidence + (weight * observation.error)[:, None] * observation.slope
+        outer = observation.slope[:, :, None] * observation.slope[:, None, :]
         self._carried = kept * self._carried + weight[:, None, None] * outer
-        self._age = self._age + lesson.dt
+        self._age = self._age + observation.dt
         size = self._carried.diagonal(dim1=-2, dim2=-1).mean(-1).clamp_min(1e-12)[:, None, None]
         ridge = 1e-6 * size * torch.eye(self._carried.shape[-1], dtype=self._carried.dtype)
         solved = torch.linalg.solve(self._carried + ridge, self._evidence)
-        news = (solved * self._evidence).sum(-1) > self._threshold
+        informative = (solved * self._evidence).sum(-1) > self._threshold
         late = self._age > 0.2 * WATCH
-        woken = news & late
+        woken = informative & late
         if bool(woken.any()):
             self._covariance = self._covariance + woken[:, None, None] * self._wide
             calm = (~woken).to(self._evidence.dtype)

@@ -7,7 +7,7 @@ from typing import Any
 from torch import Tensor
 
 from auvnn.damping.base import true_or_false
-from auvnn.online.schemes.base import Lesson, OnlineScheme, number
+from auvnn.online.schemes.base import Observation, OnlineScheme, number
 from auvnn.online.updates.weights import Weights
 
 
@@ -37,9 +37,9 @@ class SGD(OnlineScheme):
         """Return the options that rebuild this scheme."""
         return {"learning_rate": self.learning_rate, "normalised": self.normalised}
 
-    def propose(self, weights: Weights, lesson: Lesson) -> Tensor:
+    def propose(self, weights: Weights, observation: Observation) -> Tensor:
         """Return the weights after one step."""
-        step = self.learning_rate * lesson.error[:, None] * lesson.slope
+        step = self.learning_rate * observation.error[:, None] * observation.slope
         if self.normalised:
-            step = step / (1e-3 + lesson.slope.square().sum(1, keepdim=True))
+            step = step / (1e-3 + observation.slope.square().sum(1, keepdim=True))
         return weights.read() + step

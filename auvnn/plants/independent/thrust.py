@@ -166,7 +166,7 @@ class Actuators:
                     along = along + turn @ self.turns
                 thrust = thrust - values["coefficient"] * np.abs(command / self.full) * along
             elif name == "thrust_advance":
-                # The same as J / (1 + |J|) with J = V / (c V_1), and nought where neither turns nor flows anything.
+                # The same as J / (1 + |J|) with J = V / (c V_1), and zero where neither turns nor flows anything.
                 along = flow @ self.forces
                 if not self.wrench:
                     along = along + turn @ self.turns

@@ -135,7 +135,7 @@ def baseline_table(view: View) -> HtmlTable:
         "Free-running error over the same windows. The regression has no physics: the acceleration by least squares on "
         f"velocities, their squares, commands, the direction of gravity and one ({line.get('how', 'fitted to the log')})."
     )
-    return HtmlTable("Beside what needs no model", ["", *CHANNELS, "total"], rows, caption)
+    return HtmlTable("Compared with what needs no model", ["", *CHANNELS, "total"], rows, caption)
 
 
 def one_step_table(one_step: Mapping[str, Any]) -> HtmlTable:

@@ -114,7 +114,7 @@ class ImprovementPage(Page):
         return [
             common.parameter_table(view.mapping("parameters")),
             HtmlTable(
-                "Coefficients fitted beside it",
+                "Coefficients fitted with it",
                 common.PARAMETER_HEAD,
                 common.parameter_rows(refitted),
                 words=2,

@@ -58,7 +58,7 @@ class QualityPage(Page):
         repairs = levels["repair"]
         if repairs:
             out.append(
-                f"On reading, {plural(len(repairs), 'kind of fault was', 'kinds of fault were')} mended and "
+                f"On reading, {plural(len(repairs), 'kind of fault was', 'kinds of fault were')} corrected and "
                 "counted."
             )
         told = _actuator_words(view)
@@ -104,7 +104,9 @@ class QualityPage(Page):
     def tables(self, view: View) -> list[HtmlTable]:
         """Return the tables."""
         return [
-            HtmlTable("Findings", ["level", "where", "what", "how to mend it"], _finding_rows(view), words=4),
+            HtmlTable(
+                "Findings", ["level", "where", "what", "how to correct it"], _finding_rows(view), words=4
+            ),
             HtmlTable(
                 "Actuators, by what the vehicle does",
                 ["in the model file", "acts as", "sign", "share of the stated thrust"],
@@ -231,9 +233,9 @@ def _channel_rows(view: View) -> list[list[str]]:
 def _sentence(finding: Mapping[str, Any], cure: bool = False) -> str:
     where, what = (str(finding.get(k) or "").rstrip(".") for k in ("where", "what"))
     words = what if not where or what.startswith(f"{where} ") else f"{where}: {what}"
-    mend = str(finding.get("cure") or "").rstrip(".")
+    correct = str(finding.get("cure") or "").rstrip(".")
     # Some findings name their cure in the same breath.
-    return f"{words} ({mend})" if cure and mend and mend not in words else words
+    return f"{words} ({correct})" if cure and correct and correct not in words else words
 
 
 def _timeline_caption(view: View) -> str:

@@ -41,9 +41,9 @@ class UncertaintiesPage(Page):
             swallow += [] if most is None else [f"{name} {percent(most)}"]
         out = [f"Parameters identified with all uncertain at once: {', '.join(together)}."]
         if beside:
-            out.append(f"Beside networks as damping, of those that are not damping: {', '.join(beside)}.")
+            out.append(f"With networks as damping, of those that are not damping: {', '.join(beside)}.")
         if swallow:
-            out.append(f"Most that networks of the velocity swallow of an effect: {', '.join(swallow)}.")
+            out.append(f"Most that networks of the velocity absorb of an effect: {', '.join(swallow)}.")
         return out
 
     def plots(self, view: View) -> list[Plot]:
@@ -58,7 +58,7 @@ class UncertaintiesPage(Page):
         return [
             Plot(
                 "swallowed",
-                "What networks of the velocity swallow",
+                "What networks of the velocity absorb",
                 lambda: swallowed(shares),
                 "Share of the wrench by which an effect betrays itself that six networks of the paper's size can "
                 "be trained to give, from the velocity alone. Near 1 the networks fit whatever is wrong, and "

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from auvnn.diagnosis.hypotheses.bake import with_fitted_parameters
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
-from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.hypotheses.put_into_model import with_fitted_parameters
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.errors import AuvnnError
 from auvnn.improvement import add
 from auvnn.improvement.gains import paired_gain

@@ -107,14 +107,14 @@ class Journal:
                 stream.seek(-1, os.SEEK_END)
                 if stream.read(1) != b"\n":
                     # What a killed run left unfinished: nobody can read on from the middle of a line.
-                    self._mend(stream)
+                    self._repair(stream)
             stream.write(f'{text[:-1]}, "sum": "{_digest(text.encode())}"}}\n'.encode())
             stream.flush()
             os.fsync(stream.fileno())
         return json.loads(text)
 
     @staticmethod
-    def _mend(stream: Any) -> None:
+    def _repair(stream: Any) -> None:
         stream.seek(0)
         whole = stream.read().rfind(b"\n") + 1
         stream.truncate(whole)

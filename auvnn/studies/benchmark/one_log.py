@@ -66,7 +66,7 @@ def noise_of(case: Case) -> str | dict[str, Any]:
 def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
     """Return what is answered; note in `begun` once there is a log to answer for."""
     from auvnn.diagnosis import diagnose
-    from auvnn.logs.without import without
+    from auvnn.logs.without_sensors import without
     from auvnn.metrics.unmeasured import completed
     from auvnn.models import load
     from auvnn.simulation import simulate

@@ -66,8 +66,8 @@ def sized_stranger(model: Any, name: str, size: str, *, seed: int = 0, **how: An
     import torch
 
     from auvnn.diagnosis.hypotheses.candidates import windows_for
-    from auvnn.estimation.normal_equations import normal_equations
     from auvnn.estimation.sensitivity import Response
+    from auvnn.estimation.window_normal_equations import normal_equations
     from auvnn.metrics.free_run import initial_states
     from auvnn.simulation import simulate
     from auvnn.studies.benchmark.identifiability.information import noise_sigma

@@ -117,7 +117,7 @@ class DistributedProblem:
         if empty:
             raise InputError(
                 f"damping problem: no usable sample for {', '.join(empty)}: "
-                "mend the log, or give the form 'zero' there"
+                "correct the log, or give the form 'zero' there"
             )
 
     def mean_squares(self) -> tuple[Tensor, Tensor]:

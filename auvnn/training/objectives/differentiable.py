@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import copy
 import math
-from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import torch
@@ -13,15 +10,14 @@ from torch import Tensor, nn
 from torch.func import functional_call
 
 from auvnn.errors import ConfigError, InputError
-from auvnn.estimation.simulated_windows import window_error
-from auvnn.logs import Log
+from auvnn.estimation.window_simulation import window_error
 from auvnn.metrics.free_run import moved
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 from auvnn.models.free_running.torchdiffeq_solver import FIXED, solve
 from auvnn.progress import Progress
-from auvnn.training.objectives.base import Objective, Refined, Tell
-from auvnn.training.objectives.starting import best_start, sound_shots, start_option
+from auvnn.training.objectives.base import Refined, Tell
+from auvnn.training.objectives.free_running import FreeRunning
 from auvnn.training.objectives.weights import get_weights, set_weights
 from auvnn.training.objectives.windows import Shots
 from auvnn.training.schemes.base import positive, whole
@@ -39,7 +35,7 @@ EVERY = 5
 PRIOR = 0.1
 
 
-class Differentiable(Objective):
+class Differentiable(FreeRunning):
     """The same error as `rollout`, made small by Adam along gradients through torchdiffeq's solver.
 
     The runs of all windows are one batch; their initial states are parameters beside the weights. The weights
@@ -61,6 +57,7 @@ class Differentiable(Objective):
     """
 
     name = "rollout_torchdiffeq"
+    option_names = ("window", "epochs", "learning_rate", "method", "patience", "start")
 
     def __init__(
         self,
@@ -73,34 +70,16 @@ class Differentiable(Objective):
         start: str = "best",
     ) -> None:
         """Check the options."""
-        self.window = positive(window, "window")
+        super().__init__(window, patience, start)
         self.epochs = whole(epochs, "epochs")
         self.learning_rate = positive(learning_rate, "learning_rate")
         if method not in FIXED:
             raise ConfigError(f"objective.method={method}: there are {', '.join(FIXED)}")
         self.method = method
-        self.patience = whole(patience, "patience")
-        self.start = start_option(start)
-        self.estimated_start = self.start == "best"
 
-    def options(self) -> dict[str, Any]:
-        """Return the options that rebuild this objective."""
-        return {
-            n: getattr(self, n) for n in ("window", "epochs", "learning_rate", "method", "patience", "start")
-        }
-
-    def choose(self, starts: Sequence[GreyBox], stopping: Log) -> int:
-        """Return which of several one-step fits to go on from."""
-        return best_start(starts, stopping, self.window)
-
-    def refine(self, model: GreyBox, fitted: Log, stopping: Log, tell: Tell | None = None) -> Refined:
-        """Go on from the one-step fit; see the class."""
-        model = copy.deepcopy(model)
-        found = sound_shots(model, fitted, stopping, self.window)
-        if isinstance(found, Refined):
-            return found
-        shots, judge, warnings = found
-        return _Descent(self, model, shots, judge, warnings, tell or (lambda words: None)).run()
+    def descend(self, model: GreyBox, shots: Shots, judge: Shots, warnings: list[str], tell: Tell) -> Refined:
+        """Step until nothing is gained; see the class."""
+        return _Descent(self, model, shots, judge, warnings, tell).run()
 
 
 class _Descent:

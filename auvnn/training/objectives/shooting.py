@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from auvnn.logs import Log
 from auvnn.metrics.free_run import moved
 from auvnn.models import GreyBox
 from auvnn.progress import Progress
-from auvnn.training.objectives.base import Objective, Refined, Tell
-from auvnn.training.objectives.starting import best_start, sound_shots, start_option
+from auvnn.training.objectives.base import Refined, Tell
+from auvnn.training.objectives.free_running import FreeRunning
 from auvnn.training.objectives.weights import get_weights, set_weights
 from auvnn.training.objectives.windows import ShootingSums, Shots
 from auvnn.training.schemes.base import positive, whole
@@ -25,7 +20,7 @@ Array = NDArray[np.float64]
 TRIALS = 8
 
 
-class Shooting(Objective):
+class Shooting(FreeRunning):
     """The error of free runs over short windows, whose initial states are fitted along.
 
     minimises sum over windows and samples of |(y - y_hat(x0, w)) / sigma|^2 + |(w - w_0) / prior|^2
@@ -48,6 +43,7 @@ class Shooting(Objective):
     """
 
     name = "rollout"
+    option_names = ("window", "iterations", "prior", "patience", "start")
 
     def __init__(
         self,
@@ -59,28 +55,12 @@ class Shooting(Objective):
         start: str = "best",
     ) -> None:
         """Check the options."""
-        self.window = positive(window, "window")
+        super().__init__(window, patience, start)
         self.iterations = whole(iterations, "iterations")
         self.prior = positive(prior, "prior")
-        self.patience = whole(patience, "patience")
-        self.start = start_option(start)
-        self.estimated_start = self.start == "best"
 
-    def options(self) -> dict[str, Any]:
-        """Return the options that rebuild this objective."""
-        return {n: getattr(self, n) for n in ("window", "iterations", "prior", "patience", "start")}
-
-    def choose(self, starts: Sequence[GreyBox], stopping: Log) -> int:
-        """Return which of several one-step fits to go on from."""
-        return best_start(starts, stopping, self.window)
-
-    def refine(self, model: GreyBox, fitted: Log, stopping: Log, tell: Tell | None = None) -> Refined:
-        """Go on from the one-step fit; see the class."""
-        model = copy.deepcopy(model)
-        found = sound_shots(model, fitted, stopping, self.window)
-        if isinstance(found, Refined):
-            return found
-        shots, judge, warnings = found
+    def descend(self, model: GreyBox, shots: Shots, judge: Shots, warnings: list[str], tell: Tell) -> Refined:
+        """Step until nothing is gained; see the class."""
         return _Descent(self, model, shots, judge, warnings, tell).run()
 
 
@@ -94,10 +74,10 @@ class _Descent:
         shots: Shots,
         judge: Shots,
         warnings: list[str],
-        tell: Tell | None,
+        tell: Tell,
     ) -> None:
         self.options, self.model, self.shots, self.judge = options, model, shots, judge
-        self.warnings, self.tell = warnings, tell or (lambda words: None)
+        self.warnings, self.tell = warnings, tell
         self.first = self.best = get_weights(model)
         _, self.sigma = shots.settle(model)
         _, self.scale = judge.settle(model)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.errors import InputError
-from auvnn.estimation.normal_equations import CHUNK, LOOSE, TRUST, motion
 from auvnn.estimation.sensitivity import Response, respond
-from auvnn.estimation.simulated_windows import output_error
+from auvnn.estimation.window_normal_equations import CHUNK, LOOSE, TRUST, motion
+from auvnn.estimation.window_simulation import output_error
 from auvnn.logs import Log
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import ACCELERATION, POSITION, Windows, cut_windows

@@ -52,7 +52,7 @@ def test_a_dry_run_names_what_it_would_touch_and_touches_nothing(auvnn):
         assert sorted(Path().rglob("*")) == before
 
 
-def test_a_dry_run_foresees_a_refusal(refused):
+def test_a_dry_run_finds_a_refusal(refused):
     assert "dive.cvs" in refused("check", "log=dive.cvs", "dry_run=true")
     Path("full").mkdir()
     Path("full/file").touch()

@@ -22,7 +22,8 @@ from auvnn.diagnosis.hypotheses.fit import standard_errors
 from auvnn.diagnosis.score_tests.probes import probed
 from auvnn.diagnosis.score_tests.score import score
 from auvnn.errors import ConfigError, InputError
-from auvnn.estimation.sufficient_statistics import ScoreMoments, add_parts, fit_initial_states, reduce_windows
+from auvnn.estimation.initial_states import fit_initial_states
+from auvnn.estimation.sufficient_statistics import ScoreMoments, add_parts, reduce_windows
 from auvnn.executors import executor_for
 from auvnn.log_chunks import scan as parts_
 from auvnn.log_chunks.scan import Plan, WindowCut
@@ -67,7 +68,7 @@ def planned(paths: list[Path]) -> tuple[Plan, WindowCut]:
 
 def point(paths: list[Path], cut: WindowCut, asked: list[str]) -> tuple[LinearisationPoint, Any, list[str]]:
     """Stand at a point that no fit has chosen, so that nothing vanishes there."""
-    from auvnn.diagnosis.hypotheses.layout import lay_out
+    from auvnn.diagnosis.hypotheses.stated_priors import lay_out
     from auvnn.diagnosis.score_tests.probes import extent_of
 
     windows = cut_windows(Log.read(paths), 2.0, warmup=1.5, kind="thrusters", partial=True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis.hypotheses.candidates import candidates_for, windows_for
-from auvnn.logs.without import without
+from auvnn.logs.without_sensors import without
 from auvnn.metrics.unmeasured import completed
 from auvnn.models import GreyBox
 from auvnn.testing import plain_vehicle

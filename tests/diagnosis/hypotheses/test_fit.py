@@ -20,7 +20,7 @@ from auvnn.diagnosis.hypotheses.fit import (
     plausible,
     standard_errors,
 )
-from auvnn.diagnosis.hypotheses.layout import has_stated_uncertainty, lay_out, priors, scales
+from auvnn.diagnosis.hypotheses.stated_priors import has_stated_uncertainty, lay_out, priors, scales
 from auvnn.diagnosis.selection.predictive_density import (
     cross_validated_log_density,
     improves_predictive_density,
@@ -109,7 +109,7 @@ def test_what_one_run_or_one_window_alone_says_of_an_effect_counts(world, heard)
 
 
 @pytest.mark.parametrize("effects", [["net_buoyancy", "ocean_current"], []])
-def test_what_is_left_out_is_foreseen_as_the_joint_density_says(world, effects):
+def test_what_is_left_out_is_predicted_as_the_joint_density_says(world, effects):
     errors = drawn(world, 3, net_buoyancy=30.0)
     found, columns = fitted(world, errors, effects)
     held = plausible(world.layout, found.names, found.effects, found.fitted.priors, found.fitted.theta)
@@ -129,7 +129,7 @@ def test_what_is_left_out_is_foreseen_as_the_joint_density_says(world, effects):
 
 
 def test_what_a_bound_holds_is_not_credited_with_what_lies_beyond_it(world):
-    """A lag cannot be negative, however much better that would foresee."""
+    """A lag cannot be negative, however much better that would predict."""
     errors = drawn(world, 4, thruster_lag=-0.3)
     found, columns = fitted(world, errors, ["thruster_lag"])
     held = plausible(world.layout, found.names, found.effects, found.fitted.priors, found.fitted.theta)
@@ -148,7 +148,7 @@ def test_what_a_bound_holds_is_not_credited_with_what_lies_beyond_it(world):
     )
 
 
-def test_a_window_that_alone_knows_a_parameter_is_not_foreseen_from_hearsay(world):
+def test_a_window_that_alone_knows_a_parameter_is_not_predicted_from_the_others(world):
     """Elsewhere the effect leaves a fiftieth of its trace: what is fitted to that is noise, several times its size."""
     column = int(world.layout.columns["net_buoyancy"][0])
     jacobian = world.jacobian.copy()

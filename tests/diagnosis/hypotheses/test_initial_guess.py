@@ -7,7 +7,7 @@ import pytest
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
-from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.improvement import add

@@ -11,9 +11,9 @@ import torch
 from scipy.stats import multivariate_normal
 
 from auvnn.config import dump_yaml, parse_yaml
-from auvnn.diagnosis.hypotheses.bake import with_fitted_parameters
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, left_out, log_evidence
-from auvnn.diagnosis.hypotheses.layout import SINGULAR, lay_out, priors
+from auvnn.diagnosis.hypotheses.put_into_model import with_fitted_parameters
+from auvnn.diagnosis.hypotheses.stated_priors import SINGULAR, lay_out, priors
 from auvnn.errors import ModelError
 from auvnn.estimation.prediction_error import Fitted
 from auvnn.metrics.windows import cut_windows

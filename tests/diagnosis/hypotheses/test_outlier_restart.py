@@ -8,8 +8,8 @@ import pytest
 import auvnn
 from auvnn.diagnosis.hypotheses import outlier_restart as strays
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.diagnosis.hypotheses.layout import lay_out, priors
 from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out, priors
 from auvnn.estimation.prediction_error import fit
 from auvnn.estimation.priors import Priors
 

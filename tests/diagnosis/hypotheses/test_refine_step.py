@@ -8,7 +8,7 @@ import torch
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.refine_step import refine_step
-from auvnn.estimation.normal_equations import TRUST, motion
+from auvnn.estimation.window_normal_equations import TRUST, motion
 from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.windows import VELOCITY
 from auvnn.models import GreyBox

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import auvnn
-from auvnn.diagnosis.hypotheses.layout import REACH, lay_out, priors
+from auvnn.diagnosis.hypotheses.stated_priors import REACH, lay_out, priors
 from auvnn.errors import ConfigError, ModelError
 from auvnn.models import GreyBox, load
 from auvnn.vehicle import Vehicle, load_vehicle

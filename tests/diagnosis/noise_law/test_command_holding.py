@@ -12,7 +12,7 @@ import torch
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
-from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.answer import _held
 from auvnn.diagnosis.noise_law.command_holding import between, cubic_weights, holding
 from auvnn.logs import Log

@@ -9,7 +9,7 @@ import pytest
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
-from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle

@@ -1,4 +1,4 @@
-"""Names beside a stochastic force, on small logs."""
+"""Names together with a stochastic force, on small logs."""
 
 from __future__ import annotations
 

@@ -9,9 +9,9 @@ import pytest
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
-from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.noise_colour import noise_colour
-from auvnn.estimation.normal_equations import TRUST, motion
+from auvnn.estimation.window_normal_equations import TRUST, motion
 from auvnn.logs import Log
 from auvnn.logs.signals.rotation import from_euler, to_euler
 from auvnn.models import GreyBox

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.one_step.rank import Ranked, _plainer_first
 from auvnn.diagnosis.one_step.refit import OneStepRefit
 from auvnn.diagnosis.one_step.slopes import AccelerationSlopes, extent_of_log

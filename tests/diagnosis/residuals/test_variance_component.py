@@ -12,7 +12,7 @@ from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.answers.words import tell
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
-from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.residuals.variance_component import (
     Unnamed,
     moment_matched_test,

@@ -8,15 +8,15 @@ import torch
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
-from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.score_tests.null_tests import NullTests
 from auvnn.diagnosis.score_tests.probes import extent_of, probed
 from auvnn.diagnosis.score_tests.score import Score, score
 from auvnn.diagnosis.score_tests.shape_search import ShapeSearch, search_shapes
 from auvnn.effects import EFFECTS, Extent
-from auvnn.estimation.normal_equations import linearise, normal_equations
 from auvnn.estimation.priors import set_parameters
 from auvnn.estimation.sensitivity import respond
+from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.metrics.free_run import initial_states
 from auvnn.models import GreyBox, load
 from auvnn.simulation import simulate

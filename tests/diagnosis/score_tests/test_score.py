@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from auvnn.diagnosis.hypotheses.layout import priors
+from auvnn.diagnosis.hypotheses.stated_priors import priors
 from auvnn.diagnosis.score_tests.score import project, score, similarity
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from tests.diagnosis.linear_world import STATED, World, layout

@@ -8,7 +8,7 @@ import pytest
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis, log_evidence
-from auvnn.diagnosis.hypotheses.layout import lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.diagnosis.selection.model_comparison import ModelComparison

@@ -60,6 +60,6 @@ def test_a_length_that_was_asked_for_is_not_changed(log):
         windows_that_hold(pushing(0.4), log, 4.0)
 
 
-def test_units_of_sums_that_say_nothing_are_nought_and_none_overflows():
+def test_units_of_sums_that_say_nothing_are_zero_and_none_overflows():
     units = unit_of(np.diag([4.0, 0.0, -1e13, np.nan, 1e200]))
     np.testing.assert_array_equal(units, [0.5, 0.0, 0.0, 0.0, 1e-100])

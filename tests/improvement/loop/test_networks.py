@@ -71,7 +71,7 @@ def test_a_model_that_has_subnetworks_keeps_them(model):
     assert walk.steps == [] and walk.tried == []
 
 
-def test_learned_terms_are_foreseen_within_their_bounds(model, monkeypatch):
+def test_learned_terms_are_predicted_within_their_bounds(model, monkeypatch):
     """What a term promises beyond its bounds cannot be had: its scale is held to a hundredth of what is needed."""
     truth = model.with_effects({"net_buoyancy": {"force": 8.0}})
     walk = Walk(model, make_log(truth, runs=3, duration=12.0, noise=0.3), None, [], 1, 600.0, None, None)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from auvnn.logs import Log
-from auvnn.logs.quality.command_rate import CLEAR, between_samples, unforetold
+from auvnn.logs.quality.command_rate import CLEAR, between_samples, unpredicted
 from auvnn.models import load
 from auvnn.simulation import simulate
 from auvnn.simulation.excitations import EXCITATIONS
@@ -24,18 +24,18 @@ def band_limited(t, highest, rng, count=40):
     return np.sin(2 * np.pi * np.outer(t, f) + phase).sum(1) / np.sqrt(count) * 0.3
 
 
-def test_white_noise_is_wholly_unforetold_and_a_slow_sine_wholly_foretold():
+def test_white_noise_is_wholly_unpredicted_and_a_slow_sine_wholly_predicted():
     rng = np.random.default_rng(1)
     white, t = rng.normal(size=20000), 0.05 * np.arange(20000)
     run = make_run(n=20000)
-    share, changing = unforetold(run, white)
+    share, changing = unpredicted(run, white)
     assert share == pytest.approx(1.0, abs=0.03) and changing == 1.0
-    assert unforetold(run, np.sin(0.4 * t))[0] < 1e-4
+    assert unpredicted(run, np.sin(0.4 * t))[0] < 1e-4
     # A sine of w rad per sample leaves 1 - (4 cos w - cos 2w)/3 of itself, whose median is half a right angle's.
     w = 1.0
     left = 1.0 - (4.0 * np.cos(w) - np.cos(2.0 * w)) / 3.0
     wanted = left * np.sqrt(2.0) * np.sin(np.pi / 4) / (np.sqrt(1 + 34 / 36) * 0.6745)
-    assert unforetold(run, np.sin(w * np.arange(20000)))[0] == pytest.approx(wanted, rel=0.01)
+    assert unpredicted(run, np.sin(w * np.arange(20000)))[0] == pytest.approx(wanted, rel=0.01)
 
 
 @pytest.mark.parametrize("rate", [20.0, 5.0])
@@ -70,10 +70,10 @@ def test_gaps_rest_and_short_runs_say_nothing():
     rng = np.random.default_rng(5)
     y = rng.normal(size=600)
     run = make_run(n=600)
-    assert unforetold(run, np.full(600, 0.3)) == (0.0, 0.0)
-    assert unforetold(make_run(n=30), y[:30]) == (0.0, 0.0)
+    assert unpredicted(run, np.full(600, 0.3)) == (0.0, 0.0)
+    assert unpredicted(make_run(n=30), y[:30]) == (0.0, 0.0)
     y[::5] = np.nan
-    assert unforetold(run, y) == (0.0, 0.0)
+    assert unpredicted(run, y) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("excitation", ["multisine", "chirp", "pulses"])
@@ -83,7 +83,7 @@ def test_the_packages_own_manoeuvres_are_no_finding(excitation, rate):
     plan = make_excitation(excitation, EXCITATIONS).plan(load("rov95"), t, [np.random.default_rng(1)])
     run = make_run(n=len(t), dt=1.0 / rate, thrusters=plan.command[0])
     assert between_samples(Log.from_runs([run])) == []
-    assert max(unforetold(run, y)[0] for y in run.thrusters.T) < CLEAR
+    assert max(unpredicted(run, y)[0] for y in run.thrusters.T) < CLEAR
 
 
 @pytest.mark.long

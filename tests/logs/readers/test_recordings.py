@@ -9,7 +9,7 @@ import pytest
 
 from auvnn.errors import InputError
 from auvnn.logs import Log
-from auvnn.logs.look import look
+from auvnn.logs.inspect_file import look
 from auvnn.logs.readers import choose
 from tests.log_samples import make_run
 from tests.logs import foreign_formats as foreign
@@ -218,7 +218,7 @@ def test_frames_that_lie_are_refused(tmp_path: Path) -> None:
     odometry = recording.topics.pop("/odom")
     odometry.name = "/mavros/global_position/local"
     recording.topics[odometry.name] = odometry
-    from auvnn.logs.known import propose
+    from auvnn.logs.mapping_rules import propose
     from auvnn.logs.reading.mapping_file.mapping import Mapping
     from auvnn.logs.reading.recordings.assemble import from_recording
 
@@ -234,7 +234,7 @@ def test_frames_that_lie_are_refused(tmp_path: Path) -> None:
 
 def test_looking_says_what_there_is_and_the_mapping_reads_it(tmp_path: Path) -> None:
     pytest.importorskip("mcap_ros2")
-    from auvnn.logs.look import write_mapping
+    from auvnn.logs.inspect_file import write_mapping
 
     path = written("mcap", tmp_path)
     seen = look(path)

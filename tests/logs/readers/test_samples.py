@@ -89,7 +89,7 @@ def test_bags_of_other_things_are_refused_and_listed(name: str) -> None:
 
 def test_turtles_are_seen() -> None:
     pytest.importorskip("rosbags")
-    from auvnn.logs.look import look
+    from auvnn.logs.inspect_file import look
 
     seen = look(FOLDER / "ros1" / "example.bag")
     pose = seen.recording.topics["/turtle1/pose"]

@@ -1,4 +1,4 @@
-// The log: drop a file, see what was read, mend units and frames, and hear what the check objects to.
+// The log: drop a file, see what was read, correct units and frames, and hear what the check objects to.
 
 import { attempt, get, post, upload } from "./api.js";
 import { card, choice, duration, h, number, plural, s, show } from "./dom.js";

@@ -10,7 +10,7 @@ import numpy as np
 
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs.channels import ACCELERATION, EULER, POSITION, QUATERNION, VELOCITY, WRENCH
-from auvnn.logs.known import lies, propose
+from auvnn.logs.mapping_rules import lies, propose
 from auvnn.logs.readers.base import Table
 from auvnn.logs.reading.mapping_file.columns import Column
 from auvnn.logs.reading.mapping_file.mapping import Mapping

@@ -1,4 +1,4 @@
-"""What is mended or masked while a log is read, each step counted as a `repair`.
+"""What is corrected or masked while a log is read, each step counted as a `repair`.
 
 `delays` and `clock` put time right; `validity`, `masks` and `cores` take out what no sensor measured; `attitude`
 makes unit quaternions without sign flips. `resets` then splits where an estimated pose starts afresh, and `plausible`

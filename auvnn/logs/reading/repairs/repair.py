@@ -1,4 +1,4 @@
-"""What was mended, noted or doubted while a log was read: counted, never silent."""
+"""What was corrected, noted or doubted while a log was read: counted, never silent."""
 
 from __future__ import annotations
 

@@ -51,9 +51,9 @@ def _joint(view: View) -> list[HtmlTable]:
         for name, e in joint.items()
     ]  # fmt: skip
     caption = (
-        "Share of what looks like a force that each name explains beside the others, by degree of freedom, and the "
-        "fall of the error of free running on runs left out that it brings beside them. None of them is claimed to be "
-        "the cause."
+        "Share of what looks like a force that each name explains in addition to the others, by degree of freedom, and "
+        "the fall of the error of free running on runs left out that it brings in addition to them. None of them is "
+        "claimed to be the cause."
     )
     values = {str(n): e["parameters"] for n, e in joint.items() if e.get("parameters")}
     return [

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from auvnn.answers import Answer, plain
-from auvnn.diagnosis.hypotheses.layout import GROUPS
+from auvnn.diagnosis.hypotheses.stated_priors import GROUPS
 from auvnn.studies.benchmark.cases import targets
 from auvnn.studies.benchmark.counts import counting
 from auvnn.studies.benchmark.counts.counting import (

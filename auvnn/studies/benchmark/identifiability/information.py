@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.diagnosis.hypotheses.layout import FREE, Layout, lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import FREE, Layout, lay_out
 from auvnn.diagnosis.score_tests.probes import Probed, extent_of, probed
-from auvnn.estimation.normal_equations import TRUST, linearise, motion, normal_equations
-from auvnn.estimation.nuisance import NormalEquations
+from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.priors import set_parameters
+from auvnn.estimation.window_normal_equations import TRUST, linearise, motion, normal_equations
 from auvnn.logs import Log
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import CHANNELS, Windows

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.hypotheses.layout import FREE
+from auvnn.diagnosis.hypotheses.stated_priors import FREE
 from auvnn.diagnosis.score_tests.probes import extent_of
 from auvnn.effects import Parameter, effect_class
-from auvnn.estimation.nuisance import NormalEquations
+from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
 from auvnn.simulation import Simulation

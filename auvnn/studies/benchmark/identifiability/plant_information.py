@@ -11,8 +11,8 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.effects import effect_class
-from auvnn.estimation.normal_equations import normal_equations
 from auvnn.estimation.sensitivity import Response
+from auvnn.estimation.window_normal_equations import normal_equations
 from auvnn.metrics.free_run import moved
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox

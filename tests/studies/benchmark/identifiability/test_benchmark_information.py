@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.diagnosis.hypotheses.layout import FREE, lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import FREE, lay_out
 from auvnn.models import load
 from auvnn.simulation import simulate
 from auvnn.studies.benchmark.identifiability.information import (

@@ -1,0 +1,17 @@
+"""Slocum gliders' sensors: radians and metres; pitch is positive nose up; each sensor has times of its own."""
+
+from __future__ import annotations
+
+from auvnn.logs.mapping_rules.moos import present
+from auvnn.logs.mapping_rules.rule import Rule
+
+_KIND = "slocum"
+RULES = [
+    Rule(
+        "attitude", _KIND, present(("theta", "m_pitch", {}), ("phi", "m_roll", {}), ("psi", "m_heading", {}))
+    ),
+    Rule("depth", _KIND, present(("z", "m_depth", {}))),
+    Rule("fins", _KIND, present(("fin_1", "m_fin", {}))),
+    Rule("altitude", _KIND, present(("altitude", "m_altitude", {}))),
+    Rule("voltage", _KIND, present(("voltage", "m_battery", {}))),
+]
