@@ -9,19 +9,21 @@ import time
 from pathlib import Path
 
 from auvnn.answers import write_text
-from auvnn.app.script import commands, python
+from auvnn.app.script import Told, commands, python
 from auvnn.app.session import Session
 from auvnn.errors import ConfigError, InputError
 
-PATIENCE = 120.0  # s
+PATIENCE = 600.0  # s, for reports to be drawn
+GONE = "the worker process ended before it was drawn; run the step again to have it"
 ANSWERS = ("comparison", "diagnosis", "improvement", "improve")
 
 
-def save(session: Session, folder: Path) -> list[str]:
-    """Write everything into a folder that is new or empty, and return what it holds then.
+def save(session: Session, folder: Path) -> tuple[list[str], list[str]]:
+    """Write everything into a folder that is new or empty; return what it holds then, and what could not be drawn.
 
     `model/` (where effects were kept), `log.parquet` and `test.parquet`, the answers with their reports, `commands.sh`
-    and `loop.py`. It is staged beside its place and moved there: either all of it is there, or nothing.
+    and `loop.py`. It is staged beside its place and moved there: either all of it is there, or nothing. Reports that
+    are being drawn are waited for; nothing else is begun meanwhile.
 
     Args:
         session: what was done.
@@ -29,12 +31,22 @@ def save(session: Session, folder: Path) -> list[str]:
 
     Raises:
         ConfigError: the folder holds something, or there is nothing to save.
-        InputError: it cannot be written to.
+        InputError: it cannot be written to, or the reports are not drawn in time.
     """
     folder = folder.expanduser().absolute()
     told = session.told()
     with session.lock:
         session.refuse_busy()
+        session.saving = True
+    try:
+        return _saved(session, folder, told)
+    finally:
+        with session.lock:
+            session.saving = False
+
+
+def _saved(session: Session, folder: Path, told: Told) -> tuple[list[str], list[str]]:
+    with session.lock:
         source, history, answers = session.source, list(session.history), dict(session.answers)
     assert source is not None and source.fit is not None
     last = history[-1]
@@ -43,7 +55,7 @@ def save(session: Session, folder: Path) -> list[str]:
         k: last.answer if k == last.kind and last.answer is not None else answers.get(k) for k in ANSWERS
     }
     places = {kind: place for kind, place in wanted.items() if place is not None}
-    _drawn(session, list(places.values()))
+    missing = _drawn(session, places)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ConfigError(f"{folder}: is not empty; choose a new folder")
     try:
@@ -59,7 +71,7 @@ def save(session: Session, folder: Path) -> list[str]:
             source.held.write(stage / "test.parquet")
         for kind, place in places.items():
             shutil.copy(place / f"{kind}.json", stage / f"{kind}.json")
-            if (place / "report.html").is_file():
+            if kind not in missing:
                 # `report.html` is that of the saved model; where none was kept, that of the last fit.
                 main = last.kind if last.answer is not None else "improvement"
                 name = "report.html" if kind == main else f"{kind}.html"
@@ -75,18 +87,41 @@ def save(session: Session, folder: Path) -> list[str]:
     finally:
         shutil.rmtree(stage, ignore_errors=True)
     held = sorted(entry.name + "/" * entry.is_dir() for entry in folder.iterdir())
+    without = [f"the report of the {kind} is not there: {why}" for kind, why in missing.items()]
     with session.lock:
         session.saved.append(str(folder))
+        session.saved_without = without
         session.version += 1
-    return held
+    return held, without
 
 
-def _drawn(session: Session, places: list[Path]) -> None:
-    """Wait until the child process, which has nothing else to do now, has drawn the reports."""
+def _drawn(session: Session, places: dict[str, Path]) -> dict[str, str]:
+    """Wait until the child process, which has nothing else to do now, has drawn the reports.
+
+    Args:
+        session: what was done.
+        places: folder of each answer, by its kind.
+
+    Returns:
+        Why a report will never be there, by the kind of its answer.
+
+    Raises:
+        InputError: it takes too long.
+    """
     end = time.monotonic() + PATIENCE
-    while time.monotonic() < end and session.child.alive:
-        if all((place / "report.html").is_file() for place in places):
-            return
+    while True:
+        # Asked first: what the child drew before it ended is there.
+        alive = session.child.alive
+        left = {kind: place for kind, place in places.items() if not (place / "report.html").is_file()}
+        missing = {kind: session.undrawn[str(p)] for kind, p in left.items() if str(p) in session.undrawn}
+        if len(missing) == len(left):
+            return missing
+        if not alive:
+            return {kind: missing.get(kind, GONE) for kind in left}
+        if time.monotonic() >= end:
+            raise InputError(
+                f"the reports are still being drawn after {PATIENCE:.0f} s, nothing was saved; press Save again"
+            )
         time.sleep(0.1)
 
 

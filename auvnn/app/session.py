@@ -15,6 +15,7 @@ from auvnn.app.source import Source
 from auvnn.errors import AuvnnError, ConfigError, one_line
 
 LONG = 100_000  # samples from which on the quality report takes seconds
+ANSWERED = 5.0  # s, within which the child says whether it has begun a job
 
 
 class Session(SessionState):
@@ -29,6 +30,7 @@ class Session(SessionState):
     def __init__(self, work: Path, out: Path, model: str | None = None) -> None:
         super().__init__(work, out, model)
         self.child = Child(work, self._hear)
+        self._left_out, self._skipped = threading.Event(), False
 
     def open(self, source: Source) -> None:
         """Read a log and make it the one that the page works on; what was found on another one is forgotten.
@@ -129,6 +131,11 @@ class Session(SessionState):
                 return
             job.state, job.seconds = "stopped", time.monotonic() - job.began
             self.version += 1
+        # Before a job begins the child draws the reports of what was found before: these must not end with it.
+        self._left_out.clear()
+        self._skipped = False
+        if self.child.skip(job.number) and self._left_out.wait(ANSWERED) and self._skipped:
+            return
         self.child.stop()
         shutil.rmtree(job.out.with_name(f".{job.out.name}.part"), ignore_errors=True)
         shutil.rmtree(job.out, ignore_errors=True)
@@ -140,6 +147,14 @@ class Session(SessionState):
         with self.lock:
             self.version += 1
             job = self.job
+            if "left_out" in report:
+                self._skipped = report["left_out"]
+                self._left_out.set()
+                return
+            if "drawn" in report:
+                if report["problem"]:
+                    self.undrawn[report["drawn"]] = report["problem"]
+                return
             if job is None or job.state != "running":
                 return
             if "ended" in report:

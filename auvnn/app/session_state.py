@@ -38,6 +38,10 @@ class SessionState:
         self.reading, self._numbers = "", 0
         self.views: dict[str, Any] = {}
         self.looked = threading.Event()
+        # Folders of answers whose report could not be drawn, and why; whether somebody is saving.
+        self.undrawn: dict[str, str] = {}
+        self.saving = False
+        self.saved_without: list[str] = []
 
     def _forget(self) -> None:
         """Forget what was found with another log or another model; `self.lock` is held."""
@@ -55,6 +59,8 @@ class SessionState:
         """
         if self.job is not None and self.job.state == "running":
             raise ConfigError(f"{self.job.words} is running: wait for it, or stop it first")
+        if self.saving:
+            raise ConfigError("what was found is being saved: wait for it")
         if self.reading:
             raise ConfigError(f"{self.reading} is being read: wait for it")
 
@@ -113,5 +119,6 @@ class SessionState:
                                 "report": (p / "report.html").is_file()} for k, p in self.answers.items()},
                 "job": None if self.job is None else self.job.told(),
                 "saved": self.saved,
+                "saved_without": self.saved_without,
                 "out": str(self.out),
             }  # fmt: skip

@@ -236,8 +236,8 @@ class Pages:
         """Write everything into a folder."""
         text = str(asked.get("folder") or "").strip()
         folder = Path(text) if text else saving.proposed(self.session)
-        held = saving.save(self.session, folder)
-        return {"folder": str(folder.expanduser().absolute()), "holds": held}
+        held, without = saving.save(self.session, folder)
+        return {"folder": str(folder.expanduser().absolute()), "holds": held, "without": without}
 
     async def report(self, request: Request) -> Response:
         """A report as one page that runs nothing."""

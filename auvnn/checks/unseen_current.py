@@ -38,8 +38,8 @@ def doubts(model: GreyBox, log: Log) -> list[str]:
     if float(np.hypot(north, east)) < _SLOWEST or chi < _CLEAR or share < _SHARE:
         return []
     return [
-        f"velocities are over ground, and what is left looks like a current of about {north:.2f} +- {north_std:.2f} m/s "
-        f"north, {east:.2f} +- {east_std:.2f} m/s east: consider the effect ocean_current"
+        f"velocities are over ground, and what is left looks like a current of about {north:.2f} m/s north and "
+        f"{east:.2f} m/s east (standard errors {north_std:.1g} and {east_std:.1g}): consider the effect ocean_current"
     ]
 
 

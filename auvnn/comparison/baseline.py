@@ -89,9 +89,8 @@ def standing(rollout: Mapping[str, Any], line: Mapping[str, Any]) -> list[str]:
         out.append(f"{_than(error, total)} a plain regression ({total:.3g})")
     if floor is not None and np.isfinite(floor):
         ratio = error / floor if floor > 0 else np.inf
-        near = (
-            "about what noise alone leaves" if ratio < 1.25 else f"{ratio:.2g} times what noise alone leaves"
-        )
+        times = f"{ratio:.2g}" if ratio < 99.5 else f"{ratio:.0f}"
+        near = "about what noise alone leaves" if ratio < 1.25 else f"{times} times what noise alone leaves"
         out.append(f"{near} ({floor:.3g})")
     return out
 

@@ -22,7 +22,7 @@ UNITS = {
     "turn rate": "rad/s",
     "attitude": "rad",
     "heading": "rad",
-    "command": "share of largest",
+    "command": "of the largest",
     "depth": "m",
     "time": "s",
 }

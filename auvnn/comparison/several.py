@@ -178,11 +178,16 @@ def compare(
 
 
 def labelled(given: Sequence[Any], loaded: Sequence[GreyBox]) -> list[str]:
-    """Return a label for each model, all different: its file or name, else its vehicle's name and its effects."""
+    """Return a label for each model, all different: its file or name, else its vehicle's name and its effects.
+
+    Of a path stands its end, as much of it as tells the models apart.
+    """
     out: list[str] = []
+    paths = {str(s): Path(s).parts for s in given if isinstance(s, (str, Path))}
     for source, model in zip(given, loaded, strict=True):
-        named = isinstance(source, (str, Path))
-        label = str(source) if named else " + ".join([model.vehicle.name, *model.effect_names])
+        label = " + ".join([model.vehicle.name, *model.effect_names])
+        if str(source) in paths:
+            label = _end(paths[str(source)], [p for s, p in paths.items() if s != str(source)])
         if label in out:
             number = 2
             while f"{label} ({number})" in out:
@@ -190,3 +195,11 @@ def labelled(given: Sequence[Any], loaded: Sequence[GreyBox]) -> list[str]:
             label = f"{label} ({number})"
         out.append(label)
     return out
+
+
+def _end(path: tuple[str, ...], others: Sequence[tuple[str, ...]]) -> str:
+    """Return the last parts of a path, as many as no other path ends with."""
+    for count in range(1, len(path)):
+        if all(other[-count:] != path[-count:] for other in others):
+            return str(Path(*path[-count:]))
+    return str(Path(*path))

@@ -7,6 +7,7 @@ from typing import Any
 
 from auvnn.catalogue import unknown_name
 from auvnn.comparison.baseline import compare_with_baseline
+from auvnn.comparison.compare import floor_of
 from auvnn.comparison.predictions import stitch
 from auvnn.diagnosis.answers.answer import OneOf
 from auvnn.diagnosis.answers.table import values
@@ -125,6 +126,8 @@ def _assembled(
     layout, best, last, key = fits.layout, fits.best, names[-1], judged.key
     results, rolled = judged.results, judged.rolled
     waterfall = [{"step": s, "error": results[s]["rollout"][key]["total"]} for s, _ in fits.steps]
+    for horizon, free in rolled[last].items():
+        results[last]["rollout"][horizon]["noise_floor"] = floor_of(fits.final, free, test, judged.scale)
     waterfall.append(
         {"step": "noise floor", "error": noise_floor(fits.final, rolled[last][key], test, judged.scale)}
     )

@@ -49,7 +49,7 @@ class ShownModel(Shown):
         names = ", ".join(self.effect_names)
         learned = "" if self.damping is None else "; learned damping"
         line = f"driven by {self.actuation}; {'effects: ' + names if names else 'no effects'}{learned}"
-        doubts = [f"Assumed: {w}." for w in self.vehicle.warnings[:3]]
+        doubts = [f"Assumed: {w}{'' if w.endswith('?') else '.'}" for w in self.vehicle.warnings[:3]]
         foot = ".vehicle.summary() lists its numbers, .plot() draws its damping, .save('folder') writes it"
         rows = parameter_rows(self.values())
         return Card(f"Model of {self.vehicle.name}", line, doubts, PARAMETER_HEAD, rows, foot)

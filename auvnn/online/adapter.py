@@ -57,7 +57,7 @@ class Adapter(AdapterParts):
         """Take one sample.
 
         Args:
-            t: s, increasing.
+            t: s, increasing, of any beginning: seconds since 1970 too, as float64.
             eta: (7,) position NED and quaternion, or (6,) with Euler angles.
             nu: (6,), m/s and rad/s.
             command: (n,) commands, held from `t` until the next sample.

@@ -18,6 +18,10 @@ from auvnn.online.residual import Sample
 UNIT = 0.05
 
 
+# s, to which a stamp must be exact.
+COARSEST = 0.01
+
+
 def tensor(value: Any, name: str, sizes: tuple[int, ...]) -> Tensor:
     """Return numbers as a double vector of one of the sizes; 0 stands for a scalar.
 
@@ -68,7 +72,7 @@ def sample_of(
         altitude: m, or None.
 
     Raises:
-        ConfigError: a vector has the wrong size.
+        ConfigError: a vector has the wrong size, or the stamp is of a type too coarse for it.
     """
     state = (
         tensor(eta, "eta", (7, 6)),
@@ -82,10 +86,31 @@ def sample_of(
         "altitude": None if altitude is None else tensor(altitude, "altitude", (0,)),
     }
     time = tensor(t, "t", (0,))
+    _fine_enough(t)
     given = [time, *state, *(v for v in others.values() if v is not None)]
     if not all(bool(torch.isfinite(v).all()) for v in given):
         return None
     return Sample.of(float(time), *state, **others)
+
+
+def _fine_enough(t: Any) -> None:
+    """Refuse a stamp whose type is too coarse for its value: a float32 of 1.7e9 s stands still for two minutes.
+
+    Raises:
+        ConfigError: its next larger value lies more than `COARSEST` away.
+    """
+    if (
+        not isinstance(t, (Tensor, np.ndarray, np.generic))
+        or "float" not in str(t.dtype)
+        or "64" in str(t.dtype)
+    ):
+        return
+    value = np.float32(float(t)) if "float32" in str(t.dtype) else np.float16(float(t))
+    if np.isfinite(value) and np.spacing(np.abs(value)) > COARSEST:
+        raise ConfigError(
+            f"adapter: t is {value:.7g} s in {str(t.dtype).removeprefix('torch.')}, exact to "
+            f"{np.spacing(np.abs(value)):.2g} s only: give it as float64, or count from the first sample"
+        )
 
 
 def turned(sample: Sample) -> Sample | None:

@@ -18,6 +18,7 @@ from auvnn.report import style
 from auvnn.report.html import HtmlTable, Part, Picture, closed, figure_markup, folded, render
 from auvnn.report.panels import NoData
 from auvnn.report.view import View
+from auvnn.report.words import prose
 
 T = TypeVar("T")
 MOST_SENTENCES = 6
@@ -160,9 +161,9 @@ class Page:
             kind=self.kind,
             title=safely("the title", lambda: self.title(view), self.kind),
             about=safely("the subject", lambda: self.about(view), ""),
-            brief=safely("the verdict", lambda: self.brief(view)[:MOST_SENTENCES], [])
+            brief=safely("the verdict", lambda: _prose(self.brief(view)[:MOST_SENTENCES]), [])
             or ["There is no verdict in this answer."],
-            warnings=safely("the warnings", lambda: self.warnings(view), []),
+            warnings=safely("the warnings", lambda: _prose(self.warnings(view)), []),
             pictures=folded(
                 [_picture(plot, drawn, prefix, notes) for plot in plots], 1 if prefix else self.shown
             ),
@@ -171,9 +172,13 @@ class Page:
             ),
             assumed=[(k, v) for k, v in safely("what was assumed", lambda: self.assumed(view), []) if v],
             notes=notes,
-            story=safely("the story", lambda: self.story(view), []),
+            story=safely("the story", lambda: _prose(self.story(view)), []),
             parts=parts,
         )
+
+
+def _prose(lines: list[str]) -> list[str]:
+    return [prose(line) for line in lines]
 
 
 def _missing(reason: str) -> Figure:

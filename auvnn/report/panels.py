@@ -86,6 +86,10 @@ def time_series(
         ax.set_xlabel(style.axis_label("t", "s"))
     figure.align_ylabels()
     title = label(title, 90)
+    # In the order of the story, whatever lies on top.
+    if "as given" in tables:
+        told = ("measured", "as given", "refitted", "after")
+        handles.sort(key=lambda h: told.index(h.get_label()) if h.get_label() in told else len(told))
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), title=title or None)
     return figure
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -33,6 +34,24 @@ def _one(c: str) -> str:
         return " "
     code = ord(c)
     return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
+_PROSE = (
+    (re.compile(r"(?<=\s)\+-(?=\s)"), "±"),
+    (re.compile(r"(?<=\s)->(?=\s)"), "→"),
+    (re.compile(r"(?<=\d) ?%(?!\w)"), f"{_SPACES[0]}%"),
+    (
+        re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-]\d+)(?!\w|\.\w)"),
+        lambda m: f"{m[1]} × 10{str(int(m[2])).translate(_DIGITS)}",
+    ),
+)
+
+
+def prose(text: str) -> str:
+    """Return a sentence of an answer, which is plain ASCII, with the signs of a page: ±, →, 10⁻⁷, a space before %."""
+    for pattern, sign in _PROSE:
+        text = pattern.sub(sign, text)
+    return text
 
 
 def finite(value: Any) -> float | None:

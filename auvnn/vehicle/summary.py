@@ -31,7 +31,9 @@ def summary(vehicle: Vehicle) -> Text:
         ("quadratic damping", _damping(v.quadratic_damping, "N s2/m2, N m s2")),
     ]
     if v.damping_elements:
-        rows.append(("damping elements", f"{len(v.damping_elements)} parts at offset centres"))
+        count = len(v.damping_elements)
+        parts = "part at an offset centre" if count == 1 else "parts at offset centres"
+        rows.append(("damping elements", f"{count} {parts}"))
     rows += [("thrusters", _thrusters(v)), ("fins", f"{v.n_fins}" if v.fins else "none")]
     rows.append(
         ("uncertainty", ", ".join(f"{k} {100 * s:g} %" for k, s in v.uncertainty.items() if s) or "none")

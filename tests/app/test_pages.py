@@ -102,6 +102,28 @@ def test_columns_are_named_and_units_set_on_the_page(asker, tmp_path):
     assert next(c for c in now if c["name"] == "u")["scale"] == 2.0
 
 
+def test_seconds_since_1970_are_counted_from_the_beginning(asker, dive, tmp_path):
+    import polars as pl
+
+    table, path = pl.read_parquet(dive), tmp_path / "dated.csv"
+    table.with_columns(pl.col("t") + 1_716_200_000.0).write_csv(path)
+    state = asker.post("open", path=str(path))
+    assert state["log"]["ready"] and asker.wait()["log"]["sizes"]["errors"] == 0
+    for group in ("velocity", "attitude"):
+        found = asker.get(f"traces?group={group}&run=1&points=200")
+        np.testing.assert_allclose(found["t"], Log.read(dive).runs[1].t, atol=1e-5)
+    asker.post("start", kind="compare")
+    assert asker.wait()["job"]["state"] == "done"
+    log, _, _ = Log.read(dive).split()
+    import auvnn
+
+    wanted = auvnn.compare(auvnn.load("rov95"), log).rollout["5"]["total"]
+    assert asker.get("answer?kind=comparison")["rollout"]["5"]["total"] == pytest.approx(wanted, rel=1e-4)
+    places = asker.get("where")["regimes"]
+    marks = asker.get(f"where-marks?regime={next(iter(places))}&bin=1")
+    assert all(0.0 <= a <= b <= 12.0 for spans in marks["runs"].values() for a, b in spans)
+
+
 @pytest.mark.parametrize(
     ("body", "words"),
     [

@@ -63,7 +63,7 @@ def test_improvement_says_whether_it_was_accepted(unseen, accepted, words):
     page = PageText(drawer("improvement").page(improvement(60, accepted=accepted)))
     assert words in page.text
     assert (
-        "0.26 of the spread of the motion, 0.21 with its coefficients fitted again, and 0.052 with"
+        "26 % of the spread of the motion, by 21 % with its coefficients fitted again, and by 5 % with"
         in page.text
     )
     assert "95 % of what could be gained" in page.text

@@ -59,6 +59,21 @@ class Child:
                     f"the worker process has ended ({problem}); press the button again"
                 ) from None
 
+    def skip(self, number: int) -> bool:
+        """Ask the process to leave a job out that it has not begun; False where it cannot be asked.
+
+        Args:
+            number: of the job.
+        """
+        process = self._process
+        if process is None or process.poll() is not None or process.stdin is None:
+            return False
+        with self._lock, contextlib.suppress(OSError, ValueError):
+            process.stdin.write(json.dumps({"skip": number}) + "\n")
+            process.stdin.flush()
+            return True
+        return False
+
     def stop(self) -> None:
         """End the process at once; whatever it was writing stays beside its place and is never moved there."""
         with self._lock:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import traceback
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from auvnn.app.source import split
 from auvnn.comparison import compare
 from auvnn.comparison.predictions import write_predictions
 from auvnn.diagnosis import diagnose
-from auvnn.errors import AuvnnError
+from auvnn.errors import AuvnnError, one_line
 from auvnn.improvement import add, improve
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import HORIZONS, NAMES, scale_of
@@ -65,15 +66,21 @@ class Tasks:
             self._pending.append((answer, out / "report.html"))
         return plain(summary)
 
-    def draw_one(self) -> Iterator[str]:
-        """Draw one report that is still to be drawn, if any, and yield its path."""
+    def draw_one(self) -> Iterator[tuple[str, str]]:
+        """Draw one report that is still to be drawn, if any, and yield its folder and why it could not be drawn."""
         if self._pending:
             answer, path = self._pending.pop(0)
             if path.parent.is_dir():
-                answer.report(path)
-                yield str(path)
+                problem = ""
+                try:
+                    answer.report(path)
+                except Exception as error:
+                    # The answer is whole without it; whoever saves is told.
+                    traceback.print_exc()
+                    problem = f"{type(error).__name__}: {one_line(error, 200)}"
+                yield str(path.parent), problem
 
-    def draw_all(self) -> Iterator[str]:
+    def draw_all(self) -> Iterator[tuple[str, str]]:
         """Draw all reports that are still to be drawn: a stopped job must not take them along."""
         while self._pending:
             yield from self.draw_one()

@@ -28,9 +28,18 @@ def main() -> None:
 
     orders: queue.Queue[dict[str, Any]] = queue.Queue()
 
+    begun, skipped, turn = 0, set[int](), threading.Lock()
+
     def listen() -> None:
         for line in sys.stdin:
-            orders.put(json.loads(line))
+            order = json.loads(line)
+            if "skip" not in order:
+                orders.put(order)
+                continue
+            with turn:
+                skipped.add(order["skip"])
+                # A job that has begun ends only with this process; one that has not is left out.
+                report(job=order["skip"], left_out=begun < order["skip"])
         # The server is gone: nobody waits for what is being done.
         os._exit(0)
 
@@ -44,13 +53,17 @@ def main() -> None:
             order = orders.get(timeout=0.2)
         except queue.Empty:
             # Reports are drawn while nobody waits for anything.
-            for drawn in tasks.draw_one():
-                report(drawn=drawn)
+            for drawn, problem in tasks.draw_one():
+                report(drawn=drawn, problem=problem)
             continue
         number = order["job"]
         try:
-            for drawn in tasks.draw_all():
-                report(drawn=drawn)
+            for drawn, problem in tasks.draw_all():
+                report(drawn=drawn, problem=problem)
+            with turn:
+                if number in skipped:
+                    continue
+                begun = number
             summary = tasks.do(
                 order, lambda words, job=number: report(job=job, progress=one_line(words, 200))
             )

@@ -8,7 +8,7 @@ from auvnn.cli.runs.job import Answering, Job, Verb
 
 def _run(job: Job) -> Answering:
     from auvnn.online import adapt
-    from auvnn.report.pages.sections.adaptation_words import off_words
+    from auvnn.report.pages.sections.adaptation_words import off_words, ratio_words, worse_words
 
     log = job.log()
     model = job.model(log)
@@ -34,8 +34,10 @@ def _run(job: Job) -> Answering:
         for words in off_words(metrics):
             job.say(f"off       {words}", style="yellow")
     ratio = metrics["frozen_5_s_error_ratio"]
-    shown = "unknown" if ratio is None else format(ratio, ".3g")
-    job.say(f"result    free running 5 s with weights frozen at each moment: {shown} times the error before")
+    shown = "the error is unknown" if ratio is None or ratio != ratio else ratio_words(ratio)
+    job.say(f"result    free running 5 s with weights frozen at each moment: {shown}")
+    for words in worse_words(ratio):
+        job.say(f"worse     {words}", style="yellow")
     return adaptation
 
 

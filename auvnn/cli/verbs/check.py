@@ -62,7 +62,8 @@ def _run(job: Job) -> Answering:
     quality.write(job.folder)
     findings = quality.findings
     for first, words in once(findings):
-        cure = f"; {first.cure}" if first.cure else ""
+        # Some findings name their cure in the same breath.
+        cure = f"; {first.cure}" if first.cure and first.cure not in words else ""
         job.say(f"{first.level:<9} {words}{cure}", style=_STYLE.get(first.level))
     if not findings:
         job.say("result    nothing to complain of")

@@ -180,9 +180,7 @@ def _warnings(asked: Setting, state: State) -> list[str]:
         found.append("the log holds one run: what is left out in turn are stretches of it")
     if state.silent:
         them = "it" if len(state.silent) == 1 else "them"
-        found.append(
-            f"{log.name} says nothing about {', '.join(state.silent)}: nothing in it depends on {them}"
-        )
+        found.append(f"the log says nothing about {', '.join(state.silent)}: nothing in it depends on {them}")
     if not has_stated_uncertainty(asked.model):
         found.append("no coefficient of the model is uncertain: any error of theirs will be given a name")
     found += reservations(asked.layout, state.current, state.current.effects)

@@ -26,11 +26,11 @@ def costs(diagnosis: Diagnosis) -> list[str]:
             parts.append(f"without it the error of free running on runs left out is {_change(entry['cost'])}")
         worst = entry.get("worst")
         if worst and _known(worst["cost"]):
-            parts.append(f"in {worst['velocity']} {_change(worst['cost'])}")
+            parts.append(f"in {worst['velocity']} it is {_change(worst['cost'])}")
         strongest = _largest(entry["force"])
         if strongest:
-            share = f", {entry['share']:.1%} of the actuators'" if _known(entry["share"]) else ""
-            parts.append(f"its force is {strongest} rms{share}")
+            share = f", up to {_share(entry['share'])} of the actuators'" if _known(entry["share"]) else ""
+            parts.append(f"its force is {strongest} (rms){share}")
         if not parts:
             continue
         verdict = "" if entry["matters"] else " It is there and does not matter within the tolerance."
@@ -104,8 +104,17 @@ def _known(value: Any) -> TypeGuard[float]:
 
 def _change(cost: float) -> str:
     if cost >= 1.0:
-        return f"{1.0 + cost:.2g} times as large"
-    return f"{abs(cost):.1%} {'larger' if cost >= 0 else 'smaller'}"
+        return f"{_two_digits(1.0 + cost)} times as large"
+    return f"{_share(abs(cost))} {'larger' if cost >= 0 else 'smaller'}"
+
+
+def _two_digits(value: float) -> str:
+    """Return a number to two digits, from a hundred on without an exponent."""
+    return f"{value:.2g}" if value < 99.5 else f"{value:.0f}"
+
+
+def _share(share: float) -> str:
+    return f"{_two_digits(100.0 * share)}%"
 
 
 def _size(value: float, axis: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from auvnn.comparison.compare import floor_of
 from auvnn.comparison.predictions import stitch
 from auvnn.logs import Log
 from auvnn.metrics.derivative import Derivative
@@ -40,6 +41,8 @@ def budget(steps: Sequence[tuple[str, str, GreyBox]], log: Log, test: Log, how: 
         {"step": name, "kind": kind, "error": error}
         for (name, kind, _), error in zip(steps, errors, strict=True)
     ]
+    for horizon, free in finally_.items():
+        after[horizon]["noise_floor"] = floor_of(last, free, test, scale)
     floor = noise_floor(last, finally_[key], test, scale)
     waterfall.append({"step": "noise floor", "kind": "left", "error": floor})
     plain = Regression.of(log, first.actuation, how)

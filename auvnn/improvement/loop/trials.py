@@ -164,12 +164,19 @@ class Trials:
         """Accept a step if it pays on what was left out, and say so."""
         won = gain(self.state.left, state.left)
         pays = won.beyond(1.0)
-        words = f"{won.before:.3f} -> {won.after:.3f} on what was left out (fall {won.value:.3f} +- {won.std:.3f})"
+        fall = f"fall {won.value:.2g} +- {won.std:.1g}"
+        words = f"{won.before:.3f} -> {won.after:.3f} on what was left out ({fall})"
         if pays:
             self._note(state, step, kind, True, reason)
             self.state = state
-            self.told(f"Taken: {step} ({kind}; {reason}): {words}.")
+            self.told(f"Taken: {_named(step, kind, reason)}: {words}.")
         else:
             self._note(state, step, kind, False, "does not pay on what was left out")
-            self.told(f"Not taken: {step} ({kind}): {words}.")
+            self.told(f"Not taken: {_named(step, kind)}: {words}.")
         return pays
+
+
+def _named(step: str, kind: str, reason: str = "") -> str:
+    """Return a step with what kind it is and why, each said once."""
+    more = "; ".join(w for w in (kind, reason) if w and w != step)
+    return f"{step} ({more})" if more else step

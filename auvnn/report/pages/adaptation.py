@@ -12,10 +12,14 @@ from auvnn.report import style
 from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
-from auvnn.report.pages.sections.adaptation_words import off_words, ratio_words
+from auvnn.report.pages.sections.adaptation_words import off_words, ratio_words, worse_words
 from auvnn.report.plots.adaptation import movement, skipped, with_and_without
 from auvnn.report.view import View
-from auvnn.report.words import count, finite, number, plural
+from auvnn.report.words import count, finite, number, percent, plural
+
+MARKS = (
+    "Grey lines part runs; dotted lines are changes that were seen, by their numbers in the table of changes."
+)
 
 
 class AdaptationPage(Page):
@@ -40,9 +44,11 @@ class AdaptationPage(Page):
         if ratio is not None:
             out.append(f"Running free for 5 s with the weights frozen at each moment, {ratio_words(ratio)}.")
         changes = _changes(view)
-        for change in changes[:2]:
-            words = str(change.get("words", ""))
-            out.append(f"Run {change.get('run')}: {words}.")
+        out += worse_words(ratio)
+        out += [f"Run {change.get('run')}: {_change_words(change)}." for change in changes[:2]]
+        if len(changes) > 2:
+            out.append(f"{plural(len(changes) - 2, 'further change')} was seen, listed below." if len(changes) == 3
+                       else f"{len(changes) - 2} further changes were seen, listed below.")  # fmt: skip
         if not changes:
             out.append("No change of the vehicle was seen.")
             out += off_words(metrics)
@@ -62,21 +68,22 @@ class AdaptationPage(Page):
                 "prediction_error",
                 "Prediction error of the acceleration, with and without adaptation",
                 lambda: _one_step(view),
-                "Before each sample is learned from; grey lines part runs. Following every residual makes this small "
-                "by itself: the next figure shows what was learned of the vehicle.",
+                "Before each sample is learned from. Following every residual makes this small by itself: the next "
+                f"figure shows what was learned of the vehicle. {MARKS}",
             ),
             Plot(
                 "frozen_error",
                 "Free running for 5 s with the weights frozen at each moment",
                 lambda: _frozen(view),
-                "Root mean square error of the velocity over the 5 s that follow, from the measured state.",
+                "Root mean square error of the velocity over the 5 s that follow, from the measured state. There is no "
+                "line where samples are missing in these 5 s.",
             ),
             Plot(
                 "movement",
                 "How far the weights moved",
                 lambda: _movement(view),
-                "Distance of all parameters from where they began, relative to their size; dotted lines mark "
-                "changes of the vehicle that were seen, with their kind.",
+                "Distance of all parameters from where they began, relative to their size; below, when samples were "
+                "learned from.",
             ),
             Plot(
                 "skipped",
@@ -89,32 +96,32 @@ class AdaptationPage(Page):
     def tables(self, view: View) -> list[HtmlTable]:
         """Return the tables."""
         rows, kinds = [], []
-        for change in _changes(view):
+        for k, change in enumerate(_changes(view), 1):
             fitted = {str(change.get("effect")): change.get("parameters") or {}}
-            time = number(change.get("time"), 4)
-            rows += [[time, str(change.get("kind")), *row] for row in common.parameter_rows(fitted)]
+            first = [str(k), number(change.get("time"), 4), str(change.get("kind"))]
+            rows += [[*first, *row] for row in common.parameter_rows(fitted)]
             if not fitted[str(change.get("effect"))]:
-                rows.append([time, str(change.get("kind")), "–", "–", "–", "–"])
+                rows.append([*first, "–", "–", "–", "–"])
             kinds += [
-                [time, str(k.get("kind")), number(k.get("evidence")), number(k.get("explained"), 3)]
-                for k in change.get("kinds") or []
+                [*first[:2], str(o.get("kind")), number(o.get("evidence")), percent(o.get("explained"))]
+                for o in change.get("kinds") or []
             ]
         refused = [
-            [name.replace("_", " "), count(told.get("count", 0)), str(told.get("words", ""))]
+            [name.replace("_", " "), str(told.get("words", "")), count(told.get("count", 0))]
             for name, told in view.mapping("skipped").items()
         ]
         metrics = [[str(k), number(v, 4)] for k, v in view.mapping("metrics").items()]
         return [
-            HtmlTable("Changes seen", ["time, s", "kind", *common.PARAMETER_HEAD], rows, words=4),
+            HtmlTable("Changes seen", ["number", "time, s", "kind", *common.PARAMETER_HEAD], rows, words=5),
             HtmlTable(
                 "What each kind of change would explain",
-                ["time, s", "kind", "evidence, nats", "share explained"],
+                ["number", "time, s", "kind", "evidence, nats", "share explained"],
                 kinds,
                 "Evidence: logarithm of the odds against no change. Where several explain as much, the "
                 "excitation cannot tell them apart and none is named.",
-                words=2,
+                words=3,
             ),
-            HtmlTable("Samples not learned from", ["reason", "samples", "meaning"], refused),
+            HtmlTable("Samples not learned from", ["reason", "meaning", "samples"], refused, words=2),
             HtmlTable("Metrics", ["name", "value"], metrics),
         ]
 
@@ -134,6 +141,15 @@ class AdaptationPage(Page):
 
 def _changes(view: View) -> list[Mapping[str, Any]]:
     return [c for c in view.get("changes") or [] if isinstance(c, Mapping)]
+
+
+def _change_words(change: Mapping[str, Any]) -> str:
+    """Return what is said of a change; its values as they stand in tables, where it has a name."""
+    fitted = change.get("parameters") or {}
+    if not fitted or not change.get("effect"):
+        return str(change.get("words", ""))
+    values = common.parameter_words(fitted)
+    return f"at {finite(change.get('time')) or 0.0:.5g} s a change of {change.get('kind')} ({change['effect']}: {values})"
 
 
 def _counts(view: View) -> dict[str, int]:

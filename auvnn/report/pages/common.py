@@ -13,7 +13,7 @@ from auvnn.report.panels import NoData
 from auvnn.report.plots.measured_against_model import rms
 from auvnn.report.style import MOTIONS, VELOCITY, WRENCH
 from auvnn.report.view import View
-from auvnn.report.words import count, finite, interval, listing, number
+from auvnn.report.words import count, finite, interval, listing, number, percent
 
 CHANNELS = tuple(symbol for symbol, _ in VELOCITY)
 AXES = tuple(symbol for symbol, _ in WRENCH)
@@ -94,13 +94,30 @@ def baseline_words(view: View) -> list[str]:
     if finite(line.get("total")) is None:
         return []
     out = [
-        f"A plain regression of the acceleration, run freely over the same windows, errs by {number(line['total'], 2)}."
+        "A plain regression of the acceleration, run freely over the same windows, errs by "
+        f"{percent(line['total'])} of the spread."
     ]
-    for key, what in (("baseline", "the plain regression"), ("persistence", "holding the initial velocity")):
-        channels = [channel_words(c) for c in loses.get(key) or ()]
+    return out + losing_words(loses, "The model")
+
+
+def losing_words(loses: Mapping[str, Any], who: str) -> list[str]:
+    """Return in which channels a model predicts worse than what needs no model, a sentence for each of the two.
+
+    Args:
+        loses: channels by "baseline" and "persistence".
+        who: the model, in words.
+    """
+    out: dict[str, list[str]] = {}
+    for key, what in (("baseline", "a plain regression"), ("persistence", "holding the initial velocity")):
+        channels = [str(c) for c in loses.get(key) or ()]
         if channels:
-            out.append(f"The model loses to {what} in {listing(channels)}.")
-    return out
+            where = (
+                "all six velocities"
+                if set(channels) >= {*CHANNELS}
+                else listing(channel_words(c) for c in channels)
+            )
+            out.setdefault(where, []).append(what)
+    return [f"{who} predicts worse than {listing(what)} in {where}." for where, what in out.items()]
 
 
 def baseline_table(view: View) -> HtmlTable:
@@ -162,9 +179,14 @@ def parameter_rows(fitted: Mapping[str, Any]) -> list[list[str]]:
             )
             ends = "–"
             if value is not None and std is not None:
-                ends = f"{number(value - 1.96 * std)} to {number(value + 1.96 * std)}"
+                ends = f"{_like(value - 1.96 * std, std)} to {_like(value + 1.96 * std, std)}"
             rows.append([effect, name, interval(value, std, unit), ends])
     return rows
+
+
+def _like(value: float, std: float) -> str:
+    """Return the end of an interval to two digits of the standard deviation, as the value beside it stands."""
+    return interval(value, std).partition(" ±")[0]
 
 
 def parameter_table(fitted: Mapping[str, Any]) -> HtmlTable:

@@ -14,6 +14,8 @@ from auvnn.report.pages.quality import QualityPage
 from auvnn.report.view import View
 from auvnn.report.words import finite, interval, listing, number
 
+# Words with which the command begins its lines.
+STEPS = ("made", "check", "compare", "where", "diagnose", "add", "floor", "truth")
 # Shown at the top of the page, and so left out further down.
 FIRST = ("before_after", "waterfall")
 PARTS: dict[str, Page] = {
@@ -71,6 +73,13 @@ class DemoPage(Page):
             inner = _inner(view, name)
             plots += [p for p in PARTS[name].planned(inner) if p.name == wanted] if inner is not None else []
         return draw(plots).figures or super().figures(answer)
+
+    def story(self, view: View) -> list[str]:
+        """Return the lines of the command, the name of the step set apart."""
+        lines = [(line, *line.partition(" ")[::2]) for line in view.texts("story")]
+        return [
+            f"{step.capitalize()}: {rest.strip()}" if step in STEPS else line for line, step, rest in lines
+        ]
 
     def parts(self, view: View) -> list[tuple[Page, Any]]:
         """Return the four answers in the order of the loop."""

@@ -108,7 +108,11 @@ class DiagnosisPage(Page):
                 lambda: ranking(candidates, missing),
                 lambda: _ranking_caption(candidates, missing),
             ),
-            Plot("parameters", "What it would be", lambda: _parameters(chosen), common.INTERVALS),
+            *(
+                [Plot("parameters", "What it would be", lambda: _parameters(chosen), common.INTERVALS)]
+                if chosen or missing
+                else []
+            ),
             Plot(
                 "similarity",
                 "What could be confused",

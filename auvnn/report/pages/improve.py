@@ -17,7 +17,7 @@ from auvnn.report.plots.budget import budget
 from auvnn.report.plots.error_against_horizon import error_against_horizon
 from auvnn.report.plots.parameters import parameters
 from auvnn.report.view import View
-from auvnn.report.words import finite, listing, number
+from auvnn.report.words import finite, listing, number, percent
 
 KINDS = {
     "coefficients refitted": "by refitting its coefficients",
@@ -50,17 +50,27 @@ class ImprovePage(Page):
         out = []
         if errors:
             out.append(
-                f"On data that chose nothing, free running over {common.horizon_words(str(view.get('horizon')))} errs by "
-                f"{number(errors[0], 2)} of the spread of the motion as given and by {number(errors[-1], 2)} at the end."
+                f"Running free for {common.horizon_words(str(view.get('horizon')))} on held-out data, the model errs by "
+                f"{percent(errors[0])} of the spread of the motion as given, and by {percent(errors[-1])} at the end."
             )
         out += _beside(view)
         falls = _falls(steps)
-        parts = [f"{number(falls[k], 2)} {words}" for k, words in KINDS.items() if k in falls]
+        parts = [
+            f"by {percent(falls[k])} of the spread {words}"
+            for k, words in KINDS.items()
+            if falls.get(k, 0.0) > 0
+        ]
         if parts:
             out.append(f"The error fell {listing(parts)}.")
         floor = next((finite(s.get("error")) for s in steps if s.get("kind") == "left"), None)
-        if floor is not None:
-            out.append(f"Sensor noise alone gives {number(floor, 2)}: what lies between is left.")
+        if floor is not None and errors:
+            reached = errors[-1] <= 1.05 * floor
+            left = (
+                "nothing more can be gained on these data"
+                if reached
+                else "what lies between is not explained"
+            )
+            out.append(f"Sensor noise alone gives {percent(floor)}: {left}.")
         out.append(f"It ended because {view.text('stopped', 'it was done')}.")
         return out
 
@@ -102,7 +112,8 @@ class ImprovePage(Page):
                 "error_against_horizon",
                 "Error against horizon",
                 lambda: _horizons(view),
-                "Error of free running on held-out data, averaged over the channels that move.",
+                "Error of free running on held-out data, averaged over the channels that move. Noise alone would leave a "
+                "perfect model at the grey line.",
             ),
             Plot(
                 "parameters",
@@ -118,7 +129,6 @@ class ImprovePage(Page):
         taken = [s for s in view.data.get("steps") or [] if isinstance(s, Mapping)]
         tried = [s for s in view.data.get("tried") or [] if isinstance(s, Mapping)]
         head = ["step", "kind", "why", "before", "after", "fall", "± one standard error"]
-        story = [[str(k), str(words)] for k, words in enumerate(view.texts("story"), 1)]
         return [
             HtmlTable(
                 "Steps taken, by what was left out of the log",
@@ -132,7 +142,6 @@ class ImprovePage(Page):
             _by_channel(view),
             HtmlTable("Tried and not taken", head, [_row(s) for s in tried], words=3, folded=True),
             common.parameter_table(_parameters(view)),
-            HtmlTable("The story", ["", "what was done and found"], story, words=2, folded=False),
         ]
 
     def assumed(self, view: View) -> list[tuple[str, str]]:
@@ -170,13 +179,10 @@ def _beside(view: View) -> list[str]:
     if finite(line.get("total")) is None or not isinstance(held, Mapping):
         return []
     out = [
-        f"A plain regression of the acceleration errs by {number(line['total'], 2)}, holding the initial velocity by "
-        f"{number(held.get('total'), 2)}."
+        f"A plain regression of the acceleration errs by {percent(line['total'])}, holding the initial velocity by "
+        f"{percent(held.get('total'))}."
     ]
-    for key, words in (("baseline", "the plain regression"), ("persistence", "holding the initial velocity")):
-        channels = [common.channel_words(c) for c in loses.get(key) or ()]
-        if channels:
-            out.append(f"The model at the end loses to {words} in {listing(channels)}.")
+    out += common.losing_words(loses, "The model at the end")
     if not any(loses.get(k) for k in ("baseline", "persistence")):
         out.append("The model at the end is better than both in every channel that moves.")
     return out
@@ -219,7 +225,10 @@ def _horizons(view: View) -> Figure:
         name: common.over_horizons(view.mapping(key))
         for key, name in (("before", "as given"), ("after", "after"))
     }
-    return error_against_horizon(models, common.over_horizons(view.mapping("after"), "persistence"))
+    after = view.mapping("after")
+    return error_against_horizon(
+        models, common.over_horizons(after, "persistence"), common.over_horizons(after, "noise_floor")
+    )
 
 
 PAGE = ImprovePage()

@@ -25,6 +25,7 @@ from auvnn.report.words import finite, interval, listing, number, percent
 
 STAGES = {"before": "as given", "refitted": "refitted", "after": "after"}
 WHOLE_RUNS = 3
+FEW_VALUES = 4  # of an effect, that a sentence can hold
 
 
 class ImprovementPage(Page):
@@ -52,9 +53,7 @@ class ImprovementPage(Page):
         out += _floor_words(steps, errors)
         fitted = view.mapping("parameters")
         if fitted:
-            values = [f"{e}: {common.parameter_words(m)}" for e, m in fitted.items() if m]
-            if values:
-                out.append(f"Fitted: {'; '.join(values)}.")
+            out += _fitted_words(fitted)
         return out + _channel_words(view)
 
     def plots(self, view: View) -> list[Plot]:
@@ -84,7 +83,7 @@ class ImprovementPage(Page):
                 lambda: _horizons(view),
                 "Error of free running on held-out data, averaged over the channels that move. The added "
                 "effect is worth what lies between the refitted and the last line: refitting alone is not "
-                "to its credit.",
+                "to its credit. Noise alone would leave a perfect model at the grey line.",
             ),
             Plot(
                 "parameters",
@@ -145,15 +144,27 @@ class ImprovementPage(Page):
         ]
 
 
+def _fitted_words(fitted: Mapping[str, Any]) -> list[str]:
+    """Return the values of the effects that have few of them; tables hold the others."""
+    few = [f"{e}: {common.parameter_words(m)}" for e, m in fitted.items() if m and len(m) <= FEW_VALUES]
+    many = [str(e) for e, m in fitted.items() if m and len(m) > FEW_VALUES]
+    out = [f"Fitted: {'; '.join(few)}."] if few else []
+    if many:
+        out.append(f"The values of {listing(many)} stand in the table of fitted parameters.")
+    return out
+
+
 def _verdict(effects: str, accepted: bool, fall: float | None, std: float | None) -> str:
-    by = f" by {interval(fall, std)}" if fall is not None else ""
+    share = None if fall is None else 100.0 * fall
+    size = interval(share, None if std is None else 100.0 * std, "% of the spread of the motion")
+    by = f" by {size}" if fall is not None else ""
     if accepted:
         return (
             f"Adding {effects} lowers the error on held-out data{by}, more than its own uncertainty: "
             "accepted."
         )
     if fall is not None and fall <= 0:
-        gain = f"(gain {interval(fall, std)})"
+        gain = f"(gain {size})"
         return f"Adding {effects} does not lower the error on held-out data {gain}: not accepted."
     return f"Adding {effects} lowers the error on held-out data{by}, no more than chance could: not accepted."
 
@@ -163,10 +174,10 @@ def _error_words(view: View, effects: str, errors: Mapping[str, float | None]) -
     if before is None or after is None:
         return []
     span = common.horizon_words(common.main_horizon(_stage(view, "after", "rollout")) or "")
-    middle = f", {number(refitted, 2)} with its coefficients fitted again" if refitted is not None else ""
+    middle = f", by {percent(refitted)} with its coefficients fitted again" if refitted is not None else ""
     return [
-        f"Running free for {span}, the model as given errs by {number(before, 2)} of the spread of the "
-        f"motion{middle}, and {number(after, 2)} with {effects}."
+        f"Running free for {span}, the model as given errs by {percent(before)} of the spread of the "
+        f"motion{middle}, and by {percent(after)} with {effects}."
     ]
 
 
@@ -191,8 +202,7 @@ def _floor_words(steps: list[Mapping[str, Any]], errors: Mapping[str, float | No
         return []
     share = (start - end) / (start - floor)
     return [
-        f"Sensor noise alone gives {number(floor, 2)}: {percent(share)} of what could be gained has been "
-        "gained."
+        f"Sensor noise alone gives {percent(floor)}: {percent(share)} of what could be gained has been gained."
     ]
 
 
@@ -211,8 +221,8 @@ def _channel_words(view: View) -> list[str]:
     best = max(falls, key=lambda c: falls[c][0] - falls[c][1])
     worse = [common.channel_words(c) for c, (a, b) in falls.items() if b > 1.05 * a]
     out = [
-        f"Most is gained in {common.channel_words(best)}, from {number(falls[best][0], 2)} to "
-        f"{number(falls[best][1], 2)}."
+        f"Most is gained in {common.channel_words(best)}, from {percent(falls[best][0])} to "
+        f"{percent(falls[best][1])}."
     ]
     if worse:
         out.append(f"It has become worse in {listing(worse)}.")
@@ -261,14 +271,20 @@ def _waterfall_caption(steps: list[Mapping[str, Any]]) -> str:
         "what the step took off."
     )
     if falls and max(falls)[0] > 0:
-        words += f" The largest step is {max(falls)[1]}. Below the dashed line there is only sensor noise."
+        step = max(falls)[1]
+        named = "refitting the coefficients" if step == "coefficients refitted" else step
+        words += f" The largest step is {named}. Below the dashed line there is only sensor noise."
     return words
 
 
 def _horizons(view: View) -> Figure:
     rollouts = {name: _stage(view, stage, "rollout") for stage, name in STAGES.items()}
     models = {name: common.over_horizons(rollout) for name, rollout in rollouts.items() if rollout}
-    return error_against_horizon(models, common.over_horizons(rollouts["as given"], "persistence"))
+    return error_against_horizon(
+        models,
+        common.over_horizons(rollouts["as given"], "persistence"),
+        common.over_horizons(rollouts["after"], "noise_floor"),
+    )
 
 
 def _stage_table(view: View, part: str, title: str, key: str) -> HtmlTable:

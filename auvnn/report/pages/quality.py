@@ -61,7 +61,11 @@ class QualityPage(Page):
                 f"On reading, {plural(len(repairs), 'kind of fault was', 'kinds of fault were')} corrected and "
                 "counted."
             )
-        return out + _agreement_words(view) + _excitation_words(view)
+        told = _actuator_words(view)
+        if told and not _actuators(view).get("as_stated"):
+            out[1:1] = told
+            told = []
+        return out + _agreement_words(view) + _excitation_words(view) + told
 
     def warnings(self, view: View) -> list[str]:
         """Return errors and warnings, each with its cure."""
@@ -103,6 +107,14 @@ class QualityPage(Page):
             HtmlTable(
                 "Findings", ["level", "where", "what", "how to correct it"], _finding_rows(view), words=4
             ),
+            HtmlTable(
+                "Actuators, by what the vehicle does",
+                ["in the model file", "acts as", "sign", "share of the stated thrust"],
+                _actuator_rows(view),
+                " ".join(f"{str(c)[:1].upper()}{str(c)[1:]}." for c in _actuators(view).get("cures") or []),
+                words=3,
+                folded=True,
+            ),
             HtmlTable("Agreement of the sensors", _AGREEMENT_HEAD, _agreement_rows(view), words=2),
             HtmlTable("Runs", list(_RUN_HEAD), _run_rows(view)),
             HtmlTable("Channels", list(_CHANNEL_HEAD), _channel_rows(view), words=2),
@@ -138,7 +150,40 @@ _CHANNEL_HEAD = ("channel", "unit", "missing", "min", "max", "spread", "noise", 
 
 
 def _finding_rows(view: View) -> list[list[str]]:
-    return [[str(f.get(k, "")) for k in ("level", "where", "what", "cure")] for f in reading.findings(view)]
+    rows = []
+    for f in reading.findings(view):
+        level, where, what, cure = (str(f.get(k) or "") for k in ("level", "where", "what", "cure"))
+        # The cure has a column of its own.
+        rows.append([level, where, what.removesuffix(cure).rstrip("; ") if cure else what, cure])
+    return rows
+
+
+def _actuators(view: View) -> Mapping[str, Any]:
+    return reading.plain_of(view, "actuators")
+
+
+def _actuator_words(view: View) -> list[str]:
+    """Return what the motion says of order and signs of the actuators; nothing where no model was named."""
+    told = _actuators(view)
+    wrong = [str(w) for w in told.get("findings") or []]
+    sure = percent(told.get("confidence"))
+    if told.get("as_stated"):
+        return [f"The actuators act as the model file states them (confidence {sure})."]
+    return [f"Actuators against the model file: {'; '.join(wrong)} (confidence {sure})."] if wrong else []
+
+
+def _actuator_rows(view: View) -> list[list[str]]:
+    told = _actuators(view)
+    gains, place, sign = (told.get(k) or {} for k in ("gains", "place", "sign"))
+    return [
+        [
+            str(name),
+            str(place.get(name, "–")),
+            "reversed" if finite(sign.get(name)) == -1 else "as stated",
+            percent(gain),
+        ]
+        for name, gain in gains.items()
+    ]
 
 
 def _agreement_rows(view: View) -> list[list[str]]:

@@ -67,10 +67,14 @@ class StudyPage(Page):
         """Return the comparison, and all metrics."""
         rows = view.items("table")
         head = list(rows[0]) if rows else []
+        # Leading columns that hold words stand to the left.
+        words = next(
+            (k for k, key in enumerate(head) if any(not isinstance(r.get(key), str) for r in rows)), 1
+        )
         cells = [[_cell(row.get(key)) for key in head] for row in rows]
         metrics = [[str(k), _cell(v)] for k, v in view.mapping("metrics").items()]
         return [
-            *_upright([h.replace("_", " ") for h in head], cells),
+            *_upright([_column(h) for h in head], cells, max(words, 1)),
             HtmlTable("Metrics", ["name", "value"], metrics, folded=True),
         ]
 
@@ -100,10 +104,22 @@ def _plot(found: Mapping[str, Any]) -> Plot:
     return Plot(found["name"], found["title"], draw, found["caption"])
 
 
-def _upright(head: list[str], cells: list[list[str]]) -> list[HtmlTable]:
-    """Return the comparison; a table that is too wide for a page is turned, or else divided."""
+def _column(key: str) -> str:
+    """Return the name of a column in words: `tracking_rmse_over_range_worst` is said in full."""
+    name = key.replace("rmse_over_range_worst", "error, of the range, worst velocity").replace("_", " ")
+    return name.removesuffix(" s") + (", s" if name.endswith(" s") else "")
+
+
+def _upright(head: list[str], cells: list[list[str]], words: int) -> list[HtmlTable]:
+    """Return the comparison; a table that is too wide for a page is turned, or else divided.
+
+    Args:
+        head: names of the columns.
+        cells: as text.
+        words: how many leading columns hold words.
+    """
     if len(head) <= WIDE:
-        return [HtmlTable("Compared", head, cells, folded=False)]
+        return [HtmlTable("Compared", head, cells, folded=False, words=words)]
     if len(cells) + 1 <= WIDE:
         turned = [[name, *(row[k] for row in cells)] for k, name in enumerate(head) if k]
         return [HtmlTable("Compared", [head[0], *(row[0] for row in cells)], turned, folded=False)]
@@ -153,29 +169,46 @@ def _online(m: Mapping[str, float | None]) -> list[str]:
 
 def _noisy(m: Mapping[str, float | None]) -> list[str]:
     out = [
-        "Trained on noisy accelerations, the model runs free "
-        f"{number(m.get('offline_tracking_rmse_over_range_worst'), 2)} of the velocity's range away from the plant."
+        "Trained on noisy accelerations, the model that runs free is off by "
+        f"{percent(m.get('offline_tracking_rmse_over_range_worst'))} of the velocity's range."
     ]
     for name in _online(m):
         out.append(
-            f"Online learning ({name}): {number(m.get(f'{name}_tracking_rmse_over_range_worst'), 2)} of the range while "
-            f"the weights follow; frozen, their error is {number(m[f'{name}_frozen_over_offline'], 2)} times that of the "
-            f"offline networks, and on held-out velocities the damping is "
-            f"{number(m.get(f'{name}_global_error_over_offline'), 2)} times as wrong."
+            f"Online learning {_way(name)}: off by {percent(m.get(f'{name}_tracking_rmse_over_range_worst'))} while the "
+            f"weights change. With the weights frozen, the error is {_beside(m[f'{name}_frozen_over_offline'])} the "
+            f"offline networks'; on held-out velocities the error of the damping is "
+            f"{_beside(m.get(f'{name}_global_error_over_offline'))} theirs."
         )
     return out
 
 
+def _way(name: str) -> str:
+    """Return how an adapter learns: "follow" is the paper's, every sample; "guarded" refuses what noise could be."""
+    words = {"follow": "that follows every sample, as in the paper", "guarded": "with guards against noise"}
+    return words.get(name, f"({name})")
+
+
+def _beside(ratio: float | None) -> str:
+    """Return how an error stands beside another one."""
+    if ratio is None:
+        return "not known beside"
+    if abs(ratio - 1.0) <= 0.02:
+        return "the same as"
+    if ratio < 1.0:
+        return f"{percent(1.0 - ratio)} smaller than"
+    return f"{percent(ratio - 1.0)} larger than" if ratio < 2.0 else f"{number(ratio, 2)} times"
+
+
 def _payload(m: Mapping[str, float | None]) -> list[str]:
     out = [
-        "Without online learning the model is "
-        f"{number(m.get('offline_tracking_rmse_over_range_worst'), 2)} of the velocity's range off after the pick-up."
+        "Without online learning the model is off by "
+        f"{percent(m.get('offline_tracking_rmse_over_range_worst'))} of the velocity's range after the pick-up."
     ]
     for name in _online(m):
         out.append(
-            f"With it ({name}): {number(m.get(f'{name}_tracking_rmse_over_range_worst'), 2)} while the weights "
-            f"follow; frozen, their error is {number(m[f'{name}_frozen_over_offline'], 2)} times that of the offline "
-            "networks."
+            f"Online learning {_way(name)}: off by {percent(m.get(f'{name}_tracking_rmse_over_range_worst'))} while the "
+            f"weights change. With the weights frozen, the error is {_beside(m[f'{name}_frozen_over_offline'])} the "
+            "offline networks'."
         )
     return out
 

@@ -117,7 +117,10 @@ def learned_plots(view: View) -> list[Plot]:
         "log anything to say; outside, the curve is extrapolation."
     )
     if any(isinstance(c, Mapping) and c.get("band") is not None for c in view.get("surfaces")):
-        words += " The band is what the log leaves open, 95 %. Damping passes through zero at rest."
+        words += (
+            " The band is what the log leaves open, 95 %. True damping is zero at rest: a curve that is not stands in "
+            "for another force."
+        )
     return [Plot("damping_curves", "What damping was found", lambda: _damping(view), words)]
 
 

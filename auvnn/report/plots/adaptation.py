@@ -85,13 +85,24 @@ def with_and_without(
 
 
 def _mark(ax: Axes, changes: Sequence[tuple[float, str]], *, words: bool) -> None:
-    for time, kind in changes:
+    """Mark changes by lines, and above the panel by their numbers: as words they would cover one another."""
+    for time, _ in changes:
         ax.axvline(time, color=style.INK, lw=0.7, ls=(0, (1, 1)))
-        if words:
-            ax.annotate(
-                label(kind, 12), (time, 1), xycoords=("data", "axes fraction"), xytext=(2, -2),
-                textcoords="offset points", fontsize=7, va="top",
-            )  # fmt: skip
+    low, high = ax.get_xlim()
+    least = 0.055 * (high - low)
+    groups: list[list[int]] = []
+    for k in sorted(range(len(changes)), key=lambda k: changes[k][0]):
+        if groups and changes[k][0] - changes[groups[-1][0]][0] < least:
+            groups[-1].append(k)
+        else:
+            groups.append([k])
+    for group in groups if words else []:
+        said = f"{group[0] + 1}" if len(group) == 1 else f"{group[0] + 1}-{group[-1] + 1}"
+        ax.annotate(
+            said, (changes[group[0]][0], 1), xycoords=("data", "axes fraction"), xytext=(0, 1.5),
+            textcoords="offset points", fontsize=7, va="bottom", ha="left" if len(group) > 1 else "center",
+            annotation_clip=False,
+        )  # fmt: skip
 
 
 @style.styled

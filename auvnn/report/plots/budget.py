@@ -49,7 +49,8 @@ def budget(
     ]
     if not known:
         raise NoData("no step has an error")
-    figure = style.new_figure(style.PAGE, 1.2 + 0.34 * len(known))
+    there = [k for k in KINDS if any(kind == k for _, kind, _ in known)]
+    figure = style.new_figure(style.PAGE, 1.3 + 0.2 * ((len(there) + 2) // 3) + 0.34 * len(known))
     ax = figure.subplots()
     errors = [e for _, _, e in known]
     across = {n: e for n, v in lines.items() if (e := finite(v)) is not None and e > 0}
@@ -65,7 +66,7 @@ def budget(
             text += f"  ({MINUS if fall >= 0 else '+'}{abs(fall):.2g})"
         ax.annotate(
             text, (error, i), xytext=(3, 0), textcoords="offset points", va="center", fontsize=8,
-            bbox={"fc": "white", "ec": "none", "pad": 0.4},
+            bbox={"fc": "white", "ec": "none", "pad": 0.8}, zorder=5,
         )  # fmt: skip
     # Names of the lines stand one above the other: the lines may be close.
     for level, (name, error) in enumerate(sorted(across.items(), key=lambda item: -item[1])):
@@ -89,7 +90,6 @@ def budget(
     ax.set_yticks(range(len(known)), [label(n.replace("_", " "), 30) for n, _, _ in known])
     ax.tick_params(axis="y", length=0)
     ax.set_xlabel(f"held-out error ({unit})" + (", logarithmic" if logarithmic else ""))
-    there = [k for k in KINDS if any(kind == k for _, kind, _ in known)]
     handles = [Patch(fc=KINDS[k][0], ec=style.INK, hatch=KINDS[k][1], label=k, lw=0.7) for k in there]
-    ax.legend(handles=handles, loc="lower right", fontsize=8, frameon=True, framealpha=1.0)
+    figure.legend(handles=handles, loc="outside lower center", fontsize=8, ncols=3)
     return figure

@@ -13,7 +13,8 @@ from auvnn.report import style
 from auvnn.report.panels import NoData
 from auvnn.report.words import finite, label
 
-_FLOOR = style.Look("#505050", "-", 0.9, "_")
+# Broad and pale: a model that reaches it lies on it, and both are seen.
+_FLOOR = style.Look("#b8b8b8", "-", 0.9, "None")
 # Beyond three models: still apart by colour, dashes and marker.
 _FURTHER = (
     style.Look("#009e73", "-", 1.1, "v"),
@@ -55,19 +56,8 @@ def error_against_horizon(
     if persistence:
         _line(ax, persistence, end, style.PERSISTENCE, "initial velocity held", 1)
     if floor and any(finite(v) is not None for v in floor.values()):
-        _line(ax, floor, end, _FLOOR, "noise alone", 2)
+        _line(ax, floor, end, _FLOOR, "noise alone", 0.8, width=3.5)
     ax.axhline(1.0, color=style.FAINT, lw=0.6)
-    ax.annotate(
-        "as large as the motion itself",
-        _clear(models, persistence, end),
-        xytext=(0, 2),
-        textcoords="offset points",
-        ha="center",
-        fontsize=7,
-        color="#505050",
-        bbox={"fc": "white", "ec": "none", "pad": 0.6},
-        zorder=20,
-    )
     ax.set_xscale("log")
     ticks = horizons + ([end] if full else [])
     ax.xaxis.set_major_locator(FixedLocator(ticks))
@@ -75,36 +65,13 @@ def error_against_horizon(
     ax.xaxis.set_minor_formatter(NullFormatter())
     ax.set_xticks(ticks, [f"{h:g}" for h in horizons] + (["whole\nrun"] if full else []), linespacing=0.85)
     ax.set_xlabel("free-running horizon (s)")
-    ax.set_ylabel("error / spread of the motion (nrmse)")
+    # Said at the axis: among the lines a label would cover some of them.
+    ax.set_ylabel("error / spread of the motion\n(nrmse; 1: as the motion)")
     top = ax.get_ylim()[1]
     ax.set_ylim(0, max(top, 1.15))
     style.show_grid(ax, "y")
     figure.legend(loc="outside upper center", ncols=2)
     return figure
-
-
-def _clear(
-    models: Mapping[str, Mapping[str, float | None]],
-    persistence: Mapping[str, float | None] | None,
-    end: float,
-) -> tuple[float, float]:
-    """Return where on the line at one the label lies farthest from every line's marks."""
-    marks = []
-    for errors in (*models.values(), persistence or {}):
-        for horizon, error in errors.items():
-            x = end if horizon == "full" else _seconds(horizon)
-            if x is not None and (y := finite(error)) is not None:
-                marks.append((np.log10(x), y))
-    if not marks:
-        return end, 1.0
-    x, y = np.array(marks).T
-    low, high = x.min(), x.max()
-    tries = np.linspace(low + 0.22 * (high - low), high - 0.22 * (high - low), 9)
-    # The label is about half as wide as the panel, and reaches a little above the line.
-    gaps = [
-        np.hypot(np.maximum(np.abs(x - t) / max(high - low, 1e-9) - 0.24, 0.0), y - 1.05).min() for t in tries
-    ]
-    return float(10 ** tries[int(np.argmax(gaps))]), 1.0
 
 
 def _seconds(horizon: str) -> float | None:
@@ -116,15 +83,23 @@ def _seconds(horizon: str) -> float | None:
 
 
 def _line(
-    ax: Axes, errors: Mapping[str, float | None], end: float, look: style.Look, name: str, order: float
+    ax: Axes,
+    errors: Mapping[str, float | None],
+    end: float,
+    look: style.Look,
+    name: str,
+    order: float,
+    width: float = 1.2,
 ) -> None:
     known = {
         s: v for h, e in errors.items() if (s := _seconds(h)) is not None and (v := finite(e)) is not None
     }
     seconds = sorted(known)
     marks = {"color": look.color, "marker": look.marker, "mfc": "white", "mec": look.color, "mew": 0.9}
-    options = {"ls": look.dashes, "lw": 1.2, "label": label(name), "zorder": order}
+    options = {"ls": look.dashes, "lw": width, "label": label(name), "zorder": order}
     ax.plot(seconds, [known[s] for s in seconds], **options, **marks)
     whole = finite(errors.get("full"))
     if whole is not None:
-        ax.plot([end], [whole], ls="none", zorder=order, **marks)
+        # Where a line has no marks, a short stroke stands for the whole run.
+        stroke = {"marker": "_", "ms": 12, "mew": 3.5} if look is _FLOOR else {}
+        ax.plot([end], [whole], ls="none", zorder=order, **{**marks, **stroke})

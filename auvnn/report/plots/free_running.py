@@ -37,7 +37,8 @@ def free_running(
         raise NoData("there is no model to hold against the plant")
     plant, *models = lines
     lines, gone = _held(lines)
-    remarks = rms_remarks(lines[plant], {name: lines[name] for name in models}, style.VELOCITY)
+    drawn = {name: lines[name] for name in models if name not in gone}
+    remarks = rms_remarks(lines[plant], drawn, style.VELOCITY)
     figure = time_series(t, {n: v for n, v in lines.items() if n not in gone}, remarks=remarks)
     if gone:
         said = ", ".join(f"{label(name)} errs by up to {_times(lines, name)}" for name in gone)

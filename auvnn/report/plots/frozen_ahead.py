@@ -42,7 +42,9 @@ def frozen_ahead(
     ax = figure.subplots()
     for (name, (t, error)), look in zip(tables.items(), LOOKS, strict=False):
         shown = np.where(error > 0, error, np.nan)
-        ax.plot(t, shown, color=look.color, ls=look.dashes, lw=1.3, label=label(name))
+        # The first is broad and pale: where another coincides with it, it shows on either side.
+        ink = {"color": "#b5b5b5", "lw": 3.2} if look is LOOKS[0] else {"color": look.color, "lw": 1.3}
+        ax.plot(t, shown, ls=look.dashes, label=label(name), **ink)
     if mark is not None:
         ax.axvline(mark, color=style.FAINT, lw=0.8, ls=(0, (1, 1.5)), zorder=0.5)
         ax.annotate(

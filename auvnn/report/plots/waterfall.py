@@ -59,7 +59,9 @@ def _change(ax: Axes, i: int, previous: float, error: float, decimals: int) -> N
     look = style.AFTER if error < previous else style.BEFORE
     ax.bar(i, high - low, bottom=low, width=WIDTH, fc="white", ec=look.color, hatch=look.hatch, lw=0.8)
     ax.plot([i - 1 + WIDTH / 2, i - WIDTH / 2], [previous, previous], color=style.INK, lw=0.6)
-    text = f"{MINUS if error < previous else '+'}{high - low:.{decimals}f}"
+    size = f"{high - low:.{decimals}f}"
+    # A step that rounds to nothing says so without a sign.
+    text = f"{MINUS if error < previous else '+'}{size}" if float(size) else f"< {10.0**-decimals:g}"
     place = {"xytext": (0, 2), "textcoords": "offset points", "ha": "center", "va": "bottom"}
     ax.annotate(text, (i, high), fontsize=8, color=look.color, **place)
 

@@ -61,8 +61,9 @@ def noise_free(options: Options, progress: Callable[[str], None]) -> Study:
             "name": "figure_5", "kind": "velocity", "t": run.t,
             "lines": {"plant": run.nu, "networks": drawn, "zero damping": zero},
             "title": "Figure 5: free running of the model with networks for the damping",
-            "caption": "Velocity of the plant, of the model with the six networks trained on this manoeuvre, and of the "
-            "model without damping. The first two lie on top of each other, as in the paper.",
+            "caption": "Velocity of the plant and of the model with the six networks trained on this manoeuvre; they lie "
+            "on top of each other, as in the paper. The model without damping is drawn where it stays near them; where "
+            "it does not, a line under the figure says how far off it is.",
         }
     ]  # fmt: skip
     rich = rich_log(plant, options, case["rich"], seed=options.seed)

@@ -92,8 +92,8 @@ export class MissingScreen {
           h("td", { class: "num" }, Number.isFinite(l.correlation_time) ? `${number(l.correlation_time, 2)} s` : "–"), h("td", { class: "num" }, percent(l.share)));
       });
       return card("Left without a name",
-        h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Force without a name" }, h("table", {}, h("thead", {}, h("tr", {}, ["", "rms", "at most", "would have shown", "lasts", "of the actuators"].map((w) => h("th", { scope: "col" }, w)))), h("tbody", {}, rows))),
-        Number.isFinite(left.cost) && h("p", { class: "soft" }, `The error on runs left out is ${percent(left.cost)} above the noise floor.`));
+        h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Force without a name" }, h("table", {}, h("thead", {}, h("tr", {}, ["", "rms", "at most", "would have shown", "lasts", "share"].map((w) => h("th", { scope: "col" }, w)))), h("tbody", {}, rows))),
+        h("p", { class: "soft" }, `Share: of the actuators' force.${Number.isFinite(left.cost) ? ` The error on runs left out is ${percent(left.cost)} above the noise floor.` : ""}`));
     }
     return card("Left without a name",
       h("p", {}, this.answer.verdict === "adequate" ? "What is left looks like noise." : `${percent(this.answer.unexplained).replace("<", "Less than ")} of the residual's energy above the noise is explained by nothing in the catalogue.`),

@@ -6,6 +6,8 @@ import { card, choice, DOF, h, measured, number, percent, show } from "./dom.js"
 import { parameters } from "./missing.js";
 import { Group, key } from "./plot.js";
 
+const sentence = (words) => (words ? `${words.charAt(0).toUpperCase()}${words.slice(1)}.` : "");
+
 export class ResultScreen {
   constructor(app) {
     this.app = app;
@@ -47,7 +49,7 @@ export class ResultScreen {
     const a = this.answer, falls = a.waterfall, first = falls[0].error, last = falls[falls.length - 2].error, floor = falls[falls.length - 1].error;
     return h("section", { class: `verdict ${a.accepted ? "good" : "warn"}`, "aria-label": "Result" },
       h("p", { class: "word" }, a.accepted ? "The held-out error falls" : "The held-out error does not fall by more than its own uncertainty", h("b", {}, `: ${number(first)} → ${number(last)}`), a.accepted && Number.isFinite(first) && first > 0 ? ` (${percent(1 - last / first)} lower)` : ""),
-      h("p", {}, `With ${a.effects.join(", ")}; the noise floor is ${number(floor)}. ${a.more.held_out_words || ""}.`),
+      h("p", {}, `With ${a.effects.join(", ")}; the noise floor is ${number(floor)}. ${sentence(a.more.held_out_words || "")}`),
       h("p", { class: "row" },
         state.can_keep && h("button", { type: "button", class: "primary", id: "keep", onclick: (e) => attempt(async () => { await post("keep"); await this.app.changed(); }, e.target) }, "Keep it in the model"),
         state.answers.improvement.report && h("a", { href: "report/improvement", target: "_blank", rel: "noopener", class: "button" }, "Report")),
@@ -77,7 +79,8 @@ export class ResultScreen {
   horizons() {
     const a = this.answer, of = (part) => Object.fromEntries(Object.entries(part.rollout).map(([k, v]) => [k, v.total]));
     const persistence = Object.fromEntries(Object.entries(a.before.rollout).map(([k, v]) => [k, v.persistence]));
-    const rows = [["given", "as given", of(a.before)], ["refitted", "coefficients refitted", of(a.refitted)], ["after", `with ${a.effects.join(", ")}`, of(a.after)], ["persistence", "holding the speed", persistence]];
+    const floor = Object.fromEntries(Object.entries(a.after.rollout).map(([k, v]) => [k, v.noise_floor]));
+    const rows = [["given", "as given", of(a.before)], ["refitted", "coefficients refitted", of(a.refitted)], ["after", `with ${a.effects.join(", ")}`, of(a.after)], ["persistence", "holding the speed", persistence], ["floor", "noise floor", floor]];
     return card("Held-out error against horizon", againstHorizon(rows), key(...rows.map(([kind, words]) => [kind, words])));
   }
 
@@ -116,7 +119,7 @@ export class ResultScreen {
 
   save(state) {
     const folder = h("input", { type: "text", id: "folder", value: this.script.folder, spellcheck: "false", autocomplete: "off" });
-    const told = h("div", { id: "told" }, state.saved.map((path) => h("p", { class: "good" }, `Saved: ${path}`)));
+    const told = h("div", { id: "told" }, state.saved.map((path) => h("p", { class: "good" }, `Saved: ${path}`)), state.saved_without.map((words) => h("p", { class: "bad" }, `But ${words}.`)));
     const kept = state.history.length > 1;
     return card("Take it home",
       h("form", { onsubmit: (event) => { event.preventDefault(); event.submitter.textContent = "Saving …"; attempt(async () => { await post("save", { folder: folder.value }); await this.app.changed(); }, event.submitter).finally(() => { event.submitter.textContent = "Save"; }); } },

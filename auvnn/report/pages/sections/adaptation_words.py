@@ -20,6 +20,16 @@ def ratio_words(ratio: float) -> str:
     return f"the error is larger than that of the model as it was, {number(ratio, 3)} times"
 
 
+def worse_words(ratio: float | None) -> list[str]:
+    """Return what to do where what was learned predicts worse than the model as it was; nothing elsewhere."""
+    if ratio is None or not ratio > 1.0 + EQUAL:
+        return []
+    return [
+        "Do not go on with these weights: what the model lacks is not damping alone. auvnn diagnose, with the same "
+        "model and log, asks what it is."
+    ]
+
+
 def off_words(metrics: Mapping[str, Any]) -> list[str]:
     """Return what it means that learning changed much while no change of the vehicle was seen; nothing elsewhere."""
     ratio = finite(metrics.get("frozen_5_s_error_ratio"))

@@ -168,6 +168,12 @@ def _ranking_caption(candidates: list[Mapping[str, Any]], missing: list[str]) ->
     )
     if missing:
         words += " Hatched and bold, and first: what the verdict names; the others by what each explains by itself."
+    else:
+        words += " Ordered by what each explains by itself."
+    if any(
+        (finite(c.get("explained")) or 0.0) > 0.3 and (improvement(c)[0] or 0.0) < 0.05 for c in candidates
+    ):
+        words += " A long bar with a point near zero fits the runs that it was fitted to and does not predict the others."
     if brackets(candidates, missing):
         words += " Brackets join what this log can hardly tell apart."
     return words
