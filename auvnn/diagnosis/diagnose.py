@@ -12,6 +12,7 @@ from auvnn.checks.doubts import doubts
 from auvnn.checks.unmeasured import blind
 from auvnn.comparison.baseline import baseline_of
 from auvnn.diagnosis.answers.answer import Diagnosis
+from auvnn.diagnosis.answers.answering import answer
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
@@ -20,6 +21,7 @@ from auvnn.diagnosis.noise_law.answer import answer_with_force
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.state import Searched, Setting
+from auvnn.diagnosis.stages.what_is_left import settled
 from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.prediction_error import SINGULAR
 from auvnn.estimation.window_normal_equations import TRUST, motion
@@ -170,12 +172,20 @@ def searched(
         say=say,
     )
     try:
-        found, under_way = search(asked, windows)
+        state, told, words = search(asked, windows), {}, []
         if stochastic:
-            found, under_way = answer_with_force(found, under_way)
+            state, told, words = answer_with_force(asked, state)
+        state = settled(asked, state)
+        found = answer(asked, state)
     except (np.linalg.LinAlgError, SINGULAR) as problem:
         raise InputError(
             f"{log.name} cannot be diagnosed with {model.vehicle.name}: free running grows without bound, so that the "
             f"sums of its tests cannot be solved ({problem}); choose shorter windows with window=, and check the model"
         ) from None
-    return replace(found, baseline=baseline_of(model, log, choose_derivative(log))), under_way
+    found = replace(
+        found,
+        baseline=baseline_of(model, log, choose_derivative(log)),
+        stochastic=told,
+        warnings=[*found.warnings, *words],
+    )
+    return found, Searched(asked, state)

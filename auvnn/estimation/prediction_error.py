@@ -30,6 +30,8 @@ from auvnn.estimation.window_normal_equations import (
     motion,
     normal_equations,
     residual_std,
+    runs_by_block,
+    weights_of,
 )
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import Windows
@@ -165,9 +167,10 @@ def fit(
             reached = parameters_of(model, names)
             change = a - np.einsum("bij,j->bi", slopes, reached - theta)
             trial = moved(initial, torch.as_tensor(change / (1 + damping)))
-            there = _answered(model, windows, trial, names) if torch.isfinite(trial).all() else None
+            most = now * (1 + 1e-9) + 1e-6
+            there = _answered(model, windows, trial, names, sigma, most - penalty(reached))
             then = np.inf if there is None else cost_of(there, sigma) + penalty(reached)
-            if there is not None and then <= now * (1 + 1e-9) + 1e-6:
+            if there is not None and then <= most:
                 break
             damping = max(4 * damping, 1e-2)
         else:
@@ -202,11 +205,35 @@ def fit(
 
 
 def _answered(
-    model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str]
+    model: GreyBox,
+    windows: Windows,
+    initial: Tensor,
+    names: Sequence[str],
+    sigma: Array | None = None,
+    most: float = np.inf,
 ) -> list[Response] | None:
-    """Return the windows' answers; None where the equations cannot be solved, such as with a singular inertia."""
+    """Return the windows' answers; None where there are none, or none worth differentiating.
+
+    Args:
+        model: at the values in question.
+        windows: B windows.
+        initial: their initial states, (B, 13).
+        names: effects whose parameters are differentiated by.
+        sigma: weights of the errors, (18,), with `most`.
+        most: weighted squared error beyond which a step is not taken.
+    """
+    if not bool(torch.isfinite(initial).all()):
+        return None
     try:
-        return list(linearise(model, windows, initial, names))
+        runs = runs_by_block(model, windows, initial, names)
+        # Beside a stochastic force the error alone does not say what it costs.
+        if sigma is not None and windows.law is None:
+            weight = weights_of(sigma)
+            cost = sum(float(((error * weight) ** 2).sum()) for _, _, error in runs)
+            # What is on the line is left to the same sum as that which it is compared with.
+            if not cost <= most * (1 + 1e-9) + 1e-6:
+                return None
+        return list(linearise(model, windows, initial, names, runs))
     except SINGULAR:
         return None
 

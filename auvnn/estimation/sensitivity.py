@@ -175,9 +175,10 @@ def _propagate(jac_state: Tensor, jac_theta: Tensor, quaternion: Tensor, nu: Ten
     a[..., 6:12, :] = jac_state
     ha = a * steps[..., None, None]
     eye = torch.eye(12, dtype=a.dtype, device=a.device)
-    # Horner's form of (exp(hA) - 1)/(hA); eight terms reach rounding for any step the integrator may take.
-    phi = eye + ha / 8
-    for k in range(7, 1, -1):
+    # Horner's form of (exp(hA) - 1)/(hA), with as many terms as this step needs.
+    terms = _terms(float(ha.abs().sum(-1).max()) if ha.numel() else 0.0)
+    phi = eye + ha / terms
+    for k in range(terms - 1, 1, -1):
         phi = eye + (ha / k) @ phi
     forward = eye + ha @ phi
     forcing = (phi * steps[..., None, None])[..., 6:] @ jac_theta
@@ -188,6 +189,15 @@ def _propagate(jac_state: Tensor, jac_theta: Tensor, quaternion: Tensor, nu: Ten
         now[..., 12:] += forcing[:, k]
         rows.append(now)
     return torch.stack(rows, dim=1)
+
+
+def _terms(norm: float) -> int:
+    """Return how many terms of the series of (exp(x) - 1)/x leave less than 1e-7 at |x| = norm; 8 suffice."""
+    left, terms = norm / 2.0, 1
+    while (left > 1e-7 or terms < 3) and terms < 8:
+        terms += 1
+        left *= norm / (terms + 1)
+    return terms
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from torch import Tensor
 from auvnn.estimation.sensitivity import Response, respond_by
 from auvnn.estimation.stochastic_force.columns import pushed
 from auvnn.estimation.stochastic_force.sums import LOOSE, cost_with_force, sums_with_force
-from auvnn.estimation.window_simulation import simulate_windows
+from auvnn.estimation.window_simulation import run_windows, simulate_windows
 from auvnn.metrics.coloured_noise import previous
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
@@ -30,12 +30,10 @@ Array = NDArray[np.float64]
 TRUST = 1e-4
 # Sums beyond this are those of windows whose sensitivities have grown without bound.
 HUGE = 1e60
-# Windows worked out at a time, as long as there are no more parameters than columns: this bounds the memory.
+# Windows worked out at a time, as long as there are no more parameters than columns: this bounds the memory. Windows run
+# free at a time, and their thrusts differentiated. Numbers of an answer that stay near the processor.
 CHUNK, COLUMNS = 48, 80
-# Numbers of an answer that stay near the processor.
-NEAR = 2_500_000
-# Windows run free at a time, and their thrusts differentiated.
-BLOCK = CHUNK
+BLOCK, NEAR = CHUNK, 2_500_000
 
 
 @dataclass(frozen=True)
@@ -113,7 +111,33 @@ def motion(windows: Windows) -> Array:
     return torch.sqrt((((euler_free - mean) * seen) ** 2).sum((0, 1)) / count).numpy()
 
 
-def linearise(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str]) -> Iterator[Response]:
+def runs_by_block(
+    model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str]
+) -> list[tuple[Tensor, Tensor, Tensor]]:
+    """Return the free runs of windows, block by block as `linearise` takes them.
+
+    A step of a fit that is not taken needs no more, and costs a third.
+
+    Args:
+        model: at the values in question.
+        windows: of the log, B of them.
+        initial: their initial states, (B, 13).
+        names: effects whose parameters will be differentiated by.
+    """
+    model = model.without_absent(names)
+    return [
+        run_windows(model, windows.pick(block), initial[block])
+        for block in (slice(start, start + BLOCK) for start in range(0, len(windows), BLOCK))
+    ]
+
+
+def linearise(
+    model: GreyBox,
+    windows: Windows,
+    initial: Tensor,
+    names: Sequence[str],
+    runs: Sequence[tuple[Tensor, Tensor, Tensor]] | None = None,
+) -> Iterator[Response]:
     """Yield the windows' answers chunk by chunk.
 
     Args:
@@ -121,6 +145,7 @@ def linearise(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence
         windows: of the log, B of them.
         initial: their initial states, (B, 13).
         names: effects whose parameters are differentiated by.
+        runs: what `runs_by_block` returned, where that has been done.
     """
     model = model.without_absent(names)
     columns = sum(len(model.effect(n).parameters_of) for n in names)
@@ -133,7 +158,8 @@ def linearise(model: GreyBox, windows: Windows, initial: Tensor, names: Sequence
     for start in range(0, len(windows), BLOCK):
         block = slice(start, start + BLOCK)
         some, states = windows.pick(block), initial[block]
-        ran = simulate_windows(model, some, states, names)
+        begun = None if runs is None else runs[start // BLOCK]
+        ran = simulate_windows(model, some, states, names, begun)
         few = max(NEAR // (some.nu.shape[1] * 18 * (12 + columns)), 1)
         for begin in range(0, len(some), size):
             part = slice(begin, begin + size)

@@ -131,8 +131,28 @@ class SimulatedWindows:
         )
 
 
+def run_windows(model: GreyBox, windows: Windows, initial: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Run windows free and return eta (B, L, 7), nu (B, L, 6) and the error of their outputs, (B, L, 18).
+
+    Args:
+        model: that is run.
+        windows: of the log, B of L rows.
+        initial: their initial states, (B, 13).
+    """
+    with torch.no_grad():
+        # What is not there yet is differentiated elsewhere; the run itself is the same without it.
+        there = model.without_absent()
+        # Many runs follow: compiling pays, and the same bits must come each time.
+        eta, nu = predict(there, windows, initial, engine="firm")
+        return eta, nu, window_error(there, windows, eta, nu)
+
+
 def simulate_windows(
-    model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str]
+    model: GreyBox,
+    windows: Windows,
+    initial: Tensor,
+    names: Sequence[str],
+    ran: tuple[Tensor, Tensor, Tensor] | None = None,
 ) -> SimulatedWindows:
     """Run windows free, and differentiate their thrusts by the parameters of the named effects.
 
@@ -143,14 +163,11 @@ def simulate_windows(
         windows: of the log, B of L rows.
         initial: their initial states, (B, 13).
         names: effects by whose parameters the thrusts are differentiated.
+        ran: what `run_windows` returned of them, where that has been done.
     """
     module, substeps = Thrust(model), substeps_of(windows)
+    eta, nu, error = run_windows(model, windows, initial) if ran is None else ran
     with torch.no_grad():
-        # What is not there yet is differentiated elsewhere; the run itself is the same without it.
-        there = model.without_absent()
-        # Many runs follow: compiling pays, and the same bits must come each time.
-        eta, nu = predict(there, windows, initial, engine="firm")
-        error = window_error(there, windows, eta, nu)
         mean, start = module(windows, substeps)
     acting = {id(e) for e in model.before_thrust}
     keys, columns, at = {}, [], 0

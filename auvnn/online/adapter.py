@@ -15,6 +15,7 @@ from auvnn.online.intake import refusal, sample_of, turned
 from auvnn.online.residual import Residual, Sample
 from auvnn.online.schemes.base import Observation
 from auvnn.online.update import Update
+from auvnn.online.updates.trusted import Trusted
 
 MOST_HELD = 64
 
@@ -109,14 +110,17 @@ class Adapter(AdapterParts):
             self._off_until, self._off_cause = sample.t + self.guards.hold, "positions_disagree"
         elif fault:
             self._off_until, self._off_cause = sample.t + self.guards.hold, "fault_flagged"
-        elif self.guards.enabled and self._consistency.faulty(last, sample):
-            self._off_until, self._off_cause = sample.t + self.guards.hold, "inconsistent"
+        elif self.guards.enabled and self._contradictory(last, sample):
+            until = self._off_until if self._off_cause == "velocity_step" else -float("inf")
+            self._off_until, self._off_cause = max(sample.t + self.guards.hold, until), "inconsistent"
         if self._debt > 0.0 and self.guards.budget is not None:
             self._predictor.skip(sample)
             return self._no(sample.t, "over_budget")
         found = self._predictor.take(sample)
         if found is None:
             return self._no(sample.t, "first")
+        if self.guards.enabled and last is not None:
+            self._wait_after_step(last, sample, found)
         return self._learn(found, sample, dt)
 
     def _lost(self, last: Sample | None, sample: Sample) -> bool:
@@ -124,16 +128,41 @@ class Adapter(AdapterParts):
         before = self._positions.wrong
         now = self._positions.disagree(last, sample)
         if now and not before:
-            weights, scheme = self._trusted.back()
-            if not torch.equal(weights, self.weights.read()):
-                self.counts.reverted += 1
-            self.weights.write(weights)
-            self.scheme.load(scheme)
-            self._shadow.close(weights, scheme)
-            self._trial.begin(self.weights)
-        elif not now and sample.t >= self._off_until and self._trusted.due(sample.t):
-            self._trusted.keep(sample.t, self.weights.read(), self.scheme.state())
+            # While adaptation was off nothing was learned: then the fault took no longer to show than others do.
+            waited = sample.t < self._off_until and self._off_cause in ("velocity_step", "inconsistent")
+            self._take_back(self._recent if waited else self._trusted)
+        elif not now and sample.t >= self._off_until:
+            if self._trusted.due(sample.t):
+                # What is younger may have been learned from a fault that does not show yet.
+                self._trusted.keep(sample.t, *self._recent.oldest())
+            if self._recent.due(sample.t):
+                self._recent.keep(sample.t, self.weights.read(), self.scheme.state())
         return now
+
+    def _contradictory(self, last: Sample | None, sample: Sample) -> bool:
+        """Whether sensors contradict one another; what was learned while that began to show is taken back."""
+        now = self._consistency.faulty(last, sample)
+        if now and (sample.t >= self._off_until or self._off_cause == "velocity_step"):
+            self._take_back(self._recent)
+        return now
+
+    def _take_back(self, states: Trusted) -> None:
+        weights, scheme = states.back()
+        if not torch.equal(weights, self.weights.read()):
+            self.counts.reverted += 1
+        self.weights.write(weights)
+        self.scheme.load(scheme)
+        self._shadow.close(weights, scheme)
+        self._trial.begin(self.weights)
+
+    def _wait_after_step(self, last: Sample, sample: Sample, found: Residual) -> None:
+        """Adaptation waits after a step of the velocity that no force makes, until sensors would contradict it."""
+        steps = self._steps.judge(last, sample, found)
+        off = sample.t < self._off_until
+        if steps and not off:
+            self._off_until, self._off_cause = sample.t + self.guards.step_hold, "velocity_step"
+        elif steps is False and off and self._off_cause == "velocity_step":
+            self._off_until = sample.t
 
     def _passed_over(self, sample: Sample) -> bool:
         """Whether this is one of the many samples at rest that are not looked at, ever rarer as rest goes on."""

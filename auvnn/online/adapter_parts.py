@@ -25,8 +25,9 @@ from auvnn.online.schemes.base import OnlineScheme, anchors, build_online_scheme
 from auvnn.online.updates.bounds import Bounds, known_drag
 from auvnn.online.updates.shadow import Shadow
 from auvnn.online.updates.trial import Trial
-from auvnn.online.updates.trusted import Trusted
+from auvnn.online.updates.trusted import QUICK, Trusted
 from auvnn.online.updates.weights import Weights
+from auvnn.online.velocity_steps import VelocitySteps
 
 # Scales of subnetworks that an adapter adds itself: of velocity, and of acceleration for the force.
 SPEED = 0.3
@@ -79,6 +80,8 @@ class AdapterParts:
         self._consistency = Consistency()
         self._positions = Positions()
         self._trusted = Trusted(self.weights.read(), self.scheme.state())
+        self._recent = Trusted(self.weights.read(), self.scheme.state(), QUICK)
+        self._steps = VelocitySteps(bank.input_scale)
         self._monitor = Monitor(self._unadapted(), bank.output_scale) if watch else None
         self._held: list[tuple[Sample, Tensor, Tensor]] = []
         self._off_until = -float("inf")
@@ -140,6 +143,8 @@ class AdapterParts:
         self._consistency.forget()
         self._positions.forget()
         self._trusted.restart()
+        self._recent.restart()
+        self._steps.forget()
         self._gate.clear()
         self._held, self._resting, self._off_until = [], 0, -float("inf")
         if self._shadow.since is not None:

@@ -19,6 +19,8 @@ REASONS = {
     "fault_flagged": "a sensor fault is flagged: adaptation is off",
     "inconsistent": "sensors contradict one another: adaptation is off",
     "positions_disagree": "the velocity does not lead from position to position: adaptation is off until it does",
+    "velocity_step": "the velocity stepped as no force makes it: adaptation is off until attitude and positions "
+    "have had time to contradict it",
     "over_budget": "the last update took longer than its time: this sample is skipped, not queued",
     "first": "nothing to compare with yet",
     "at_rest": "at rest the damping is not excited",
@@ -44,6 +46,8 @@ class Guards:
         gate_floor: the least standard deviation that the gate assumes, in the subnetworks' force scale.
         persist: a suspect residual is believed when it has lasted this long, s.
         hold: adaptation stays off for this long after a fault was last seen, s.
+        step_hold: adaptation is off for this long after a step of the measured velocity that no force can make, s;
+            0: it goes on.
         noise_floor: the least standard deviation of the noise, in the subnetworks' force scale.
         settle: samples from which the noise is estimated before anything is learned.
         judge: updates are judged against the last validated weights over this many seconds.
@@ -67,6 +71,7 @@ class Guards:
     gate_floor: float = 0.05
     persist: float = 0.3
     hold: float = 1.0
+    step_hold: float = 3.0
     noise_floor: float = 0.01
     settle: int = 10
     judge: float = 1.0

@@ -105,6 +105,10 @@ def _restored(kind: type[Adapter], files: Mapping[str, bytes], path: Path) -> Ad
         adapter._consistency.load(_part(tensors, "consistency"))
         adapter._positions.load(_part(tensors, "positions"))
         adapter._trusted.load(_part(tensors, "trusted"))
+        # States that were saved before these were kept have the older ones alone.
+        recent = _part(tensors, "recent")
+        adapter._recent.load(recent if recent else _part(tensors, "trusted"))
+        adapter._steps.load(_part(tensors, "steps"))
         adapter._off_cause = plain["off_cause"]
         predictor._last = _sample(tensors, "last") if plain["last"] else None
     except AuvnnError:
@@ -159,6 +163,8 @@ def _tensors(adapter: Adapter) -> dict[str, Tensor]:
         "consistency": adapter._consistency.state(),
         "positions": adapter._positions.state(),
         "trusted": adapter._trusted.state(),
+        "recent": adapter._recent.state(),
+        "steps": adapter._steps.state(),
     }
     found = {f"{part}/{name}": v for part, tensors in parts.items() for name, v in tensors.items()}
     for k, sample in enumerate(adapter._predictor.history):

@@ -9,6 +9,7 @@ import pytest
 import torch
 from scipy.optimize import least_squares, lsq_linear
 
+from auvnn.estimation import prediction_error
 from auvnn.estimation.prediction_error import Fitted, fit
 from auvnn.estimation.priors import Priors, bounded_step, parameters_of, set_parameters
 from auvnn.estimation.sensitivity import Response
@@ -356,3 +357,29 @@ def test_a_bounded_step_is_the_constrained_minimum(seed):
     assert np.sum((a @ step - b) ** 2) <= 2 * best.cost * 1.02
     wide = bounded_step(a.T @ a, a.T @ b, np.full(5, -9.0), np.full(5, 9.0))
     assert wide == pytest.approx(np.linalg.lstsq(a, b, rcond=None)[0])
+
+
+def test_a_step_that_is_not_taken_is_run_and_not_differentiated(monkeypatch):
+    """And the fit is the same, to the last bit, as one that differentiates every step."""
+    truth = GreyBox(small_vehicle()).with_effects({"thruster_lag": {"time_constant": 0.4}})
+    model = truth.rebuilt(truth.copied_effects())
+    # So far away that the first steps are too long.
+    set_parameters(model, ["thruster_lag"], np.array([3.0]))
+    windows = cut_windows(make_log(truth, runs=1, duration=8.0, rate=10.0, noise=1.0), 2.0)
+    names, priors = ["thruster_lag"], free_priors(model, ["thruster_lag"])
+    tried, differentiated = [], []
+    run, linear = prediction_error.runs_by_block, prediction_error.linearise
+
+    def counted(at, *given):
+        return at.append(1) or (run if at is tried else linear)(*given)
+
+    monkeypatch.setattr(prediction_error, "runs_by_block", lambda *given: counted(tried, *given))
+    monkeypatch.setattr(prediction_error, "linearise", lambda *given: counted(differentiated, *given))
+    found = fit(model, windows, names, priors, iterations=12)
+    assert len(differentiated) == found.iterations + 1 < len(tried)
+    monkeypatch.setattr(
+        prediction_error, "weights_of", lambda sigma: 0.0 * torch.as_tensor(sigma).nan_to_num()
+    )
+    every = fit(model, windows, names, priors, iterations=12)
+    assert (found.theta == every.theta).all() and found.cost == every.cost
+    assert torch.equal(found.initial, every.initial)

@@ -231,4 +231,5 @@ def judged(
 if __name__ == "__main__":
     torch.set_num_threads(1)
     seconds = int(sys.argv[1]) if len(sys.argv) > 1 else 7200
-    print(json.dumps(asdict(soak(seconds, *sys.argv[2:3])), indent=1))
+    seed = int(sys.argv[3]) if len(sys.argv) > 3 else 0
+    print(json.dumps(asdict(soak(seconds, *sys.argv[2:3], seed=seed)), indent=1))

@@ -5,13 +5,10 @@ Where the first search leaves nothing, its answer stands as it is.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from auvnn.diagnosis.answers.answer import Diagnosis
-from auvnn.diagnosis.answers.answering import answer
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.command_holding import Holding, holding, squared_error
@@ -25,7 +22,8 @@ from auvnn.diagnosis.noise_law.words import left
 from auvnn.diagnosis.residuals.forces import actuators_of, share_of
 from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
 from auvnn.diagnosis.search import search
-from auvnn.diagnosis.stages.state import Searched, Setting, State
+from auvnn.diagnosis.stages.state import Setting, State
+from auvnn.diagnosis.stages.what_is_left import settled
 from auvnn.metrics.force_law import ForceLaw
 
 # Share of a degree of freedom's force that measured inputs may predict (lower 95 % limit) before it is no noise.
@@ -42,48 +40,42 @@ UNDECIDED = (
 ONE_SIDED = 1.645
 
 
-def answer_with_force(found: Diagnosis, under_way: Searched) -> tuple[Diagnosis, Searched]:
-    """Return the answer and the search that led to it, once what is left has been asked for.
+def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, Any], list[str]]:
+    """Return where the search stands once what is left has been asked for, what was found of it, and words.
 
     Args:
-        found: of the first search.
-        under_way: where that ended.
+        asked: what is asked.
+        state: where the first search ended.
     """
-    if not _leaves_something(found):
-        return found, under_way
-    asked = under_way.setting
-    least, held = _held(under_way.state)
-    windows = held.applied(under_way.state.windows)
+    if not state.leaves_something:
+        return state, {}, []
+    least, held = _held(state)
+    windows = held.applied(state.windows)
     asked.say("asking whether the sensors' noise is white")
     try:
-        colour = noise_colour(least, windows, under_way.floor)
+        colour = noise_colour(least, windows, asked.floor)
     except UNSOLVED:
         colour = Colour(None, 0.0)
     if held.odds > 0.0 or colour.noise is not None:
         why = [f"commands change between samples ({held.name})"] if held.odds > 0.0 else []
         why += [] if colour.noise is None else ["the sensors' noise is not white"]
         asked.say(f"{' and '.join(why)}: searching again")
-        found, under_way = search(asked, colour.applied(windows))
+        state = search(asked, colour.applied(windows))
     told: dict[str, Any] = {"commands": held.to_dict(), "noise": colour.to_dict()}
-    if not _leaves_something(found):
-        return replace(found, stochastic=told), under_way
+    if not state.leaves_something:
+        return state, told, []
+    if state.refuted is not None and not _leaves_force(asked, state, state.refuted):
+        # With all names nothing significant is left: those that predict alone decide whether there is.
+        state = settled(asked, state)
     try:
-        beside = _with_force(asked, under_way)
+        beside = _with_force(asked, state)
     except UNSOLVED:
         # The first answer stands: it did not need what could not be solved here.
-        return replace(found, stochastic=told, warnings=[*found.warnings, UNDECIDED]), under_way
+        return state, told, [UNDECIDED]
     if beside is None:
-        return replace(found, stochastic=told), under_way
+        return state, told, []
     state, law, foreknown = beside
-    found = answer(asked, state)
-    told["force"] = left(law)
-    words = [] if foreknown is None else [_words(foreknown)]
-    return replace(found, stochastic=told, warnings=[*found.warnings, *words]), Searched(asked, state)
-
-
-def _leaves_something(found: Diagnosis) -> bool:
-    """Whether a search ended with something that it has no name for."""
-    return found.verdict in ("unknown", "partial") or found.steps[-1]["verdict"] == "unknown"
+    return state, {**told, "force": left(law)}, [] if foreknown is None else [_words(foreknown)]
 
 
 def _held(state: State) -> tuple[FittedHypothesis, Holding]:
@@ -92,7 +84,8 @@ def _held(state: State) -> tuple[FittedHypothesis, Holding]:
     One that was tried and is about to diverge says nothing of them: then the next best is asked.
     """
     sigma = state.first.fitted.sigma
-    for end in sorted([state.first, *state.tried, state.current], key=lambda e: squared_error(e, sigma)):
+    known = [state.first, *state.tried, state.refuted or state.current]
+    for end in sorted(known, key=lambda e: squared_error(e, sigma)):
         try:
             return end, holding(end, state.windows)
         except np.linalg.LinAlgError:
@@ -100,17 +93,13 @@ def _held(state: State) -> tuple[FittedHypothesis, Holding]:
     return state.first, Holding("held", 0.0, 0.0, 0.0)
 
 
-def _with_force(
-    asked: Setting, under_way: Searched
-) -> tuple[State, ForceLaw | None, InputPrediction | None] | None:
+def _with_force(asked: Setting, state: State) -> tuple[State, ForceLaw | None, InputPrediction | None] | None:
     """Return where a search together with the stochastic force ends, the law, and what measured inputs predict of it.
 
     None where there is no such force.
     """
-    state = under_way.state
-    windows, floor, first = state.windows, under_way.floor, under_way.first
-    last = state.current
-    if variance_component_test(last, windows, white(last, floor)).p_value >= ALPHA_BOUNDARY:
+    windows, floor, first = state.windows, asked.floor, state.first
+    if not _leaves_force(asked, state, state.refuted or state.current):
         return None
     beside = ForceSearch(asked, windows)
     null = beside.begin(first, white(first, floor))
@@ -126,6 +115,11 @@ def _with_force(
         if _predictable(asked, again) is None:
             result, predicted = again, None
     return _state(asked, state, result, chance=predicted is None), result.estimate.law, predicted
+
+
+def _leaves_force(asked: Setting, state: State, end: FittedHypothesis) -> bool:
+    noise = white(end, asked.floor)
+    return variance_component_test(end, state.windows, noise).p_value < ALPHA_BOUNDARY
 
 
 def _predictable(asked: Setting, result: WithForce) -> InputPrediction | None:
@@ -169,6 +163,7 @@ def _state(asked: Setting, state: State, result: WithForce, *, chance: bool) -> 
         negligible=small,
         nearest=() if named else tuple(dict.fromkeys([*tried, *state.nearest, *before])),
         partial=False,
+        refuted=None,
         unexplained=share if named else state.unexplained,
     )
 

@@ -96,6 +96,7 @@ class State:
         negligible: whether a force is left that does not matter.
         nearest: names that explain a part of it and are not the cause.
         partial: whether these stay in the fit because they predict.
+        refuted: the explanation with names that are no cause, of which it is still open whether they predict.
         unexplained: share of what looked like a force that nothing explains.
         notes: what could not be worked out, in words.
     """
@@ -120,6 +121,7 @@ class State:
     negligible: bool = False
     nearest: tuple[str, ...] = ()
     partial: bool = False
+    refuted: FittedHypothesis | None = None
     unexplained: float = 1.0
     notes: tuple[str, ...] = ()
 
@@ -141,6 +143,14 @@ class State:
     def in_groups(self) -> list[str]:
         """The members of all groups between which the log cannot decide."""
         return [e.effects[-1] for group in self.groups for e in group]
+
+    @property
+    def leaves_something(self) -> bool:
+        """Whether the search ended with something that it has no name for."""
+        gone = {e for s in self.steps if s["verdict"] == "withdrawn" for e in s["effects"]}
+        standing = [s for s in self.steps if s["verdict"] != "withdrawn" and not {*s["effects"]} <= gone]
+        leading = (standing or self.steps[-1:])[0]
+        return leading["verdict"] in ("unknown", "partial") or self.steps[-1]["verdict"] == "unknown"
 
     def without_groups(self, names: list[str]) -> tuple[State, list[str]]:
         """Return the state without the groups for which some names stand, and these names with all members."""

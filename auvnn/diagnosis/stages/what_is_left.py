@@ -64,7 +64,7 @@ def _asked(asked: Setting, state: State) -> State:
     much = state.unexplained > PARTIAL and p_value < ALPHA_LEFT
     none_needed = bool(own) and len(needless) == len(own)
     if none_needed or (much and not small(asked, state, left)):
-        return _not_the_cause(asked, state, given, own)
+        return _not_the_cause(asked, state, given)
     if needless:
         try:
             last = asked.chooser(state.windows).without(last, asked.base, needless)
@@ -96,27 +96,13 @@ def _unknown(state: State, left: Unnamed, p_value: float) -> State:
     return state.but(steps=(*before, end), left=left)
 
 
-def _not_the_cause(asked: Setting, state: State, given: list[str], own: list[str]) -> State:
-    """Return the state with names that are no cause: kept for what they predict, or dropped as the nearest."""
+def _not_the_cause(asked: Setting, state: State, given: list[str]) -> State:
+    """Return the state with names that are no cause: the nearest, until it is asked whether they predict."""
     p_value = state.steps[0]["p_value"]
-    found = kept(asked, state, own)
-    if found is not None:
-        noise = white(found, asked.floor)
-        left = variance_component_test(found, state.windows, noise)
-        return state.but(
-            current=found,
-            chosen=found.effects,
-            groups=(),
-            nearest=found.effects,
-            partial=True,
-            left=left,
-            remainder=left,
-            unexplained=left.left_of(variance_component_test(state.first, state.windows, noise)),
-            steps=({"verdict": "partial", "effects": [], "p_value": p_value},),
-        )
     first: FittedHypothesis = state.first
     left = variance_component_test(first, state.windows, white(first, asked.floor))
     return state.but(
+        refuted=state.current,
         current=first,
         chosen=(),
         groups=(),
@@ -124,4 +110,32 @@ def _not_the_cause(asked: Setting, state: State, given: list[str], own: list[str
         left=left,
         remainder=left,
         steps=({"verdict": "unknown", "effects": [], "p_value": p_value},),
+    )
+
+
+def settled(asked: Setting, state: State) -> State:
+    """Return the state with names that are no cause kept for what they predict, where each earns its place.
+
+    It takes a fit for each of them, and is asked once nothing else is left to be asked.
+    """
+    if state.refuted is None:
+        return state
+    own = [n for n in state.nearest if n in state.refuted.effects]
+    asked.say("asking what the names predict")
+    found = kept(asked, state.but(current=state.refuted), own)
+    if found is None:
+        return state.but(refuted=None)
+    noise = white(found, asked.floor)
+    left = variance_component_test(found, state.windows, noise)
+    return state.but(
+        refuted=None,
+        current=found,
+        chosen=found.effects,
+        groups=(),
+        nearest=found.effects,
+        partial=True,
+        left=left,
+        remainder=left,
+        unexplained=left.left_of(variance_component_test(state.first, state.windows, noise)),
+        steps=({"verdict": "partial", "effects": [], "p_value": state.steps[0]["p_value"]},),
     )

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 import torch
 from torch import Tensor
 
-# Two states are kept, the older one this far back at least, s: most faults show within it.
-EVERY = 20.0
+# Two states are kept, the older one this far back at least, s: a velocity that contradicts the positions shows within
+# the first, sensors that contradict one another within a second, and so well within the second.
+SLOW, QUICK = 20.0, 2.0
 
 
 class Trusted:
@@ -17,17 +18,19 @@ class Trusted:
     Args:
         weights: (6, P) those that the adapter begins with.
         scheme: what the scheme remembers then.
+        every: s between the two states.
     """
 
-    def __init__(self, weights: Tensor, scheme: Mapping[str, Tensor]) -> None:
+    def __init__(self, weights: Tensor, scheme: Mapping[str, Tensor], every: float = SLOW) -> None:
         """Trust what is there."""
+        self.every = every
         first = (None, weights.clone(), dict(scheme))
         self._kept: list[tuple[float | None, Tensor, dict[str, Tensor]]] = [first, first]
 
     def due(self, t: float) -> bool:
         """Whether the newest state is old enough to keep another one."""
         newest = self._kept[-1][0]
-        return newest is None or t - newest >= EVERY
+        return newest is None or t - newest >= self.every
 
     def keep(self, t: float, weights: Tensor, scheme: Mapping[str, Tensor]) -> None:
         """Keep a state beside the newest one; the oldest goes.
@@ -42,6 +45,10 @@ class Trusted:
     def restart(self) -> None:
         """Another clock begins; what is trusted stays."""
         self._kept = [(None, weights, scheme) for _, weights, scheme in self._kept]
+
+    def oldest(self) -> tuple[Tensor, dict[str, Tensor]]:
+        """Return the older state, and go on."""
+        return self._kept[0][1:]
 
     def back(self) -> tuple[Tensor, dict[str, Tensor]]:
         """Return the older state, and trust nothing younger."""

@@ -91,7 +91,9 @@ def test_a_fit_that_grows_without_bound_is_passed_over(model):
         holding(wild, windows)
 
     def found(first, *tried):
-        state: Any = SimpleNamespace(first=first, tried=list(tried), current=wild, windows=windows)
+        state: Any = SimpleNamespace(
+            first=first, tried=list(tried), current=wild, refuted=None, windows=windows
+        )
         return _held(state)
 
     assert found(first, wild) == (first, holding(first, windows))

@@ -131,6 +131,24 @@ def test_a_name_is_refuted_on_weaker_grounds_than_adequacy(model, monkeypatch, p
     assert found.nearest == (["net_buoyancy"] if verdict == "partial" else [])
 
 
+def test_what_names_predict_is_asked_once_and_last(model, monkeypatch):
+    """A fit for each name is spent where the search beside a stochastic force has not answered already."""
+    log = make_log(model.with_effects({"net_buoyancy": {"force": 6.0}}), runs=2, duration=12.0, noise=1.0)
+    p_values, order = np.array([1e-3, *np.ones(5)]), []
+
+    def half_left(explanation, windows, sigma):
+        energy = 1.0 if explanation.effects else 2.0
+        return Unnamed(np.zeros(6), p_values, np.array([energy, 0, 0, 0, 0, 0]), {"X": 1.0})
+
+    monkeypatch.setattr("auvnn.diagnosis.stages.what_is_left.variance_component_test", half_left)
+    found = diagnose(
+        model, log, ["net_buoyancy"], advice=False, whiteness=False, costs=False, progress=order.append
+    )
+    asked = [k for k, words in enumerate(order) if "asking what the names predict" in str(words)]
+    white = [k for k, words in enumerate(order) if "noise is white" in str(words)]
+    assert found.verdict == "partial" and len(asked) == 1 and white and white[0] < asked[0]
+
+
 def test_a_withdrawn_name_is_not_among_the_nearest(model, monkeypatch):
     """A name that was taken first and withdrawn does not stand, whatever is left."""
     truth = pushed(model, 12.0).with_effects({"constant_force": {"X": 8.0}, "net_buoyancy": {"force": 6.0}})
