@@ -54,9 +54,9 @@ def _run(job: Job) -> Answering:
     quality = log.quality()
     if looked:
         quality = replace(quality, files=looked)
-    from auvnn.checks import blind, check_actuators
+    from auvnn.checks import check_actuators, unmeasured
 
-    quality = quality.with_notes("not measured", blind.words(log, job["model"] is not None))
+    quality = quality.with_notes("not measured", unmeasured.words(log, job["model"] is not None))
     if job["model"] is not None and not log.unmeasured:
         quality = quality.with_actuators(check_actuators(job.model(log), log))
     quality.write(job.folder)

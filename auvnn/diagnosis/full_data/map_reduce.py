@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.score_tests.probes import Probed, probed
 from auvnn.effects import Extent
-from auvnn.estimation.initial_states import fit_initial_states
+from auvnn.estimation.initial_states import ROUNDS, fit_initial_states
 from auvnn.estimation.sufficient_statistics import (
-    ROUNDS,
     Combination,
     ScoreMoments,
     WindowSums,

@@ -74,8 +74,8 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         return state, told, [UNDECIDED]
     if beside is None:
         return state, told, []
-    state, law, foreknown = beside
-    return state, {**told, "force": left(law)}, [] if foreknown is None else [_words(foreknown)]
+    state, law, predicted = beside
+    return state, {**told, "force": left(law)}, [] if predicted is None else [_words(predicted)]
 
 
 def _held(state: State) -> tuple[FittedHypothesis, Holding]:
@@ -94,7 +94,7 @@ def _held(state: State) -> tuple[FittedHypothesis, Holding]:
 
 
 def _with_force(asked: Setting, state: State) -> tuple[State, ForceLaw | None, InputPrediction | None] | None:
-    """Return where a search together with the stochastic force ends, the law, and what measured inputs predict of it.
+    """Return where a search beside the stochastic force ends, the law, and what measured inputs predict of it.
 
     None where there is no such force.
     """
