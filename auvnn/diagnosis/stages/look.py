@@ -82,7 +82,7 @@ def regroup(asked: Setting, state: State) -> State:
     The errors of what had not been found yet may have hidden the difference.
     """
     chooser, last = asked.chooser(state.windows), state.current
-    groups, steps = list(state.groups), [dict(s) for s in state.steps]
+    groups, steps = list(state.groups), [s.copy() for s in state.steps]
     for k, group in enumerate(state.groups):
         names = [e.effects[-1] for e in group]
         if {*last.effects} == {*group[0].effects}:

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.answer_types import SearchStep
+from auvnn.diagnosis.answers.table import CandidateRow
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
@@ -107,8 +109,8 @@ class State:
     chosen: tuple[str, ...] = ()
     groups: tuple[tuple[FittedHypothesis, ...], ...] = ()
     withdrawn: tuple[str, ...] = ()
-    steps: tuple[dict[str, Any], ...] = ()
-    table: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    steps: tuple[SearchStep, ...] = ()
+    table: Mapping[str, CandidateRow] = field(default_factory=dict)
     tried: tuple[FittedHypothesis, ...] = ()
     failed: Mapping[str, str] = field(default_factory=dict)
     p_value: float = 1.0
