@@ -30,9 +30,9 @@ from auvnn.estimation.window_normal_equations import (
     motion,
     normal_equations,
     residual_std,
-    runs_by_block,
     weights_of,
 )
+from auvnn.estimation.window_simulation import runs_by_block
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox

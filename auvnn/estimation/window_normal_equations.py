@@ -18,7 +18,7 @@ from torch import Tensor
 from auvnn.estimation.sensitivity import Response, respond_by
 from auvnn.estimation.stochastic_force.columns import pushed
 from auvnn.estimation.stochastic_force.sums import LOOSE, cost_with_force, sums_with_force
-from auvnn.estimation.window_simulation import run_windows, simulate_windows
+from auvnn.estimation.window_simulation import BLOCK, simulate_windows
 from auvnn.metrics.coloured_noise import previous
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
@@ -30,10 +30,10 @@ Array = NDArray[np.float64]
 TRUST = 1e-4
 # Sums beyond this are those of windows whose sensitivities have grown without bound.
 HUGE = 1e60
-# Windows worked out at a time, as long as there are no more parameters than columns: this bounds the memory. Windows run
-# free at a time, and their thrusts differentiated. Numbers of an answer that stay near the processor.
-CHUNK, COLUMNS = 48, 80
-BLOCK, NEAR = CHUNK, 2_500_000
+# Windows worked out at a time, as long as there are no more parameters than columns: this bounds the memory.
+CHUNK, COLUMNS = BLOCK, 80
+# Numbers of an answer that stay near the processor.
+NEAR = 2_500_000
 
 
 @dataclass(frozen=True)
@@ -109,26 +109,6 @@ def motion(windows: Windows) -> Array:
     count = torch.clamp(seen.sum((0, 1)), min=1)
     mean = (euler_free * seen).sum((0, 1)) / count
     return torch.sqrt((((euler_free - mean) * seen) ** 2).sum((0, 1)) / count).numpy()
-
-
-def runs_by_block(
-    model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str]
-) -> list[tuple[Tensor, Tensor, Tensor]]:
-    """Return the free runs of windows, block by block as `linearise` takes them.
-
-    A step of a fit that is not taken needs no more, and costs a third.
-
-    Args:
-        model: at the values in question.
-        windows: of the log, B of them.
-        initial: their initial states, (B, 13).
-        names: effects whose parameters will be differentiated by.
-    """
-    model = model.without_absent(names)
-    return [
-        run_windows(model, windows.pick(block), initial[block])
-        for block in (slice(start, start + BLOCK) for start in range(0, len(windows), BLOCK))
-    ]
 
 
 def linearise(

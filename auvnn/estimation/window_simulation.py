@@ -17,6 +17,9 @@ from auvnn.models import GreyBox
 from auvnn.models.free_running.rollout import steps_per_interval
 from auvnn.physics.attitude import quat_conjugate, quat_multiply, quat_to_matrix, quat_to_rotvec
 
+# Windows run free at a time, and their thrusts differentiated.
+BLOCK = 48
+
 
 class Thrust(nn.Module):
     """Mean thrust of every interval, and the thrust as it begins, as functions of the effects' parameters.
@@ -145,6 +148,26 @@ def run_windows(model: GreyBox, windows: Windows, initial: Tensor) -> tuple[Tens
         # Many runs follow: compiling pays, and the same bits must come each time.
         eta, nu = predict(there, windows, initial, engine="firm")
         return eta, nu, window_error(there, windows, eta, nu)
+
+
+def runs_by_block(
+    model: GreyBox, windows: Windows, initial: Tensor, names: Sequence[str]
+) -> list[tuple[Tensor, Tensor, Tensor]]:
+    """Return the free runs of windows, block by block as `linearise` takes them.
+
+    A step of a fit that is not taken needs no more, and costs a third.
+
+    Args:
+        model: at the values in question.
+        windows: of the log, B of them.
+        initial: their initial states, (B, 13).
+        names: effects whose parameters will be differentiated by.
+    """
+    model = model.without_absent(names)
+    return [
+        run_windows(model, windows.pick(block), initial[block])
+        for block in (slice(start, start + BLOCK) for start in range(0, len(windows), BLOCK))
+    ]
 
 
 def simulate_windows(

@@ -38,13 +38,14 @@ def cases(options: Mapping[str, Any]) -> list[Case]:
     Args:
         options: lists or single values by name; see `KEYS` and `configs/benchmark.yaml`. With a `plan`, each of
             its parts is taken in turn, what it does not say being as in `common`, and then as in the options.
+            Of every part (or of all combinations, without a plan) `every` and `offset` take a sample.
 
     Raises:
         ConfigError: something in it is unknown or out of range.
     """
     plan = options.get("plan")
     if plan is None:
-        return _combined(options, "")
+        return _thinned(_combined(options, ""), options)
     for key in plan:
         if key not in OF_A_PLAN:
             raise ConfigError(unknown_name("key of a plan", str(key), OF_A_PLAN))
@@ -60,8 +61,18 @@ def cases(options: Mapping[str, Any]) -> list[Case]:
             for key in given:
                 if key not in KEYS:
                     raise ConfigError(unknown_name(f"key of the plan's part {name}", str(key), KEYS))
-            out += _combined({**options, **given}, str(name))
+            # Each part begins elsewhere, so that a sample of them all holds different effects.
+            begin = _count(options, "offset") + list(parts).index(name)
+            out += _thinned(_combined({**options, **given}, str(name)), options, begin)
     return out
+
+
+def _thinned(found: list[Case], options: Mapping[str, Any], begin: int | None = None) -> list[Case]:
+    """Return every so many-th log, which keeps its seed and what is hidden in it, whatever is left out."""
+    every, offset = _count(options, "every", 1), _count(options, "offset")
+    if every < 1 or offset >= every:
+        raise ConfigError(f"every={every} offset={offset}: offset= counts from 0 to every= less one")
+    return found[(offset if begin is None else begin) % every :: every]
 
 
 def targets(options: Mapping[str, Any]) -> list[dict[str, Any]]:

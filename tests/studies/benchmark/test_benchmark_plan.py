@@ -42,6 +42,23 @@ def test_a_plan_is_its_parts_one_after_the_other():
     assert {(c.duration, c.runs) for c in found} == {(15.0, 4)}
 
 
+def test_samples_of_a_plan_are_its_logs_each_in_one_of_them():
+    parts = {
+        "one": {"effects": ["cg_offset", "tether"], "repeats": 5},
+        "two": {"effects": "nothing", "repeats": 9},
+    }
+    whole = cases(plan(**parts))
+    samples = [cases({**plan(**parts), "every": 7, "offset": k}) for k in range(7)]
+    assert sorted(map(repr, whole)) == sorted(repr(c) for sample in samples for c in sample)
+    # Each part begins elsewhere; and what a part holds does not depend on which others are asked for.
+    assert samples[0][0] == whole[0]
+    (first_of_two,) = {c for c in cases({**plan(**parts), "every": 7, "only": "two"}) if c.seed < 18}
+    assert first_of_two in samples[0]
+    for wrong in ({"every": 0}, {"every": 3, "offset": 3}, {"every": 1.5}):
+        with pytest.raises(ConfigError, match="every"):
+            cases({**plan(**parts), **wrong})
+
+
 def test_a_plan_can_be_asked_again_on_logs_that_nobody_has_seen():
     pairs = {"pairs": 12, "repeats": 0}
     options = plan(one={"effects": "cg_offset", "seed": 500}, two={"effects": "nothing"}, three=pairs)
