@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
+from auvnn.estimation.force_marginalisation.columns import PUSH, Cells
 from auvnn.estimation.point_slopes import OperatingPoint, differentiate
-from auvnn.estimation.stochastic_force.columns import PUSH, Cells
 from auvnn.estimation.window_simulation import SimulatedWindows, simulate_windows
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox, Inputs

@@ -7,7 +7,7 @@ import pytest
 
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
-from auvnn.diagnosis.residuals.additive_force import AdditiveForce
+from auvnn.diagnosis.residuals.additive_force_test import AdditiveForce
 from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.effects import effect_class
 from auvnn.models import GreyBox

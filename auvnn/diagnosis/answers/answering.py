@@ -19,9 +19,9 @@ from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.candidates import HORIZON, WARMUP
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import has_stated_uncertainty
-from auvnn.diagnosis.residuals.additive_force import additive_force_test
+from auvnn.diagnosis.residuals.additive_force_test import additive_force_test
 from auvnn.diagnosis.residuals.attribution import attribute_residual
-from auvnn.diagnosis.residuals.variance_component import white
+from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.diagnosis.residuals.whiteness import residual_tests
 from auvnn.diagnosis.stages.partial import without
 from auvnn.diagnosis.stages.state import Setting, State

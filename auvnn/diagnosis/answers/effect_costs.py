@@ -19,7 +19,7 @@ from auvnn.diagnosis.cross_validation.errors import Gain, LeftOut, gain
 from auvnn.diagnosis.cross_validation.left_out import left_out_found
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.residuals.forces import AXES, actuators_of, forces_of, share_of
-from auvnn.diagnosis.residuals.variance_component import Unnamed
+from auvnn.diagnosis.residuals.variance_component_test import Unnamed
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.errors import InputError
 from auvnn.metrics.noise_floor import noise_floor

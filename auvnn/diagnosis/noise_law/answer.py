@@ -21,7 +21,7 @@ from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction, predi
 from auvnn.diagnosis.noise_law.search import UNSOLVED, ForceSearch
 from auvnn.diagnosis.noise_law.words import left
 from auvnn.diagnosis.residuals.forces import actuators_of, share_of
-from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
+from auvnn.diagnosis.residuals.variance_component_test import variance_component_test, white
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.diagnosis.stages.what_is_left import settled

@@ -14,8 +14,8 @@ from auvnn.diagnosis.answers.table import CandidateRow
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
-from auvnn.diagnosis.residuals.additive_force import AdditiveForce
-from auvnn.diagnosis.residuals.variance_component import Unnamed
+from auvnn.diagnosis.residuals.additive_force_test import AdditiveForce
+from auvnn.diagnosis.residuals.variance_component_test import Unnamed
 from auvnn.diagnosis.score_tests.null_tests import NullTests
 from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.logs import Log
