@@ -57,7 +57,7 @@ class Comparison(Answer):
     baseline: dict[str, Any] = field(default_factory=dict)
 
     def card(self) -> Card:
-        """Return the error of free running, and what it stands beside."""
+        """Return the error of free running, and what it is compared with."""
         rows = [
             [
                 "whole run" if h == "full" else f"{h} s",

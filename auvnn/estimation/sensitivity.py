@@ -151,7 +151,7 @@ def respond_by(
             state, parameters = (some.whitened(x.mul_(mask)) for x in (state, parameters))
         state, parameters, force = state.mul_(mask), parameters.mul_(mask), None
         if cells is not None:
-            parameters, force = cells.parted(parameters)
+            parameters, force = cells.separate(parameters)
         yield Response(ran.error[part], state, parameters, force)
 
 
