@@ -9,7 +9,7 @@ from typing import Any
 
 from auvnn.errors import ConfigError, MissingExtra, one_line
 from auvnn.executors.base import AHEAD, TRIES, Executor, Lost, handed_ahead
-from auvnn.executors.safe_path import kept_safe
+from auvnn.executors.safe_path import kept_safe, ray_job
 
 # Ray gives the agents of a node 15 s to come up, and cannot be told otherwise (ray-project/ray issue 65983). On a busy
 # machine the first try reads their code from the disk and may fail; the next one finds it in memory.
@@ -46,13 +46,11 @@ class RayCluster(Executor):
         for left in reversed(range(_STARTS if self.address is None else 1)):
             try:
                 with kept_safe():
-                    # A job of Ray's client: otherwise Ray puts the current folder first in its workers' search path.
-                    job = importlib.import_module("ray.job_config").JobConfig(_client_job=True)
                     ray.init(
                         address=self.address,
                         log_to_driver=False,
                         logging_level="ERROR",
-                        job_config=job,
+                        job_config=ray_job(),
                         **own,
                     )
                 return

@@ -9,10 +9,12 @@ Reference: https://docs.python.org/3/using/cmdline.html#cmdoption-P
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import os
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 # Where this package was imported from is trusted, also if the user stands there (a checkout that is worked on).
 _HOME = os.path.realpath(Path(__file__).parents[2])
@@ -73,3 +75,35 @@ def kept_safe() -> Iterator[None]:
             os.environ.pop(name, None)
             if value is not None:
                 os.environ[name] = value
+
+
+def ray_job() -> Any:
+    """Return the description of a Ray job whose processes do not have the current folder in their search path.
+
+    Ray puts it there first, but for jobs of its client (`_client_job`), which hand their code over by themselves.
+    """
+    kind = importlib.import_module("ray.job_config").JobConfig
+    return kind(_client_job=True, _py_driver_sys_path=[_HOME])
+
+
+@contextlib.contextmanager
+def ray_kept_safe() -> Iterator[None]:
+    """Let whoever starts Ray in this process start such jobs: Hydra's launcher does, where it is installed."""
+    try:
+        there = importlib.util.find_spec("hydra_plugins.hydra_ray_launcher") is not None
+    except ModuleNotFoundError:
+        there = False
+    if not there:
+        yield
+        return
+    ray = importlib.import_module("ray")
+    begin = ray.init
+
+    def init(*given: Any, **more: Any) -> Any:
+        return begin(*given, **{"job_config": ray_job(), "logging_level": "ERROR", **more})
+
+    ray.init = init
+    try:
+        yield
+    finally:
+        ray.init = begin

@@ -33,6 +33,7 @@ from auvnn.cli.runs.working import WORK, refuse_links, take_away
 from auvnn.cli.speech import Speaker, complain
 from auvnn.config import config_dir
 from auvnn.errors import AuvnnError, ConfigError, one_line
+from auvnn.executors.safe_path import ray_kept_safe
 
 
 def run_verb(name: str, verb: Verb, arguments: list[str]) -> int:
@@ -128,7 +129,8 @@ def _counted(name: str, verb: Verb, composer: Composer, tally: Path, config: Dic
 def _launched(name: str, arguments: list[str], task: Callable[[DictConfig], Any]) -> None:
     """Run many jobs by Hydra's launcher; one that gives up leaves what it has done."""
     try:
-        _hydra(name, arguments, task)
+        with ray_kept_safe():
+            _hydra(name, arguments, task)
     except AuvnnError:
         raise
     except Exception as error:

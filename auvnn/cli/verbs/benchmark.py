@@ -11,7 +11,8 @@ from auvnn.cli.runs.job import Answering, Job, Verb
 TAKEN = (
     "effects", "sizes", "noises", "excitations", "vehicles", "coefficients", "repeats", "seed", "runs", "duration",
     "rate", "workers", "plants", "accelerations", "loops", "pairs", "triples", "strangers", "held_out", "ties",
-    "candidates", "only", "shift", "worlds", "balanced", "costs", "variants", "oracle", "without",
+    "candidates", "only", "shift", "worlds", "balanced", "costs", "variants", "oracle", "without", "every",
+    "offset",
 )  # fmt: skip
 JOURNAL = "rows.jsonl"
 

@@ -117,11 +117,35 @@ def with_body(vehicle: Vehicle, body: Body) -> Vehicle:
     linear, quadratic = array(body.element_linear), array(body.element_quadratic)
     if linear is not None and quadratic is not None:
         elements = tuple(replace(e, linear=linear[k], quadratic=quadratic[k]) for k, e in enumerate(elements))
+    inertia, added_mass = array(body.inertia), array(body.added_mass)
+    if inertia is not None and added_mass is not None:
+        inertia, added_mass = of_a_body(inertia, added_mass)
     return replace(
         vehicle,
-        inertia=array(body.inertia),
-        added_mass=array(body.added_mass),
+        inertia=inertia,
+        added_mass=added_mass,
         linear_damping=array(body.linear),
         quadratic_damping=array(body.quadratic),
         damping_elements=elements,
     )
+
+
+def of_a_body(inertia: Array, added_mass: Array) -> tuple[Array, Array]:
+    """Return an inertia that a body can have, and the added mass that takes over what is more.
+
+    Only the sum of I_b and of the rotational block of M_A is in M and in C (Fossen, 2011, sections 3.3 and 6.3), so
+    that a fit to a slender body, I_x + I_y near I_z, may ask of the inertia alone what no body has: a principal moment
+    beyond the sum of the others. What is beyond goes into the added mass, and every force stays what it was.
+
+    Args:
+        inertia: I_g, (3, 3), kg m2.
+        added_mass: M_A, (6, 6).
+    """
+    moments, axes = np.linalg.eigh(inertia)
+    beyond = moments[2] - (moments[0] + moments[1])
+    if beyond <= 0.0:
+        return inertia, added_mass
+    part = beyond * np.outer(axes[:, 2], axes[:, 2])
+    added = added_mass.copy()
+    added[3:, 3:] += part
+    return inertia - part, added

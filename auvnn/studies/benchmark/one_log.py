@@ -182,7 +182,7 @@ def _seen(case: Case, model: Any, log: Any, made: Any, found: Any) -> dict[str, 
     rivals = dict.fromkeys([*first, *[c["effect"] for c in found.candidates[:3]]])
     known = [n for n in rivals if n not in hidden and n in EFFECTS]
     oracle = Oracle(model, made, case.runs, list(hidden))
-    return {"cost": cost_of(model, log, hidden), "oracle": oracle.distances(known)}
+    return {"cost": cost_of(model, log, hidden), "oracle_distances": oracle.distances(known)}
 
 
 def _ties(case: Case, model: Any, log: Any, truth: Mapping[str, Any], found: Any) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import yaml
 
 from auvnn.cli.main import VERBS
 from auvnn.cli.verbs.benchmark import TAKEN
+from auvnn.config import config_dir, read_yaml
 from auvnn.studies.benchmark import cases
 from auvnn.studies.benchmark.cases import apart
 
@@ -95,3 +96,10 @@ def test_whoever_ends_it_is_told_that_it_goes_on(auvnn, monkeypatch):
     monkeypatch.setattr(study, "run_case", interrupted)
     status, out, err = auvnn("benchmark", *TINY, "out=out")
     assert status == 130 and "the same command goes on" in err and "result" not in out
+
+
+def test_every_option_that_says_which_logs_reaches_the_benchmark():
+    """An option of the composed config that is neither handed on nor the command's own would change nothing."""
+    own = {"plan", "any_code", "rows", "only_done", "defaults", "hydra"}
+    options = read_yaml(config_dir() / "benchmark.yaml")
+    assert {*options} - own == {*TAKEN}

@@ -61,14 +61,14 @@ def visible(row: Row) -> bool:
 def seen_at(row: Row) -> float | None:
     """Return by how many standard errors an oracle sees the hidden effect, or None where nobody asked it."""
     names = effects_of(row)
-    return ((row.get("oracle") or {}).get(names[0]) or {}).get(counting.UNSEEN) if names else None
+    return ((row.get("oracle_distances") or {}).get(names[0]) or {}).get(counting.UNSEEN) if names else None
 
 
 def _told(row: Row) -> dict[str, Any]:
     """Return the row without neutral names, the oracle's distances being what ties are judged by."""
     out = stripped(row)
-    if row.get("oracle"):
-        out["imitation"], out["plant_imitation"] = row["oracle"], None
+    if row.get("oracle_distances"):
+        out["imitation"], out["plant_imitation"] = row["oracle_distances"], None
     return out
 
 

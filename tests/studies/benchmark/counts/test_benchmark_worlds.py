@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from typing import Any
 
@@ -12,6 +13,7 @@ from auvnn.errors import ConfigError
 from auvnn.models import load
 from auvnn.simulation import simulate
 from auvnn.studies.benchmark import cases, run_case
+from auvnn.studies.benchmark.case import Case
 from auvnn.studies.benchmark.cases import targets
 from auvnn.studies.benchmark.costs import cost_of, costly
 from auvnn.studies.benchmark.counts.rates import NUMBERS, RATES
@@ -79,5 +81,8 @@ def test_one_log_of_a_world_goes_the_whole_way():
     (case,) = cases({**OPTIONS, **part})
     row = run_case(case)
     assert row["fault"] is None and row["size"] == "150%" and 0.7 < row["cost"] < 3.0
-    assert row["oracle"]["net_buoyancy"]["nothing"] > row["oracle"]["net_buoyancy"]["constant_force"] > 0.0
+    seen = row["oracle_distances"]["net_buoyancy"]
+    assert seen["nothing"] > seen["constant_force"] > 0.0
+    # By what a row says its case is found again, and the log is not made twice.
+    assert {Case.of_row(json.loads(json.dumps(row, default=float))): 1} == {case: 1}
     assert np.shape(row["world_law"]["drawn"]["force"]["rms"]) == (6,)

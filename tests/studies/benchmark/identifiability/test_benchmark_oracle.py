@@ -108,7 +108,7 @@ def row(hidden: str, *found: tuple[str, list[str]], true=(), kind="effect", **mo
         "hidden": hidden, "kind": kind, "world": "w", "verdict": found[0][0], "made": True,
         "missing": [n for v, names in found if v in ("named", "ambiguous") for n in names],
         "found": [{"verdict": v, "effects": n} for v, n in found], "world_law": {"true_names": list(true)},
-        "oracle": {hidden: {"nothing": 9.0, "b": 2.0, "c": 8.0}}, "cost": 0.4, **more,
+        "oracle_distances": {hidden: {"nothing": 9.0, "b": 2.0, "c": 8.0}}, "cost": 0.4, **more,
     }  # fmt: skip
 
 
@@ -132,7 +132,7 @@ def test_what_is_true_in_a_world_is_neither_a_hit_nor_an_error():
     only = row("a", ("named", ["t"]), END, true=["t"])
     assert not right(only) and not wrong_first(only)
     assert right(row("a", ("ambiguous", ["a", "t"]), true=["t"])), "what is left of the group is the name"
-    assert right(row("t", ("named", ["t"]), END, true=["t"], oracle={"t": {"nothing": 9.0}})), (
+    assert right(row("t", ("named", ["t"]), END, true=["t"], oracle_distances={"t": {"nothing": 9.0}})), (
         "it is hidden here"
     )
     nothing = row("nothing", ("named", ["t"]), END, true=["t"], kind="nothing")
@@ -146,9 +146,9 @@ def test_what_is_true_in_a_world_is_neither_a_hit_nor_an_error():
 def test_visible_is_seen_and_costly():
     assert visible(row("a", END))
     assert not visible(row("a", END, cost=0.09)) and not visible(
-        row("a", END, oracle={"a": {"nothing": 4.9}})
+        row("a", END, oracle_distances={"a": {"nothing": 4.9}})
     )
-    assert not visible(row("a", END, oracle=None)), "nobody asked"
+    assert not visible(row("a", END, oracle_distances=None)), "nobody asked"
     rows = [row("a", ("named", ["a"])), row("a", END), row("a", ("named", ["a"]), cost=0.01)]
     assert [rate("visible_named_or_tied", rows)[k] for k in ("hits", "count")] == [1, 2]
     assert [rate("visible", rows)[k] for k in ("hits", "count")] == [2, 3]
