@@ -9,14 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, log_evidence
-from auvnn.diagnosis.hypotheses.stated_priors import Layout
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, shapes
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
+from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import set_parameters
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
+# Logarithm of the odds beyond which nobody asks whether an effect is needed.
+BEYOND_DOUBT = 300.0
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,8 @@ class Pruning:
         """
         gone: list[str] = []
         for name in taken.effects[:-1]:
+            if self.clearly_needed(taken, name):
+                continue
             left = tuple(e for e in taken.effects if e != name)
             self.say(f"asking whether {name} is still needed")
             model = taken.fitted.model.rebuilt(taken.fitted.model.copied_effects())
@@ -84,6 +89,28 @@ class Pruning:
                 gone.append(name)
                 taken = self._settled(without, self.layout, base)
         return taken, gone
+
+    def clearly_needed(self, taken: FittedHypothesis, name: str) -> bool:
+        """Whether the evidence for an effect is beyond doubt without a fit in which it is absent.
+
+        With W = J^T J and the other parameters following, the error grows by d^T (W_dd - W_do W_oo^-1 W_od) d on the way
+        d to the effect's null: Wald's statistic. Where half of it is many times what any comparison asks for, a fit
+        that is not linear decides no differently.
+
+        Args:
+            taken: the explanation.
+            name: one of its effects.
+        """
+        fitted, place = taken.fitted, self.layout.places(taken.names)[name]
+        # A shape says nothing where the effect is absent: it follows like the others.
+        own = np.asarray(place)[~shapes(self.layout, name)]
+        if not len(own):
+            return False
+        others = np.setdiff1d(np.arange(len(fitted.theta)), own)
+        whole = fitted.statistics.total + fitted.priors.square
+        left = NormalEquations(whole, fitted.statistics.slope.sum(0)).eliminate(own, others, rcond=1e-12)
+        way = fitted.theta[own] - self.layout.means[name][~shapes(self.layout, name)]
+        return float(way @ left.information @ way) / self._factor(taken) > 2.0 * BEYOND_DOUBT
 
     def without(
         self,
