@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.answer_types import DerivativeEntry, Failure
 from auvnn.answers import PLOTTED, Answer, plain
 from auvnn.cards import Card, figure
 from auvnn.checks.doubts import doubts
@@ -43,11 +44,11 @@ class Comparison(Answer):
     log: str
     samples: int
     runs: int
-    derivative: dict[str, Any]
+    derivative: DerivativeEntry
     one_step: dict[str, dict[str, float]]
     rollout: dict[str, dict[str, Any]]
     residual_wrench: dict[str, dict[str, float]]
-    failures: list[dict[str, Any]]
+    failures: list[Failure]
     warnings: list[str] = field(default_factory=list)
     series: list[dict[str, Any]] = field(default_factory=list)
     regimes: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -56,7 +57,7 @@ class Comparison(Answer):
     baseline: dict[str, Any] = field(default_factory=dict)
 
     def card(self) -> Card:
-        """Return the error of free running, and what it stands beside."""
+        """Return the error of free running, and what it is compared with."""
         rows = [
             [
                 "whole run" if h == "full" else f"{h} s",

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.answer_types import Failure
 from auvnn.logs import Log, Run
 from auvnn.metrics.one_step import OneStep
 
@@ -108,7 +109,7 @@ def _bins(x: Array, edges: Array) -> NDArray[np.intp]:
 
 def failures(
     parts: list[OneStep], located: dict[str, dict[str, Any]], floor: Array, limit: int = 8
-) -> list[dict[str, Any]]:
+) -> list[Failure]:
     """Return where the error sits, in plain words, largest first.
 
     A place's share is what its bin holds of the residual's energy above the noise floor, all six degrees of
@@ -132,7 +133,7 @@ def failures(
     if not np.isfinite(whole) or whole <= 0:
         return []
     samples = len(wrench)
-    found = []
+    found: list[Failure] = []
     for k, axis in enumerate(AXES):
         if energy[k] == 0.0:
             continue

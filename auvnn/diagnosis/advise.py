@@ -14,12 +14,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import permutations
-from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from auvnn.answer_types import NextExperiment
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, priors
 from auvnn.estimation.window_normal_equations import Statistics, linearise, normal_equations
@@ -49,7 +49,7 @@ class Advice:
     names: tuple[str, ...]
     ranking: tuple[tuple[str, float], ...]
 
-    def to_dict(self) -> dict[str, Any] | None:
+    def to_dict(self) -> NextExperiment | None:
         """Return `next_experiment` of the public contract; None where nothing can be driven."""
         if not self.ranking:
             return None

@@ -147,7 +147,7 @@ def searched(
     usable, needs = candidates_for(model, log, effects)
     log.quality().refuse_contradictions(force)
     allowed = Tolerance.of(tolerance)
-    # What subnetworks have swallowed leaves no residual: only what drag can be is kept of them.
+    # What subnetworks have absorbed leaves no residual: only what drag can be is kept of them.
     known, spread = with_drag_only(model, log)
     windows, notes = windows_that_hold(known, log, window)
     layout = lay_out(known, usable, spread)

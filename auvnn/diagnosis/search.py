@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from auvnn.diagnosis.stages.look import fit_null, look, regroup
+from auvnn.diagnosis.stages.search_round import fit_null, regroup, search_round
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.diagnosis.stages.what_is_left import what_is_left
 from auvnn.metrics.windows import Windows
@@ -23,5 +23,5 @@ def search(asked: Setting, windows: Windows) -> State:
     """
     state = fit_null(asked, windows)
     while not state.ended:
-        state = look(asked, state)
+        state = search_round(asked, state)
     return what_is_left(asked, regroup(asked, state))

@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
+from auvnn.estimation.force_marginalisation.columns import PUSH, Cells
 from auvnn.estimation.point_slopes import OperatingPoint, differentiate
-from auvnn.estimation.stochastic_force.columns import PUSH, Cells
 from auvnn.estimation.window_simulation import SimulatedWindows, simulate_windows
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox, Inputs
@@ -151,7 +151,7 @@ def respond_by(
             state, parameters = (some.whitened(x.mul_(mask)) for x in (state, parameters))
         state, parameters, force = state.mul_(mask), parameters.mul_(mask), None
         if cells is not None:
-            parameters, force = cells.parted(parameters)
+            parameters, force = cells.separate(parameters)
         yield Response(ran.error[part], state, parameters, force)
 
 

@@ -15,9 +15,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from auvnn.estimation.force_marginalisation.columns import pushed
+from auvnn.estimation.force_marginalisation.sums import LOOSE, cost_with_force, sums_with_force
 from auvnn.estimation.sensitivity import Response, respond_by
-from auvnn.estimation.stochastic_force.columns import pushed
-from auvnn.estimation.stochastic_force.sums import LOOSE, cost_with_force, sums_with_force
 from auvnn.estimation.window_simulation import BLOCK, simulate_windows
 from auvnn.metrics.coloured_noise import previous
 from auvnn.metrics.windows import Windows

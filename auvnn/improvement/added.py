@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from auvnn.answer_types import ByEffect, OwnFall
 from auvnn.answers import PLOTTED, Answer, plain
 from auvnn.cards import PARAMETER_HEAD, Card, figure, parameter_rows
 from auvnn.models import GreyBox
@@ -40,8 +41,8 @@ class Improvement(Answer):
     after: dict[str, Any]
     gain: dict[str, float]
     waterfall: list[dict[str, Any]]
-    parameters: dict[str, dict[str, dict[str, Any]]]
-    coefficients: dict[str, dict[str, dict[str, Any]]]
+    parameters: ByEffect
+    coefficients: ByEffect
     held_out: str
     model: GreyBox
     refitted_model: GreyBox
@@ -50,7 +51,7 @@ class Improvement(Answer):
     objective: str = "rollout"
     left_out: dict[str, float] | None = None
     steps: list[dict[str, Any]] = field(default_factory=list)
-    by_effect: dict[str, dict[str, Any]] = field(default_factory=dict)
+    by_effect: dict[str, OwnFall] = field(default_factory=dict)
     baseline: dict[str, Any] = field(default_factory=dict)
 
     def card(self) -> Card:

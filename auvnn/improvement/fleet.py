@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from auvnn.answer_types import Dive, ParameterTrend
 from auvnn.answers import Answer, plain
 from auvnn.diagnosis.full_data.large_logs import SEARCH
 from auvnn.diagnosis.hypotheses.candidates import (
@@ -48,9 +49,9 @@ class Fleet(Answer):
     kind = "fleet"
     model: str
     effects: list[str]
-    dives: list[dict[str, Any]]
+    dives: list[Dive]
     failed: list[dict[str, str]]
-    trends: list[dict[str, Any]]
+    trends: list[ParameterTrend]
     along: str
     warnings: list[str] = field(default_factory=list)
 
@@ -149,24 +150,24 @@ def fleet(
     return _together(model, names, dives, failed)
 
 
-def _together(
-    model: GreyBox, names: list[str], dives: list[dict[str, Any]], failed: list[dict[str, str]]
-) -> Fleet:
+def _together(model: GreyBox, names: list[str], dives: list[Dive], failed: list[dict[str, str]]) -> Fleet:
     dated = all(d["start"] is not None for d in dives) and len({d["start"] for d in dives}) == len(dives) > 1
     if dated:
-        dives = sorted(dives, key=lambda d: d["start"])
-    begin = datetime.fromisoformat(dives[0]["start"]) if dated else None
+        dives = sorted(dives, key=lambda d: str(d["start"]))
+    begin = datetime.fromisoformat(str(dives[0]["start"])) if dated else None
     for number, each in enumerate(dives, 1):
         each["dive"] = number
         each["days"] = (
-            None if begin is None else (datetime.fromisoformat(each["start"]) - begin).total_seconds() / _DAY
+            None
+            if begin is None
+            else (datetime.fromisoformat(str(each["start"])) - begin).total_seconds() / _DAY
         )
-    x = [d["days"] if dated else d["dive"] for d in dives]
+    x = [d["dive"] if d["days"] is None else d["days"] for d in dives]
     rows = []
     for effect in names:
         for name, first in dives[0]["parameters"][effect].items():
-            each = [d["parameters"][effect][name] for d in dives]
-            found = trend(x, [e["value"] for e in each], [e["std"] for e in each])
+            own = [d["parameters"][effect][name] for d in dives]
+            found = trend(x, [p["value"] for p in own], [p["std"] for p in own])
             rows.append(_row(effect, name, first["unit"], found, dated))
     count = len([r for r in rows if r["dives"] > 1])
     for row in rows:
@@ -190,7 +191,7 @@ def _below(p: float, count: int) -> bool:
     return bool(np.isfinite(p) and p * count < LEVEL)
 
 
-def _row(effect: str, name: str, unit: str, found: Trend, dated: bool) -> dict[str, Any]:
+def _row(effect: str, name: str, unit: str, found: Trend, dated: bool) -> ParameterTrend:
     per = "d" if dated else "dive"
     return {
         "effect": effect,
@@ -207,10 +208,13 @@ def _row(effect: str, name: str, unit: str, found: Trend, dated: bool) -> dict[s
         },
         "line": {"middle": found.middle, "level": found.level, "std": found.level_std},
         "scatter": found.scatter,
+        # What is said of it depends on how many parameters there are.
+        "changes": False,
+        "words": "",
     }
 
 
-def _words(row: dict[str, Any], dated: bool) -> str:
+def _words(row: ParameterTrend, dated: bool) -> str:
     label = f"{row['effect']}.{row['parameter']}"
     if row["dives"] < 2:
         return f"{label}: {row['dives']} dives say something of it, too few to compare"

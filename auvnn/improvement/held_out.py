@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from auvnn.answer_types import OwnFall
 from auvnn.diagnosis.answers.bounds import reservations
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
@@ -40,7 +41,7 @@ class Judged:
     key: str
     scale: Scale
     gain: tuple[float, float]
-    by_effect: dict[str, dict[str, Any]]
+    by_effect: dict[str, OwnFall]
 
     @property
     def accepted(self) -> bool:
@@ -82,7 +83,7 @@ def judge(
             results[step]["one_step"] = scores(one_step(model, test, how))
     last = rolled[names[-1]][key]
     gain = paired_gain(rolled[REFITTED][key], last, scale)
-    by_effect = {}
+    by_effect: dict[str, OwnFall] = {}
     for name in names:
         own, minded = gain, reservations(fits.layout, fits.best, [name])
         if len(names) > 1:

@@ -6,8 +6,8 @@ import re
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
+from auvnn.answer_types import Dive
 from auvnn.diagnosis.answers.table import values
 from auvnn.diagnosis.hypotheses.candidates import (
     HORIZON,
@@ -58,7 +58,7 @@ class Question:
     force: bool
 
 
-def dive(question: Question, path: Path) -> dict[str, Any] | str:
+def dive(question: Question, path: Path) -> Dive | str:
     """Return one dive's values, or why there are none: a dive that fails does not stop the others."""
     try:
         return _fitted(question, path)
@@ -68,7 +68,7 @@ def dive(question: Question, path: Path) -> dict[str, Any] | str:
         return f"{path}: a fault of the program ({type(fault).__name__}: {one_line(fault, 200)})"
 
 
-def _fitted(question: Question, path: Path) -> dict[str, Any]:
+def _fitted(question: Question, path: Path) -> Dive:
     model, names = question.model, question.effects
     log = _log(question, path)
     log.quality().refuse_errors(question.force)
@@ -101,6 +101,9 @@ def _fitted(question: Question, path: Path) -> dict[str, Any]:
         "settled": found.fitted.converged,
         "parameters": values(layout, found, names),
         "coefficients": values(layout, found, [n for n in layout.nuisance if n not in names]),
+        # Its place among the others is known once all are fitted.
+        "dive": 0,
+        "days": None,
     }
 
 

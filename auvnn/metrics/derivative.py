@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.answer_types import DerivativeEntry
 from auvnn.catalogue import unknown_name
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log
@@ -38,7 +39,7 @@ class Derivative:
     half_width: int = 4
     order: int = 2
 
-    def describe(self, dt: float) -> dict[str, Any]:
+    def describe(self, dt: float) -> DerivativeEntry:
         """Return what the answers state of it; figures are comparable only at equal bandwidth."""
         if self.method == "measured":
             return {"method": "measured", "bandwidth_hz": 0.5 / dt}

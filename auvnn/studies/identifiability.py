@@ -1,4 +1,4 @@
-"""What a manoeuvre can identify at once, by the information in its windows, and what subnetworks swallow."""
+"""What a manoeuvre can identify at once, by the information in its windows, and what subnetworks absorb."""
 
 from __future__ import annotations
 

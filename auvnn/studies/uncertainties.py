@@ -6,7 +6,7 @@ Damping, added mass and restoring are all badly known. For each manoeuvre of equ
   under the noise of good sensors. A parameter's standard error with everything else known, with all else
   uncertain too, and with damping not even of a known law but six networks, each against what was known before;
   what is correlated with what;
-- what six networks of the velocity would swallow: the wrench by which each effect betrays itself along the
+- what six networks of the velocity would absorb: the wrench by which each effect betrays itself along the
   motion, and the share of it that damping subnetworks can be trained to give.
 """
 

@@ -117,7 +117,7 @@ def fit_damping(
         raise ConfigError(f"resume is {resume!r}: give true, false or force")
     if resume and checkpoint_folder is None:
         raise ConfigError("resume needs the folder of the checkpoints: give checkpoint_folder")
-    if not (chosen.parted or isinstance(problem, DampingProblem)):
+    if not (chosen.sums_suffice or isinstance(problem, DampingProblem)):
         raise ConfigError(f"scheme {chosen.name} needs its samples in memory: take levenberg_marquardt")
     train, held = problem.split(held_out) if held_out else (problem, None)
     learned = [axis for form in bank.groups() if list(form.parameters()) for axis in form.axes]

@@ -65,7 +65,7 @@ def spreads(
     Raises:
         ConfigError: an unknown scheme, objective or option.
     """
-    return build_scheme(scheme).parted and build_objective(objective).name == "one_step"
+    return build_scheme(scheme).sums_suffice and build_objective(objective).name == "one_step"
 
 
 @on_one_thread

@@ -8,7 +8,7 @@ import torch
 
 from auvnn.comparison import compare
 from auvnn.diagnosis import diagnose
-from auvnn.diagnosis.residuals.variance_component import VarianceComponents
+from auvnn.diagnosis.residuals.variance_component_test import VarianceComponents
 from auvnn.improvement import add
 from auvnn.models import GreyBox
 from auvnn.models.structures import STRUCTURES, build_structure

@@ -306,7 +306,7 @@ ELSEWHERE = {
         "tests/diagnosis/test_diagnose.py::test_nothing_hidden_is_adequate",
     ],
     92: [
-        "tests/diagnosis/test_diagnose.py::test_two_names_for_the_same_thing_are_given_as_a_group",
+        "tests/diagnosis/test_groups.py::test_two_names_for_the_same_thing_are_given_as_a_group",
     ],
     93: [
         "tests/improvement/test_add.py::test_a_model_on_which_nothing_is_missing_gains_nothing_by_an_effect",

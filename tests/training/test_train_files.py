@@ -73,7 +73,7 @@ def in_memory(bare, log) -> Any:
         return train(bare, log, SCHEME, MIXED, seed=3)
 
 
-def parted(bare: GreyBox, dives: Any, **options: Any) -> Any:
+def train_in_parts(bare: GreyBox, dives: Any, **options: Any) -> Any:
     return train_files(bare, dives, SCHEME, MIXED, seed=3, group=GROUP, **options)
 
 
@@ -86,7 +86,7 @@ def numbers(training: Any) -> dict[str, float]:
 
 
 def test_many_files_in_parts_give_what_one_log_in_memory_gives_to_the_last_bit(bare, log, dives, in_memory):
-    found = parted(bare, dives)
+    found = train_in_parts(bare, dives)
     assert found.parts is not None
     assert (found.parts["files"], found.parts["runs"], found.parts["samples"]) == (5, 5, log.samples)
     assert found.parts["groups"] == 4  # of 3 runs of 151 samples
@@ -120,7 +120,7 @@ def test_a_single_run_is_split_in_time_as_in_memory(bare, tmp_path, small_groups
 def test_a_named_test_log_is_held_out(bare, log, tmp_path, small_groups):
     fitted, held = log.select([0, 1, 2]), log.select([3, 4])
     alone = train(bare, fitted, SCHEME, MIXED, test=held)
-    found = parted(
+    found = train_in_parts(
         bare, fitted.write(tmp_path / "fitted.parquet"), test=held.write(tmp_path / "held.parquet")
     )
     assert found.test == "held" and found.derivative["held_out"] == "held is held out"
@@ -128,7 +128,9 @@ def test_a_named_test_log_is_held_out(bare, log, tmp_path, small_groups):
     assert bits(found) == bits(seed_free) != bits(alone)
     assert numbers(found) == pytest.approx(numbers(seed_free), rel=1e-12)
     with pytest.raises(InputError, match=r"shares \d+ of \d+ samples with the log"):
-        parted(bare, tmp_path / "fitted.parquet", test=log.select([2, 3]).write(tmp_path / "both.parquet"))
+        train_in_parts(
+            bare, tmp_path / "fitted.parquet", test=log.select([2, 3]).write(tmp_path / "both.parquet")
+        )
 
 
 @pytest.mark.parametrize("accelerations", [False, True])
@@ -186,8 +188,8 @@ def test_killed_anywhere_and_resumed_is_the_same_to_the_last_bit(
             raise Killed
 
     with pytest.raises(Killed):
-        parted(bare, dives, checkpoint=tmp_path / "kept", progress=kill)
-    again = parted(bare, dives, checkpoint=tmp_path / "kept", resume=True)
+        train_in_parts(bare, dives, checkpoint=tmp_path / "kept", progress=kill)
+    again = train_in_parts(bare, dives, checkpoint=tmp_path / "kept", resume=True)
     assert bits(again) == bits(in_memory) and again.history == in_memory.history
 
 
@@ -203,24 +205,24 @@ def test_other_data_are_not_gone_on_with(bare, dives, tmp_path, monkeypatch):
 def test_a_file_that_cannot_be_read_is_told_and_left_out(bare, dives, tmp_path, in_memory):
     broken = tmp_path / "broken.parquet"
     broken.write_bytes(next(iter(sorted(dives.iterdir()))).read_bytes()[:-100])
-    found = parted(bare, [*sorted(dives.iterdir()), broken])
+    found = train_in_parts(bare, [*sorted(dives.iterdir()), broken])
     assert bits(found) == bits(in_memory)
     assert any("broken.parquet" in w for w in found.warnings)
     with pytest.raises(InputError, match="broken"):
-        parted(bare, broken)
+        train_in_parts(bare, broken)
 
 
 def test_files_of_different_vehicles_are_refused(bare, dives, tmp_path):
     other = make_log(GreyBox(VEHICLE), runs=1, duration=10.0, accelerations=True, first=9)
     with pytest.raises(InputError, match="differ in nu_dot"):
-        parted(bare, [*sorted(dives.iterdir()), other.write(tmp_path / "other.parquet")])
+        train_in_parts(bare, [*sorted(dives.iterdir()), other.write(tmp_path / "other.parquet")])
 
 
 def test_the_same_recording_twice_is_refused(bare, dives, tmp_path):
     twin = tmp_path / "copy.parquet"
     twin.write_bytes((dives / "dive0.parquet").read_bytes())
     with pytest.raises(InputError, match="same bytes"):
-        parted(bare, [*sorted(dives.iterdir()), twin])
+        train_in_parts(bare, [*sorted(dives.iterdir()), twin])
 
 
 def test_a_worker_that_does_not_see_the_scratch_folder_works_it_out_again(bare, log, dives, tmp_path):
@@ -243,7 +245,7 @@ def test_what_cannot_be_spread_is_refused(bare, dives):
 
 
 def test_two_processes_give_the_same_bits(bare, dives, in_memory):
-    assert bits(parted(bare, dives, workers=2)) == bits(in_memory)
+    assert bits(train_in_parts(bare, dives, workers=2)) == bits(in_memory)
 
 
 def deadly(shared: tuple[str, Any, Any], task: Any) -> Any:
@@ -273,7 +275,7 @@ def test_a_worker_that_is_killed_changes_nothing(bare, dives, tmp_path, monkeypa
             return super().run(killer, (str(mark), function, shared), tasks, losses=losses)
 
     monkeypatch.setattr(files, "executor_for", lambda *a: Deadly(2))
-    found = parted(bare, dives)
+    found = train_in_parts(bare, dives)
     assert mark.exists()
     assert bits(found) == bits(in_memory)
 

@@ -27,7 +27,7 @@ def _run(job: Job) -> Answering:
     for line in words(better.baseline):
         say(f"baseline  {line}")
     for name, values in data["parameters"].items():
-        say(f"fitted    {name}: {parameters({'parameters': values})}")
+        say(f"fitted    {name}: {parameters(values)}")
     for step in data["waterfall"]:
         error = "unknown" if step["error"] is None else f"{step['error']:.4g}"
         say(f"error     {step['step']}: {error}")

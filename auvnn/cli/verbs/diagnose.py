@@ -16,10 +16,10 @@ def _run(job: Job) -> Answering:
     from auvnn.comparison.baseline import words
     from auvnn.logs.reading.portions import is_large
 
-    parted = job["stream"]
-    if parted is None:
-        parted = job["max_duration"] is None and is_large(files(job.options, "log"))
-    diagnosis = _in_parts(job) if parted else _in_memory(job)
+    in_parts = job["stream"]
+    if in_parts is None:
+        in_parts = job["max_duration"] is None and is_large(files(job.options, "log"))
+    diagnosis = _in_parts(job) if in_parts else _in_memory(job)
     diagnosis.write(job.folder)
     data = diagnosis.to_dict()
     job.warn(data["warnings"])

@@ -8,6 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.answer_types import (
+    Candidate,
+    DerivativeEntry,
+    EffectCost,
+    MovedCoefficient,
+    NextExperiment,
+    SearchStep,
+)
 from auvnn.answers import PLOTTED, Answer
 from auvnn.cards import Card, figure, measured
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
@@ -43,13 +51,13 @@ class Diagnosis(Answer):
     log: str
     verdict: str
     missing: list[str]
-    steps: list[dict[str, Any]]
-    candidates: list[dict[str, Any]]
+    steps: list[SearchStep]
+    candidates: list[Candidate]
     unexplained: float
     depends_on: dict[str, dict[str, float]]
-    next_experiment: dict[str, Any] | None
+    next_experiment: NextExperiment | None
     warnings: list[str]
-    derivative: dict[str, Any]
+    derivative: DerivativeEntry
     global_p_value: float
     similarity: tuple[list[str], Array] = field(default_factory=lambda: ([], np.eye(0)))
     explanation: FittedHypothesis | None = None
@@ -57,11 +65,11 @@ class Diagnosis(Answer):
     absorbed: Confounding | None = None
     acts_in: dict[str, float] = field(default_factory=dict)
     nearest: list[str] = field(default_factory=list)
-    matters: dict[str, dict[str, Any]] = field(default_factory=dict)
+    matters: dict[str, EffectCost] = field(default_factory=dict)
     joint: dict[str, dict[str, Any]] = field(default_factory=dict)
     left: dict[str, Any] = field(default_factory=dict)
     small_remainder: bool = False
-    moved: list[dict[str, Any]] = field(default_factory=list)
+    moved: list[MovedCoefficient] = field(default_factory=list)
     tolerance: dict[str, float] = field(default_factory=dict)
     judged_by: str = ""
     whole_log: dict[str, Any] | None = None

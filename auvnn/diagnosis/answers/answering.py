@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from auvnn.answer_types import Candidate, NextExperiment
 from auvnn.diagnosis.advise import advise
 from auvnn.diagnosis.answers.answer import Diagnosis, OneOf
 from auvnn.diagnosis.answers.bounds import reservations
@@ -17,9 +19,9 @@ from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.candidates import HORIZON, WARMUP
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import has_stated_uncertainty
-from auvnn.diagnosis.residuals.additive_force import additive_force_test
+from auvnn.diagnosis.residuals.additive_force_test import additive_force_test
 from auvnn.diagnosis.residuals.attribution import attribute_residual
-from auvnn.diagnosis.residuals.variance_component import white
+from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.diagnosis.residuals.whiteness import residual_tests
 from auvnn.diagnosis.stages.partial import without
 from auvnn.diagnosis.stages.state import Setting, State
@@ -47,7 +49,7 @@ def answer(asked: Setting, state: State) -> Diagnosis:
         log=asked.log.name,
         verdict=verdict,
         missing=missing,
-        steps=[dict(s) for s in state.steps],
+        steps=[s.copy() for s in state.steps],
         candidates=_candidates(asked, state, given, without),
         unexplained=_unexplained(state, verdict),
         depends_on=_depends(asked, state, verdict, notes),
@@ -95,7 +97,7 @@ def _worth(asked: Setting, state: State, without: Mapping[str, FittedHypothesis]
 
 def _candidates(
     asked: Setting, state: State, given: list[str], without: Mapping[str, FittedHypothesis]
-) -> list[dict[str, Any]]:
+) -> list[Candidate]:
     """Return the table of candidates, those given first, then by their evidence."""
     table = dict(state.table)
     # What was tried alone at first has other values beside what was found since.
@@ -104,13 +106,13 @@ def _candidates(
     table = fill_candidate(asked.layout, table, state.current, state.first, without)
     for name, reason in state.failed.items():
         if name not in state.current.effects:
-            table[name] = {**table[name], "reason": reason}
+            table[name] = replace(table[name], reason=reason)
     names = [*given, *(n for n in state.nearest if n not in given)] if state.partial else given
     rows = sorted(
         table.values(),
-        key=lambda c: (names.index(c["effect"]) if c["effect"] in names else len(table), -c["_order"]),
+        key=lambda c: (names.index(c.effect) if c.effect in names else len(table), -c.order),
     )
-    return [{k: v for k, v in row.items() if k != "_order"} for row in rows]
+    return [row.to_dict() for row in rows]
 
 
 def _unexplained(state: State, verdict: str) -> float:
@@ -155,7 +157,7 @@ def _tests(asked: Setting, state: State, notes: list[str]) -> dict[str, Any]:
     return {"before": before, "after": after}
 
 
-def _next(asked: Setting, state: State, notes: list[str]) -> dict[str, Any] | None:
+def _next(asked: Setting, state: State, notes: list[str]) -> NextExperiment | None:
     vehicle = asked.model.vehicle
     # Manoeuvres are made of forces: a glider has none, and a measured attitude follows none.
     if not (asked.advice and state.groups) or vehicle.glides:

@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.answer_types import EffectCost, Worst
 from auvnn.diagnosis.cross_validation.errors import Gain, LeftOut, gain
 from auvnn.diagnosis.cross_validation.left_out import left_out_found
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.residuals.forces import AXES, actuators_of, forces_of, share_of
-from auvnn.diagnosis.residuals.variance_component import Unnamed
+from auvnn.diagnosis.residuals.variance_component_test import Unnamed
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.errors import InputError
 from auvnn.metrics.noise_floor import noise_floor
@@ -45,7 +46,7 @@ class Cost:
     share: Array
     matters: bool
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> EffectCost:
         """Return what the answer holds."""
         return {
             "cost": None if self.gain is None else self.gain.cost,
@@ -125,7 +126,7 @@ def small(asked: Setting, state: State, left: Unnamed) -> bool:
     )
 
 
-def worst(fall: Gain | None) -> dict[str, Any] | None:
+def worst(fall: Gain | None) -> Worst | None:
     """Return the velocity whose error rises most without a name, and by what share."""
     if fall is None or not fall.by_dof:
         return None

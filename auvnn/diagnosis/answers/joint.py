@@ -10,7 +10,7 @@ from auvnn.diagnosis.answers.confounded import confounded_with
 from auvnn.diagnosis.answers.effect_costs import Worth
 from auvnn.diagnosis.answers.table import values
 from auvnn.diagnosis.residuals.forces import AXES
-from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
+from auvnn.diagnosis.residuals.variance_component_test import variance_component_test, white
 from auvnn.diagnosis.stages.state import Setting, State
 
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from auvnn.answer_types import MovedCoefficient
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 
@@ -13,13 +12,13 @@ from auvnn.diagnosis.hypotheses.stated_priors import Layout
 FAR, NAMED = 2.0, 6
 
 
-def moved(layout: Layout, found: FittedHypothesis) -> list[dict[str, Any]]:
+def moved(layout: Layout, found: FittedHypothesis) -> list[MovedCoefficient]:
     """Return stated coefficients that moved by more than two of their standard deviations, the furthest first.
 
     Each is a factor on what the vehicle's file states, which is one; `deviations` says by how many of the stated standard
     deviations it has left that. Groups that were asked for as effects are told as effects.
     """
-    out = []
+    out: list[MovedCoefficient] = []
     for name, own in layout.places(found.names).items():
         spread = layout.spreads.get(name)
         if spread is None or name in found.effects or name == "learned_drag":
@@ -45,7 +44,7 @@ def moved(layout: Layout, found: FittedHypothesis) -> list[dict[str, Any]]:
     return sorted(out, key=lambda m: -abs(m["deviations"]))
 
 
-def moved_words(found: list[dict[str, Any]]) -> list[str]:
+def moved_words(found: list[MovedCoefficient]) -> list[str]:
     """Return that in words, one sentence or none."""
     if not found:
         return []
@@ -59,7 +58,7 @@ def moved_words(found: list[dict[str, Any]]) -> list[str]:
     ]
 
 
-def _one(one: dict[str, Any]) -> str:
+def _one(one: MovedCoefficient) -> str:
     name = f"{one['group']}.{one['coefficient']}"
     size = f"times {one['fitted'] / one['stated']:.3g}" if one["stated"] else f"{one['fitted']:.3g}"
     return f"{name} {size} ({one['deviations']:+.1f})"

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.answer_types import ByEffect, Candidate, Parameters, Similar
 from auvnn.diagnosis.answers.describe_parameters import describe_parameters
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, standard_errors
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
@@ -17,13 +18,56 @@ from auvnn.diagnosis.score_tests.score import Score
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class CandidateRow:
+    """A row of the table of candidates.
+
+    Attributes:
+        effect: name.
+        needs: channels that the log lacks for it.
+        p_value: of its test at the null; None where there is none.
+        explained: share of what is left that it explains.
+        cv_before: error on what is left out without it, in weighted standard deviations.
+        cv_after: the same with it.
+        parameters: as its test or its fit has them.
+        confusable_with: effects that leave a similar trace, the most similar first.
+        reason: why its fit failed.
+        order: evidence by which candidates are listed.
+    """
+
+    effect: str
+    needs: list[str]
+    p_value: float | None = None
+    explained: float | None = None
+    cv_before: float | None = None
+    cv_after: float | None = None
+    parameters: Parameters = field(default_factory=dict)
+    confusable_with: list[Similar] = field(default_factory=list)
+    reason: str | None = None
+    order: float = -np.inf
+
+    def to_dict(self) -> Candidate:
+        """Return what the answer holds."""
+        return {
+            "effect": self.effect,
+            "p_value": self.p_value,
+            "explained": self.explained,
+            "cv_before": self.cv_before,
+            "cv_after": self.cv_after,
+            "parameters": self.parameters,
+            "confusable_with": self.confusable_with,
+            "needs": self.needs,
+            "reason": self.reason,
+        }
+
+
 def candidate_table(
     layout: Layout,
     scores: dict[str, Score],
     current: FittedHypothesis,
     similar: tuple[list[str], Array],
     needs: dict[str, list[str]],
-) -> dict[str, dict[str, Any]]:
+) -> dict[str, CandidateRow]:
     """Return an entry for every effect that was wanted, by its test at the null; see `formats` of the answer.
 
     Args:
@@ -35,32 +79,22 @@ def candidate_table(
     """
     names, matrix = similar
     whole = max(excess_variance(current, current), max((s.gain for s in scores.values()), default=0.0), 1e-12)
-    table: dict[str, dict[str, Any]] = {}
+    table: dict[str, CandidateRow] = {}
     for name, absent in needs.items():
         found = scores.get(name)
-        entry: dict[str, Any] = {
-            "effect": name,
-            "p_value": None,
-            "explained": None,
-            "cv_before": None,
-            "cv_after": None,
-            "parameters": {},
-            "confusable_with": [],
-            "needs": absent,
-            "reason": None,
-            "_order": -np.inf,
-        }
+        entry = CandidateRow(name, absent)
         if found is not None:
             row = names.index(name)
             near = sorted(((matrix[row, j], names[j]) for j in range(len(names)) if j != row), reverse=True)
-            entry.update(
+            entry = replace(
+                entry,
                 p_value=found.p_value,
                 explained=float(np.clip(found.gain / whole, 0.0, 1.0)),
                 cv_before=current.cv,
                 cv_after=predicted_left_out(current, found),
                 parameters=describe_parameters(layout.model.effect(name), found.estimate, found.std),
                 confusable_with=[{"effect": n, "similarity": float(v)} for v, n in near if v >= 0.5],
-                _order=found.evidence,
+                order=found.evidence,
             )
         table[name] = entry
     return table
@@ -68,11 +102,11 @@ def candidate_table(
 
 def fill_candidate(
     layout: Layout,
-    table: Mapping[str, dict[str, Any]],
+    table: Mapping[str, CandidateRow],
     explanation: FittedHypothesis,
     before: FittedHypothesis,
     without: Mapping[str, FittedHypothesis] | None = None,
-) -> dict[str, dict[str, Any]]:
+) -> dict[str, CandidateRow]:
     """Return the table with the one-step figures of an explanation's effects replaced by those of its own fit.
 
     Args:
@@ -86,23 +120,25 @@ def fill_candidate(
     whole = max(excess_variance(before, before), 1e-12)
     after = _scaled_left_out(explanation, before)
     for name in explanation.effects:
-        own: dict[str, Any] = {"parameters": found[name]}
         count = before.left_out_count.sum()
-        if without is None or name not in without or without[name] is before:
-            own["cv_before"] = before.cv
-        else:
-            own["cv_before"] = float(np.sqrt(max(_scaled_left_out(without[name], before), 0.0) / count))
-        own["cv_after"] = float(np.sqrt(max(after, 0.0) / count))
+        cv_before = before.cv
+        if without is not None and name in without and without[name] is not before:
+            cv_before = float(np.sqrt(max(_scaled_left_out(without[name], before), 0.0) / count))
+        explained = out[name].explained
         if without is not None and name in without:
             fall = excess_variance(without[name], before) - excess_variance(explanation, before)
-            own["explained"] = float(np.clip(fall / whole, 0.0, 1.0))
-        out[name] = {**out[name], **own}
+            explained = float(np.clip(fall / whole, 0.0, 1.0))
+        out[name] = replace(
+            out[name],
+            parameters=found[name],
+            cv_before=cv_before,
+            cv_after=float(np.sqrt(max(after, 0.0) / count)),
+            explained=explained,
+        )
     return out
 
 
-def values(
-    layout: Layout, found: FittedHypothesis, wanted: Sequence[str]
-) -> dict[str, dict[str, dict[str, Any]]]:
+def values(layout: Layout, found: FittedHypothesis, wanted: Sequence[str]) -> ByEffect:
     """Return the named effects' parameters as fitted, with their standard errors, as answers hold them.
 
     Args:

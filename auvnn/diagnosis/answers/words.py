@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from auvnn.answer_types import Parameters
 from auvnn.diagnosis.answers import judged_words
 from auvnn.diagnosis.answers.moved_coefficients import moved_words
 from auvnn.diagnosis.noise_law.words import stochastic_words
@@ -35,11 +36,9 @@ def number(value: float | None, std: float | None, unit: str) -> str:
     return f"{value:.{digits}f} +- {std:.{digits}f}{shown}"
 
 
-def parameters(candidate: dict[str, Any]) -> str:
-    """Return a candidate's parameters on one line."""
-    return ", ".join(
-        f"{n} {number(p['value'], p['std'], p['unit'])}" for n, p in candidate["parameters"].items()
-    )
+def parameters(values: Parameters) -> str:
+    """Return an effect's parameters on one line."""
+    return ", ".join(f"{n} {number(p['value'], p['std'], p['unit'])}" for n, p in values.items())
 
 
 def tell(diagnosis: Diagnosis) -> list[str]:
@@ -65,7 +64,9 @@ def tell(diagnosis: Diagnosis) -> list[str]:
     for step in diagnosis.steps:
         if step["verdict"] == "named":
             for name in [e for e in step["effects"] if e not in gone]:
-                lines.append(f"Missing: {name} ({EFFECTS.get(name).cause}): {parameters(by_name[name])}.")
+                lines.append(
+                    f"Missing: {name} ({EFFECTS.get(name).cause}): {parameters(by_name[name]['parameters'])}."
+                )
         elif step["verdict"] == "ambiguous":
             lines.append(
                 "One of these is missing, and this log cannot tell which: " + ", ".join(step["effects"]) + "."

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.answer_types import ByEffect
 from auvnn.diagnosis.answers.describe_parameters import describe_parameters
 from auvnn.diagnosis.full_data.map_reduce import LinearisationPoint, MapReduce
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
@@ -122,7 +122,7 @@ class Refit:
     settled: bool
     lasting: bool
 
-    def values(self, layout: Layout, wanted: Sequence[str]) -> dict[str, dict[str, dict[str, Any]]]:
+    def values(self, layout: Layout, wanted: Sequence[str]) -> ByEffect:
         """Return the named effects' parameters with their standard errors, as answers hold them."""
         places = {n: at for n, at in layout.places(self.names).items() if n in wanted}
         return {

@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from auvnn.answer_types import SearchedPart
 from auvnn.answers import plain
 from auvnn.diagnosis.answers.answer import Diagnosis
 from auvnn.diagnosis.answers.describe_parameters import describe_parameters as parameters_told
@@ -173,7 +174,7 @@ def _planned(pool: Executor, paths: Sequence[Path], cut: WindowCut, say: Callabl
     return Plan(plan.parts, plan.samples, plan.duration, plan.runs, (*map(str, bad), *plan.notes))
 
 
-def _sample(plan: Plan, paths: Sequence[Path], cut: WindowCut, most: int) -> tuple[Log, dict[str, Any]]:
+def _sample(plan: Plan, paths: Sequence[Path], cut: WindowCut, most: int) -> tuple[Log, SearchedPart]:
     """Return the log on which the search runs, and how it was chosen."""
     name = paths[0].stem if len(paths) == 1 else f"{paths[0].stem} and {len(paths) - 1} more"
     some = plan.spread(most)
@@ -237,7 +238,7 @@ def _describe(
     plan: Plan,
     files: int,
     count: int,
-    told: dict[str, Any],
+    told: SearchedPart,
     looked: ScoreTests,
     layout: Layout,
     fitted: Refit,

@@ -21,7 +21,7 @@ from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 
 # A window is an outlier whose error is so many times the median's, and fit to lead the others back below so many.
-ASTRAY, NEAR = 3.0, 2.0
+DIVERGED, NEAR = 3.0, 2.0
 # A fit that goes out from another one is left alone unless a window is as far out as this.
 WILD = 1e3
 # How often at most a fit is begun again, and steps of a window's initial state on its own.
@@ -66,7 +66,7 @@ def fit_with_outlier_restart(
         cost = best.statistics.cost
         middle = max(float(np.median(cost)), 1e-300)
         near = cost <= NEAR * middle
-        settled = (cost <= ASTRAY * middle).all() if plain else (cost <= WILD * middle).all()
+        settled = (cost <= DIVERGED * middle).all() if plain else (cost <= WILD * middle).all()
         if near.all() or (settled and (best.converged or not plain)):
             break
         try:
@@ -90,7 +90,7 @@ def _begun_again(
     sigma: NDArray[np.float64] | None,
     iterations: int,
 ) -> Fitted:
-    """Return the fit to all windows from one to those that are near, each stray brought back."""
+    """Return the fit to all windows from one to those that are near, each of the others brought back."""
     others = fit(
         best.model,
         windows.pick(near),
@@ -102,17 +102,17 @@ def _begun_again(
     )
     initial = initial_states(model, windows)
     initial[torch.as_tensor(near)] = others.initial
-    strays = np.nonzero(~near)[0]
+    outliers = np.nonzero(~near)[0]
     # One that needs short steps would hold up the others.
-    for few in np.array_split(strays, len(strays) if len(strays) <= FEW * len(windows) else 1):
+    for few in np.array_split(outliers, len(outliers) if len(outliers) <= FEW * len(windows) else 1):
         initial[torch.as_tensor(few)] = _restarted(others, windows.pick(few))
     return fit(others.model, windows, names, priors, initial=initial, sigma=sigma, iterations=iterations)
 
 
-def _restarted(others: Fitted, strays: Windows) -> Tensor:
+def _restarted(others: Fitted, outliers: Windows) -> Tensor:
     """Return the initial states of windows that fit them best under what the others say, (B, 13)."""
     nothing = Priors(np.zeros(0), np.zeros(0))
-    return fit(others.model, strays, (), nothing, sigma=others.sigma, iterations=ALONE).initial
+    return fit(others.model, outliers, (), nothing, sigma=others.sigma, iterations=ALONE).initial
 
 
 def _errors(fitted: Fitted) -> float:

@@ -135,7 +135,7 @@ def lay_out(model: GreyBox, candidates: Sequence[str], learned: Array | None = N
         spreads["learned_drag"] = learned
     spreads |= further
     for effect in model.members:
-        # What the model has was fitted or stated: were it all but free, it would swallow what is missing.
+        # What the model has was fitted or stated: were it all but free, it would absorb what is missing.
         if str(effect.name) not in spreads and str(effect.name) in EFFECTS:
             spreads[str(effect.name)] = effect.standard_deviations()
     return Layout(full, tuple(columns), columns, tuple(groups), means, spreads, model.joint)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.command_holding import Holding, holding, squared_error
@@ -20,7 +21,7 @@ from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction, predi
 from auvnn.diagnosis.noise_law.search import UNSOLVED, ForceSearch
 from auvnn.diagnosis.noise_law.words import left
 from auvnn.diagnosis.residuals.forces import actuators_of, share_of
-from auvnn.diagnosis.residuals.variance_component import variance_component_test, white
+from auvnn.diagnosis.residuals.variance_component_test import variance_component_test, white
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.diagnosis.stages.what_is_left import settled
@@ -141,7 +142,7 @@ def _state(asked: Setting, state: State, result: WithForce, *, chance: bool) -> 
     refuted = (not chance and share > MOST) or exceeds_actuators(asked, state, law)
     named = [] if refuted else list(result.steps)
     tried = [e for s in result.steps for e in s["effects"]]
-    end: dict[str, Any] = {
+    end: SearchStep = {
         "verdict": "adequate" if small else "unknown",
         "effects": [],
         "p_value": state.p_value,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, correlation_root, scales, shapes
 from auvnn.diagnosis.noise_law.estimate_law import Estimate, estimate
@@ -68,7 +68,7 @@ class WithForce:
         first_law: the law without any name.
     """
 
-    steps: list[dict[str, Any]]
+    steps: list[SearchStep]
     groups: list[list[FittedHypothesis]]
     last: FittedHypothesis
     windows: Windows

@@ -20,7 +20,7 @@ from auvnn.diagnosis.noise_law.command_holding import cost_at_best
 from auvnn.diagnosis.noise_law.estimate_law import estimate
 from auvnn.diagnosis.noise_law.law_likelihood import Likelihood
 from auvnn.diagnosis.noise_law.sums import force_sums
-from auvnn.diagnosis.residuals.variance_component import white
+from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.metrics.coloured_noise import NoiseColour

@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out
-from auvnn.diagnosis.residuals.additive_force import _by_part
+from auvnn.diagnosis.residuals.additive_force_test import _by_part
 from auvnn.diagnosis.residuals.input_forces import ANGLES, AXES, InputForces, _euler, _raw
 from auvnn.estimation.window_normal_equations import Statistics
 from auvnn.metrics.windows import Windows

@@ -13,12 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, folds, left_out
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, shapes
 from auvnn.diagnosis.noise_law.estimate_law import estimate
@@ -128,7 +128,7 @@ class ForceSearch:
             most: look for at most this many.
         """
         current, chosen = null, []
-        steps: list[dict[str, Any]] = []
+        steps: list[SearchStep] = []
         groups: list[list[FittedHypothesis]] = []
         tried: list[Hypothesis] = []
         whole = 1.0

@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.answer_types import SearchStep
+from auvnn.diagnosis.answers.table import CandidateRow
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
-from auvnn.diagnosis.residuals.additive_force import AdditiveForce
-from auvnn.diagnosis.residuals.variance_component import Unnamed
+from auvnn.diagnosis.residuals.additive_force_test import AdditiveForce
+from auvnn.diagnosis.residuals.variance_component_test import Unnamed
 from auvnn.diagnosis.score_tests.null_tests import NullTests
 from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.logs import Log
@@ -107,8 +109,8 @@ class State:
     chosen: tuple[str, ...] = ()
     groups: tuple[tuple[FittedHypothesis, ...], ...] = ()
     withdrawn: tuple[str, ...] = ()
-    steps: tuple[dict[str, Any], ...] = ()
-    table: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    steps: tuple[SearchStep, ...] = ()
+    table: Mapping[str, CandidateRow] = field(default_factory=dict)
     tried: tuple[FittedHypothesis, ...] = ()
     failed: Mapping[str, str] = field(default_factory=dict)
     p_value: float = 1.0

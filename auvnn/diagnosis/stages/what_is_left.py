@@ -12,10 +12,10 @@ import numpy as np
 
 from auvnn.diagnosis.answers.effect_costs import small
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.residuals.additive_force import additive_force_test
-from auvnn.diagnosis.residuals.variance_component import Unnamed, variance_component_test, white
-from auvnn.diagnosis.stages.look import ALPHA_NEXT, ALPHA_UNKNOWN
+from auvnn.diagnosis.residuals.additive_force_test import additive_force_test
+from auvnn.diagnosis.residuals.variance_component_test import Unnamed, variance_component_test, white
 from auvnn.diagnosis.stages.partial import kept
+from auvnn.diagnosis.stages.search_round import ALPHA_NEXT, ALPHA_UNKNOWN
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.estimation.prediction_error import FitError
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.answer_types import ByEffect
 from auvnn.damping.bank import DampingBank
 from auvnn.diagnosis.cross_validation.errors import LeftOut
 from auvnn.diagnosis.cross_validation.fitters import newton
@@ -232,7 +232,7 @@ def as_given(base: GreyBox, judge: Judge) -> State:
     return State(Recipe(), layout, None, (), np.zeros(0), base, judge.as_it_is(base))
 
 
-def parameters(state: State) -> dict[str, dict[str, dict[str, Any]]]:
+def parameters(state: State) -> ByEffect:
     """Return the values of the effects that were added, with standard errors: sandwich estimates over windows.
 
     Reference: White (1982), Econometrica 50(1).

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from auvnn.online.change_detection.change_statistics import Block
 from auvnn.online.change_detection.change_words import Change
-from auvnn.online.change_detection.evidence import Block
 from auvnn.online.change_detection.sensitivities import Columns
 
 ITEMS = ("start", "count", "hessian", "slope", "square", "total", "reach")

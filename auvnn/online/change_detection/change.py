@@ -22,8 +22,8 @@ from torch import Tensor
 
 from auvnn.models import GreyBox
 from auvnn.online.change_detection.blocks import ITEMS, _blocks, _joined, _Open
+from auvnn.online.change_detection.change_statistics import Block, Fit, fit, gains
 from auvnn.online.change_detection.change_words import Change, _words
-from auvnn.online.change_detection.evidence import Block, Fit, fit, gains
 from auvnn.online.change_detection.sensitivities import KINDS, Columns, Sensitivities
 from auvnn.online.noise import NoiseLevel
 from auvnn.online.residual import Sample

@@ -1,4 +1,4 @@
-"""What networks of the velocity swallow of each effect, manoeuvre by manoeuvre."""
+"""What networks of the velocity absorb of each effect, manoeuvre by manoeuvre."""
 
 from __future__ import annotations
 

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.answer_types import Parameters
 from auvnn.effects import EFFECTS
 from auvnn.logs import Log
 from auvnn.metrics.derivative import Derivative, choose_derivative
@@ -195,8 +196,8 @@ def _confounded_effect(
     statistic = float(estimate @ np.linalg.pinv(covariance, rcond=1e-10, hermitian=True) @ estimate)
     relative = float(np.sqrt(np.sum((total @ estimate) ** 2) / np.sum((learned.wrench / size) ** 2)))
     sure = statistic / len(estimate) > SURE**2 and bool((np.abs(estimate) > SURE * std).any())
-    parameters = {
-        p.name: {"value": p.null + v * s, "std": d * s, "unit": p.unit}
+    parameters: Parameters = {
+        p.name: {"value": float(p.null + v * s), "std": float(d * s), "unit": p.unit}
         for p, v, d, s in zip(described, estimate, std, scale, strict=True)
     }
     return ConfoundedEffect(name, share, relative, parameters, sure and share > SHARE and relative > SIZE)

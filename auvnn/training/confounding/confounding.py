@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.answer_types import Parameters
+
 Array = NDArray[np.float64]
 
 
@@ -53,7 +55,7 @@ class ConfoundedEffect:
     effect: str
     share: float
     size: float
-    parameters: dict[str, dict[str, Any]]
+    parameters: Parameters
     found: bool
 
 

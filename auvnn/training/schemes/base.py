@@ -42,12 +42,12 @@ State = tuple[dict[str, Tensor], dict[str, Any]]
 class Scheme:
     """A way to find the parameters of a bank, one iteration at a time.
 
-    A scheme that asks of its samples sums alone, by the methods of `Samples`, says so by `parted`: it can then fit
+    A scheme that asks of its samples sums alone, by the methods of `Samples`, says so by `sums_suffice`: it can then fit
     logs larger than the memory, and many files.
     """
 
     name: ClassVar[str]
-    parted: ClassVar[bool] = False
+    sums_suffice: ClassVar[bool] = False
     warnings: list[str]
 
     def options(self) -> dict[str, Any]:

@@ -75,7 +75,7 @@ class GradientScheme(Scheme):
             self.bank.reset(task.seed)
         self._generator = torch.Generator().manual_seed(task.seed)
         like = self.bank.input_scale
-        assert isinstance(task.train, Samples)  # others are for schemes that say `parted`
+        assert isinstance(task.train, Samples)  # others are for schemes that say `sums_suffice`
         weight = task.train.weight
         # A mean over each axis' own samples: missing ones must not make the others count less.
         weight = weight * len(weight) / weight.sum(0).clamp_min(1e-300) / task.spread.square()

@@ -48,7 +48,7 @@ class LevenbergMarquardt(Scheme):
     """
 
     name = "levenberg_marquardt"
-    parted = True
+    sums_suffice = True
 
     def __init__(
         self,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import auvnn
-from auvnn.diagnosis.hypotheses import outlier_restart as strays
+from auvnn.diagnosis.hypotheses import outlier_restart as outliers
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out, priors
@@ -61,7 +61,7 @@ def test_the_last_fit_begins_with_each_stray_already_brought_back(monkeypatch):
         seen.append((at, some, names, how))
         return fit(at, some, names, held, **how)
 
-    monkeypatch.setattr(strays, "fit", watched)
+    monkeypatch.setattr(outliers, "fit", watched)
     found = fit_with_outlier_restart(model, windows, groups, known, iterations=15)
     at, some, names, how = seen[-1]
     assert len(some) == len(windows) and names == groups

@@ -55,7 +55,7 @@ def test_a_search_goes_on_with_shorter_steps(model, windows, monkeypatch):
     def halved(model, windows, initial, sigma):
         return windows if windows.max_step < 0.05 else type(windows)(**{**vars(windows), "max_step": 0.025})
 
-    monkeypatch.setattr("auvnn.diagnosis.stages.look.refine_step", halved)
+    monkeypatch.setattr("auvnn.diagnosis.stages.search_round.refine_step", halved)
     log = make_log(model, runs=2, duration=8.0, noise=1.0)
     found, search = searched(model, log, ["net_buoyancy"], whiteness=False)
     assert found.verdict == "adequate" and search.state.windows.max_step == 0.025

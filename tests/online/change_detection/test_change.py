@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from auvnn.online import Adapter
-from auvnn.online.change_detection.evidence import Block, fit
+from auvnn.online.change_detection.change_statistics import Block, fit
 from tests.online.online_world import driven, fed, vehicle
 
 CHANGES = {

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import expit
+
+from auvnn.studies.benchmark.counts.entries import SmallestFound
 
 Array = NDArray[np.float64]
 
@@ -18,7 +19,7 @@ LOOSEST = float(np.log(2.0))
 FEWEST = 6
 
 
-def smallest_found(sizes: Sequence[float], found: Sequence[bool]) -> dict[str, Any]:
+def smallest_found(sizes: Sequence[float], found: Sequence[bool]) -> SmallestFound:
     """Return the size at which an effect is found with a chance of 90 %.
 
     P(found) = 1 / (1 + exp(-(a + b ln size))), fitted with Jeffreys' prior as a penalty, so that the curve stays
@@ -36,7 +37,9 @@ def smallest_found(sizes: Sequence[float], found: Sequence[bool]) -> dict[str, A
         Firth (1993), Biometrika 80(1), for the penalty; Heinze and Schemper (2002), Statistics in Medicine 21.
     """
     x, y = np.log(np.asarray(sizes, dtype=float)), np.asarray(found, dtype=float)
-    nothing: dict[str, Any] = {"size": None, "low": None, "high": None, "determined": False, "logs": len(y)}
+    nothing: SmallestFound = {
+        "size": None, "low": None, "high": None, "determined": False, "logs": len(y), "words": "",
+    }  # fmt: skip
     tried = np.unique(x)
     if len(y) < FEWEST or len(tried) < 2:
         return {**nothing, "words": "too few logs or sizes"}

@@ -12,6 +12,7 @@ from auvnn.catalogue import unknown_name
 from auvnn.errors import ConfigError
 from auvnn.studies.benchmark.counts import counting, worlds
 from auvnn.studies.benchmark.counts.counting import Row, kind_of
+from auvnn.studies.benchmark.counts.entries import PartRate, RateEntry, TargetEntry
 
 Z95 = 1.96
 
@@ -93,7 +94,7 @@ def interval(hits: int, count: int) -> tuple[float, float]:
     return float(found.low), float(found.high)
 
 
-def rate(name: str, rows: Sequence[Row]) -> dict[str, Any]:
+def rate(name: str, rows: Sequence[Row]) -> RateEntry:
     """Return a rate: hits, count, share and its interval; the share is None where there is nothing to count.
 
     A median has the interval of its order statistics, a mean that of Student; no hits are counted for them.
@@ -133,13 +134,13 @@ def _around_median(values: np.ndarray) -> tuple[float | None, float | None]:
     return float(values[rank - 1]), float(values[count - rank])
 
 
-def by_part(rows: Sequence[Row]) -> list[dict[str, Any]]:
+def by_part(rows: Sequence[Row]) -> list[PartRate]:
     """Return every rate of every part of the plan that has anything to count, "all" first."""
     parts: dict[str, list[Row]] = {"all": list(rows)}
     for row in rows:
         if row.get("part"):
             parts.setdefault(str(row["part"]), []).append(row)
-    out = []
+    out: list[PartRate] = []
     for part, members in parts.items():
         for name in (*RATES, *NUMBERS):
             found = rate(name, members)
@@ -148,14 +149,14 @@ def by_part(rows: Sequence[Row]) -> list[dict[str, Any]]:
     return out
 
 
-def judged(rows: Sequence[Row], aims: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def judged(rows: Sequence[Row], aims: Iterable[Mapping[str, Any]]) -> list[TargetEntry]:
     """Return what was aimed at beside what came out, and whether it was met; None where nothing was counted.
 
     Args:
         rows: all rows.
         aims: `part` ("all" for all), `rate`, and `least` or `most` or both; `sizes` leaves out logs of other sizes.
     """
-    out = []
+    out: list[TargetEntry] = []
     for aim in aims:
         sizes = aim.get("sizes")
         members = [

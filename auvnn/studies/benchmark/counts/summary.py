@@ -21,6 +21,7 @@ from auvnn.studies.benchmark.counts.counting import (
     kind_of,
     named_first,
 )
+from auvnn.studies.benchmark.counts.entries import PartRate, TargetEntry
 from auvnn.studies.benchmark.counts.power import smallest_found
 from auvnn.studies.benchmark.counts.rates import RATES, Z95, by_part, falls, judged, rate, z_of
 from auvnn.studies.hidden import BEYOND, SIZES
@@ -53,8 +54,8 @@ class Benchmark(Answer):
     options: dict[str, Any]
     metrics: dict[str, float] = field(default_factory=dict)
     table: list[dict[str, Any]] = field(default_factory=list)
-    rates: list[dict[str, Any]] = field(default_factory=list)
-    targets: list[dict[str, Any]] = field(default_factory=list)
+    rates: list[PartRate] = field(default_factory=list)
+    targets: list[TargetEntry] = field(default_factory=list)
     effects: list[dict[str, Any]] = field(default_factory=list)
     confusion: dict[str, dict[str, int]] = field(default_factory=dict)
     uniformity: dict[str, Any] = field(default_factory=dict)

@@ -82,7 +82,7 @@ class Cells:
         """
         return (at, self._by_cell(slope, self.of_sample)) if at == end - 6 else (at, slope)
 
-    def parted(self, columns: Tensor) -> tuple[Tensor, Tensor]:
+    def separate(self, columns: Tensor) -> tuple[Tensor, Tensor]:
         """Return the columns of the parameters, and those of the force's independent variables."""
         return columns[..., : -self.size].contiguous(), columns[..., -self.size :].contiguous()
 

@@ -1,6 +1,6 @@
-"""The stages of a search, each from one state to the next: fit of the null, one look after the other, groups again.
+"""The stages of a search, each from one state to the next: fit of the null, one round after the other, groups again.
 
-A look is: score tests of all that remains, refit of the leaders, their comparison, acceptance of the one that explains
+A round is: score tests of all that remains, refit of the leaders, their comparison, acceptance of the one that explains
 best and pays on what is left out, and pruning of what is then no longer needed.
 """
 
@@ -32,7 +32,7 @@ def fit_null(asked: Setting, windows: Windows) -> State:
     return State(windows, first, first)
 
 
-def look(asked: Setting, state: State) -> State:
+def search_round(asked: Setting, state: State) -> State:
     """Test all effects that remain, refit the leaders, take the one that explains best; see the module's text."""
     chosen, first = list(state.chosen), state.first
     remaining = [n for n in asked.usable if n not in {*chosen, *state.withdrawn, *state.in_groups}]
@@ -82,7 +82,7 @@ def regroup(asked: Setting, state: State) -> State:
     The errors of what had not been found yet may have hidden the difference.
     """
     chooser, last = asked.chooser(state.windows), state.current
-    groups, steps = list(state.groups), [dict(s) for s in state.steps]
+    groups, steps = list(state.groups), [s.copy() for s in state.steps]
     for k, group in enumerate(state.groups):
         names = [e.effects[-1] for e in group]
         if {*last.effects} == {*group[0].effects}:

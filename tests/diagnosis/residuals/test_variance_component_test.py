@@ -13,7 +13,7 @@ from auvnn.diagnosis.answers.words import tell
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.residuals.variance_component import (
+from auvnn.diagnosis.residuals.variance_component_test import (
     Unnamed,
     moment_matched_test,
     variance_component_test,

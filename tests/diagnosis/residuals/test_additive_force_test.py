@@ -9,8 +9,8 @@ from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.residuals.additive_force import AdditiveForce, additive_force_test
-from auvnn.diagnosis.residuals.variance_component import Unnamed, white
+from auvnn.diagnosis.residuals.additive_force_test import AdditiveForce, additive_force_test
+from auvnn.diagnosis.residuals.variance_component_test import Unnamed, white
 from auvnn.models import GreyBox
 from tests.diagnosis.strange_effects import HeadingForce
 from tests.small_logs import make_log, small_vehicle
