@@ -12,6 +12,7 @@ Reference: Kristensen, Madsen and Joergensen (2004), Automatica 40(2) 225-237.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -112,13 +113,6 @@ class ForceSearch:
         sums = force_sums(explanation, self.windows, self.sigma, self.cell)
         return judged(self.layout, explanation, sums, self.sigma, law)
 
-    def _judged_or_none(self, explanation: FittedHypothesis, law: ForceLaw) -> Hypothesis | None:
-        """Return a judged explanation; None where its free running grows so that nothing can be said of it."""
-        try:
-            return self.judged(explanation, law)
-        except UNSOLVED:
-            return None
-
     def run(self, null: Hypothesis, fitted: Sequence[FittedHypothesis], most: int) -> WithForce:
         """Search for one effect after the other.
 
@@ -198,7 +192,11 @@ class ForceSearch:
         """Return the leading effects, fitted and judged, the most evident first."""
         assert current.estimate.law is not None
         leading = self._leading(tested, current, base, chosen, fitted, WORTH_A_FIT * odds)
-        found = [h for h in (self._judged_or_none(e, current.estimate.law) for e in leading) if h is not None]
+        found = []
+        for explanation in leading:
+            # One whose free running grows so that nothing can be said of it is passed over.
+            with suppress(*UNSOLVED):
+                found.append(self.judged(explanation, current.estimate.law))
         return sorted(found, key=lambda h: -h.evidence)
 
     def _tests(self, law: ForceLaw) -> NullTests:
