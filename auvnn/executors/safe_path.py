@@ -96,7 +96,7 @@ def ray_kept_safe() -> Iterator[None]:
     if not there:
         yield
         return
-    ray = importlib.import_module("ray")
+    ray: Any = importlib.import_module("ray")
     begin = ray.init
 
     def init(*given: Any, **more: Any) -> Any:

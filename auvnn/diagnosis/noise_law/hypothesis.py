@@ -18,12 +18,15 @@ from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS
 from auvnn.diagnosis.selection.predictive_density import cross_validated_log_density
 from auvnn.effects import effect_class
 from auvnn.estimation.priors import limits
+from auvnn.logs import Log
 from auvnn.metrics.force_law import ForceLaw
+from auvnn.metrics.rollouts import Scale, roll
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
 # How often parameters that would leave their bounds are held there.
 ROUNDS = 3
+HORIZON = "5"
 
 
 @dataclass(frozen=True)
@@ -166,3 +169,22 @@ def predicts_better(after: Hypothesis, before: Hypothesis, least: float) -> bool
     """
     gain = cross_validated_log_density(before.weighed) - cross_validated_log_density(after.weighed)
     return float(gain.sum()) > least * float(np.sqrt(len(gain)) * gain.std(ddof=1))
+
+
+def free_running_cost(after: Hypothesis, before: Hypothesis, log: Log, scale: Scale) -> float:
+    """Return by what share the error of free running over 5 s is larger before than after.
+
+    Args:
+        after: hypothesis with a name more.
+        before: hypothesis without it.
+        log: on which both run freely.
+        scale: of the errors, as `rollouts.scale_of` has it.
+    """
+    rolled = [
+        roll(h.explanation.fitted.model.without_absent(h.explanation.effects), log, HORIZON, scale)
+        for h in (before, after)
+    ]
+    if rolled[0] is None or rolled[1] is None:
+        return float("inf")
+    errors = [r.total(scale) for r in rolled if r is not None]
+    return errors[0] / errors[1] - 1.0 if np.isfinite(errors[1]) and errors[1] > 0.0 else -1.0

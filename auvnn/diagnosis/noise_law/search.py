@@ -26,6 +26,7 @@ from auvnn.diagnosis.noise_law.estimate_law import estimate
 from auvnn.diagnosis.noise_law.hypothesis import (
     Hypothesis,
     WithForce,
+    free_running_cost,
     judged,
     p_value_of,
     predicts_better,
@@ -42,7 +43,7 @@ from auvnn.estimation.prediction_error import SINGULAR, FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.metrics.force_law import ForceLaw, cell_for
-from auvnn.metrics.rollouts import roll, scale_of
+from auvnn.metrics.rollouts import scale_of
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 
@@ -58,7 +59,6 @@ GAIN, GAIN_FURTHER = 1.0, 2.0
 LEADERS = 3
 # Members of a group that the log cannot tell apart, at most.
 GROUP = 3
-HORIZON = "5"
 STEPS = 6
 # Share of the odds that a further name needs, which its test must promise before it is fitted.
 WORTH_A_FIT = 0.3
@@ -138,7 +138,13 @@ class ForceSearch:
             # A second search begins with the same look.
             seen = self._first_look if not chosen else None
             known = seen[1:] if seen is not None and seen[0] is null else None
-            tested = known[0] if known else self._tests(law)(current.weighed, remaining, base, chosen)
+            tested = (
+                known[0]
+                if known
+                else NullTests(self.layout, replace(self.windows, law=law), self.say)(
+                    current.weighed, remaining, base, chosen
+                )
+            )
             # Beside what was found the variance is no longer inflated by it: the tests say whether to go on.
             if chosen and tested.p_value >= ALPHA:
                 break
@@ -158,7 +164,10 @@ class ForceSearch:
                 if h.evidence > current.evidence + odds
                 and sure[h.name] < level
                 and predicts_better(h, current, least)
-                and (self.ignores_cost or self._cost(h, current) > cost * self.tolerance.cost)
+                and (
+                    self.ignores_cost
+                    or free_running_cost(h, current, self.log, self.scale) > cost * self.tolerance.cost
+                )
             ]
             if not good:
                 break
@@ -198,9 +207,6 @@ class ForceSearch:
             with suppress(*UNSOLVED):
                 found.append(self.judged(explanation, current.estimate.law))
         return sorted(found, key=lambda h: -h.evidence)
-
-    def _tests(self, law: ForceLaw) -> NullTests:
-        return NullTests(self.layout, replace(self.windows, law=law), self.say)
 
     def _leading(
         self,
@@ -247,22 +253,6 @@ class ForceSearch:
             except FitError:
                 continue
         return None
-
-    def _cost(self, after: Hypothesis, before: Hypothesis) -> float:
-        """Return by what share the error of free running over 5 s is larger before than after."""
-        rolled = [
-            roll(
-                h.explanation.fitted.model.without_absent(h.explanation.effects),
-                self.log,
-                HORIZON,
-                self.scale,
-            )
-            for h in (before, after)
-        ]
-        if rolled[0] is None or rolled[1] is None:
-            return float("inf")
-        errors = [r.total(self.scale) for r in rolled if r is not None]
-        return errors[0] / errors[1] - 1.0 if np.isfinite(errors[1]) and errors[1] > 0.0 else -1.0
 
     def _taken(self, best: Hypothesis) -> Hypothesis:
         """Return a hypothesis at the parameters that its law has moved it to.
