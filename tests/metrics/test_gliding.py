@@ -160,7 +160,7 @@ THRUSTER = {"position": [0, 0, 0], "direction": [1, 0, 0], "max_forward": 1, "ma
         ({"moving_mass": {"axis": [1, 0, 0]}}, "mass is missing"),
         (
             {"ballast": {}, "thrusters": [THRUSTER]},
-            "beside thrusters",
+            "together with thrusters",
         ),
     ],
 )  # fmt: skip

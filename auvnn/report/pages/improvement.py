@@ -133,14 +133,8 @@ class ImprovementPage(Page):
             ("Fitted on", view.text("log")),
             ("Held out", view.text("held_out") or view.text("test")),
             ("Effects", listing(view.texts("effects"))),
-            (
-                "Error",
-                "root mean square over free-running windows of 5 s, divided by the spread of each channel",
-            ),
-            (
-                "Gain",
-                "from the refitted model to the extended one; one standard deviation over windows and runs",
-            ),
+            ("Error", "rms over free-running windows of 5 s, as a share of each channel's spread"),
+            ("Gain", "from the refitted to the extended model; one standard deviation over windows and runs"),
         ]
 
 
