@@ -60,7 +60,8 @@ class Pruning:
         """
         gone: list[str] = []
         for name in taken.effects[:-1]:
-            if self.clearly_needed(taken, name):
+            # What is uncertain anyway stays free without it, near what was stated: that takes a fit.
+            if name not in base and self.clearly_needed(taken, name):
                 continue
             left = tuple(e for e in taken.effects if e != name)
             self.say(f"asking whether {name} is still needed")

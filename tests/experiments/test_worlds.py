@@ -1,0 +1,51 @@
+"""The study of other people's worlds: the rows that are kept give the figures that are told."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from auvnn.studies.benchmark.case import Case
+from auvnn.studies.benchmark.cases import cases
+from auvnn.studies.benchmark.counts import worlds
+from tests.studies.benchmark.plans import of_plan
+
+HERE = Path(__file__).resolve().parents[2] / "experiments" / "worlds"
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return [json.loads(line) for line in (HERE / "rows.jsonl").read_text().splitlines()]
+
+
+def test_the_rows_are_logs_of_the_plan(rows):
+    options, _ = of_plan("worlds")
+    sample = cases({**options, "every": 31})
+    done = [Case.of_row(r) for r in rows]
+    assert {*done} <= {*sample} and len({*done}) == len(rows)
+
+
+def test_the_rows_give_what_is_told(rows):
+    expected = json.loads((HERE / "expected.json").read_text())
+    seen = [r for r in rows if r["kind"] == "effect" and worlds.visible(r)]
+    nothing = [r for r in rows if r["kind"] == "nothing"]
+    found = {
+        "logs": len(rows),
+        "visible": len(seen),
+        "visible_named_or_tied": sum(map(worlds.right, seen)),
+        "visible_alone": sum(map(worlds.alone, seen)),
+        "wrong_first": sum(map(worlds.wrong_first, rows)),
+        "nothing": len(nothing),
+        "nothing_without_a_name": sum(map(worlds.silent, nothing)),
+        "nothing_adequate": sum(map(worlds.adequate, nothing)),
+        "faults": sum(r["verdict"] == "fault" or bool(r["fault"]) for r in rows),
+    }
+    assert found == expected
+    text = (HERE / "README.md").read_text()
+    for words in (
+        f"{found['visible_named_or_tied']} of {found['visible']} visible",
+        f"{found['wrong_first']} of {found['logs']} logs",
+    ):
+        assert words in text
