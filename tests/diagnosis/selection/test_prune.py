@@ -13,7 +13,7 @@ from auvnn.estimation.prediction_error import FitError
 
 @pytest.mark.parametrize("doubtless", [True, False])
 def test_a_fit_is_spent_on_what_is_uncertain_anyway_and_where_there_is_a_doubt(monkeypatch, doubtless):
-    """An uncertain coefficient stays free without its name, near what was stated: Wald's test at its null says nothing."""
+    """An uncertain coefficient stays free without its name, near what was stated: a test at its null says nothing."""
     fitted: list[tuple[str, ...]] = []
 
     def fit(_layout, _windows, _base, effects, **_more):
