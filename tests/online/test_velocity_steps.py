@@ -52,6 +52,19 @@ def test_nothing_is_learned_of_a_gyro_that_begins_to_report_a_bias(run, measured
     assert any(torch.equal(parameters(adapter), p) for p in before)
 
 
+def test_what_was_learned_while_a_bias_began_to_show_is_taken_back(run):
+    """Without the wait something of it is learned first; once attitude contradicts the rates, that is given up."""
+    adapter, nu = Adapter(vehicle(), watch=False, guards={"step_hold": 0.0}), np.array(run.nu)
+    nu[160:, 5] += 0.2
+    before = healthy(adapter, run, range(160))
+    learned = []
+    for k in range(160, 240):
+        (update,) = steps(adapter, run, nu, [k])
+        learned.append(update.adapted)
+    assert any(learned) and not learned[-1]
+    assert any(torch.equal(parameters(adapter), p) for p in before)
+
+
 def test_velocities_of_three_times_the_size_are_not_learned_before_positions_refute_them(run):
     adapter, nu = Adapter(vehicle(), watch=False), np.array(run.nu)
     begin = 170

@@ -6,12 +6,13 @@ import importlib.util
 import os
 import subprocess
 import sys
+import types
 from pathlib import Path
 
 import pytest
 
 from auvnn.executors import EXECUTORS
-from auvnn.executors.safe_path import environment, import_path, kept_safe
+from auvnn.executors.safe_path import environment, import_path, kept_safe, ray_kept_safe
 from tests.security.poison import PACKAGE, outside, poisoned
 
 SIMULATE = ["simulate", "model=rov95", "runs=1", "duration=1", "noise=none", "out=made"]
@@ -123,3 +124,18 @@ def test_a_checkout_in_which_one_stands_is_found(monkeypatch):
     monkeypatch.chdir(PACKAGE)
     monkeypatch.setattr(sys, "path", [PACKAGE, *sys.path])
     assert PACKAGE in import_path() and PACKAGE in environment()["PYTHONPATH"].split(os.pathsep)
+
+
+def test_ray_is_started_without_the_current_folder_whoever_starts_it(monkeypatch):
+    """Ray puts the current folder first in its workers' path, but for jobs of its client; stubs stand for both."""
+    begun: list[dict] = []
+    ray, config = types.ModuleType("ray"), types.ModuleType("ray.job_config")
+    ray.init = begin = lambda **given: begun.append(given)  # type: ignore[attr-defined]
+    config.JobConfig = lambda **given: given  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "ray", ray)
+    monkeypatch.setitem(sys.modules, "ray.job_config", config)
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: object())
+    with ray_kept_safe():
+        ray.init(num_cpus=1)  # type: ignore[attr-defined]
+    assert begun[0]["num_cpus"] == 1 and begun[0]["job_config"]["_client_job"] is True
+    assert ray.init is begin  # type: ignore[attr-defined]

@@ -111,7 +111,7 @@ class Pruning:
         whole = fitted.statistics.total + fitted.priors.square
         left = NormalEquations(whole, fitted.statistics.slope.sum(0)).eliminate(own, others, rcond=1e-12)
         way = fitted.theta[own] - self.layout.means[name][~shapes(self.layout, name)]
-        return float(way @ left.information @ way) / self._factor(taken) > 2.0 * BEYOND_DOUBT
+        return bool(way @ left.information @ way > 2.0 * BEYOND_DOUBT * self._factor(taken))
 
     def without(
         self,

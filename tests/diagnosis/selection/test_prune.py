@@ -5,10 +5,16 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis, standard_errors
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.selection import prune
 from auvnn.estimation.prediction_error import FitError
+from auvnn.models import GreyBox
+from tests.small_logs import make_log, small_vehicle
 
 
 @pytest.mark.parametrize("doubtless", [True, False])
@@ -35,3 +41,23 @@ def test_a_fit_is_spent_on_what_is_uncertain_anyway_and_where_there_is_a_doubt(m
     assert (found, gone) == (taken, [])
     without_drag, without_buoyancy = ("net_buoyancy", "tether"), ("quadratic_damping", "tether")
     assert fitted == ([without_drag] if doubtless else [without_drag, without_buoyancy])
+
+
+def test_what_is_there_is_clearly_needed_and_what_is_not_there_is_not():
+    """Half of Wald's statistic of one parameter is half of (value over standard error) squared."""
+    model = GreyBox(small_vehicle())
+    log = make_log(model.with_effects({"net_buoyancy": {"force": 6.0}}), runs=2, duration=12.0, noise=1.0)
+    names = ["net_buoyancy", "constant_force"]
+    layout, windows = lay_out(model, names), windows_for(model, log)
+    base = [n for n in layout.names if n not in names]
+    found = fit_hypothesis(layout, windows, base, names)
+    asked = prune.Pruning(layout, windows, lambda _: None)
+    assert asked.clearly_needed(found, "net_buoyancy") and not asked.clearly_needed(found, "constant_force")
+    alone = fit_hypothesis(layout, windows, base, ["net_buoyancy"])
+    (column,) = layout.places(alone.names)["net_buoyancy"]
+    (std,), _ = standard_errors(alone, np.array([column]))
+    half = 0.5 * (alone.fitted.theta[column] / std) ** 2
+    for share, wanted in ((0.5, True), (2.0, False)):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(prune, "BEYOND_DOUBT", share * half)
+            assert asked.clearly_needed(alone, "net_buoyancy") is wanted
