@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 import torch
@@ -9,7 +11,7 @@ from torch.func import functional_call, vmap
 
 from auvnn.effects import EFFECTS
 from auvnn.estimation.priors import parameters_of, set_parameters
-from auvnn.estimation.sensitivity import respond
+from auvnn.estimation.sensitivity import _terms, respond
 from auvnn.estimation.window_simulation import output_error
 from auvnn.logs import Log, Run
 from auvnn.metrics.free_run import initial_states, moved
@@ -210,3 +212,11 @@ def test_what_was_not_measured_has_neither_error_nor_slope():
     assert found.state.shape[2] == found.parameters.shape[2] == 12
     assert found.error[0, 5, 9] == 0 and not found.parameters[0, 5, 9].any()
     assert found.parameters[0, 6, 6].abs().max() > 0 and bool(torch.isfinite(found.error).all())
+
+
+@pytest.mark.parametrize("norm", [1e-3, 0.03, 0.2, 0.5])
+def test_the_series_has_as_many_terms_as_a_step_needs(norm):
+    """Of (exp(x) - 1)/x, summed up to and without the terms that are left out."""
+    kept = sum(norm**k / math.factorial(k + 1) for k in range(_terms(norm)))
+    assert abs(kept - math.expm1(norm) / norm) < 3e-7
+    assert _terms(norm) <= _terms(2.0 * norm) <= 8
