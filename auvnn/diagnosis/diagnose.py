@@ -20,6 +20,7 @@ from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.answer import answer_with_force
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.runaway import windows_that_hold
+from auvnn.diagnosis.stages.shorter_windows import search_over_shorter
 from auvnn.diagnosis.stages.state import Searched, Setting
 from auvnn.diagnosis.stages.what_is_left import settled
 from auvnn.errors import ConfigError, InputError
@@ -173,6 +174,8 @@ def searched(
     )
     try:
         state, told, words = search(asked, windows), {}, []
+        if window is None:
+            asked, state = search_over_shorter(asked, state, search)
         if stochastic:
             state, told, words = answer_with_force(asked, state)
         state = settled(asked, state)
