@@ -12,6 +12,7 @@ import numpy as np
 
 from auvnn.answer_types import Dive, ParameterTrend
 from auvnn.answers import Answer, plain
+from auvnn.cards import measured
 from auvnn.diagnosis.full_data.large_logs import SEARCH
 from auvnn.diagnosis.hypotheses.candidates import (
     check_window_length,
@@ -218,12 +219,19 @@ def _words(row: ParameterTrend, dated: bool) -> str:
     label = f"{row['effect']}.{row['parameter']}"
     if row["dives"] < 2:
         return f"{label}: {row['dives']} dives say something of it, too few to compare"
-    mean, slope, unit = row["mean"], row["slope"], "" if row["unit"] in ("", "1") else f" {row['unit']}"
+    mean, slope, unit = row["mean"], row["slope"], "" if row["unit"] in ("", "1") else row["unit"]
     constant = row["constancy"]["p_value"]
-    told = f"{label}: mean {mean['value']:.3g} ± {mean['std']:.2g}{unit} over {row['dives']} dives"
+    told = f"{label}: mean {measured(mean['value'], mean['std'], unit)[0]} over {row['dives']} dives"
     if not row["changes"]:
-        return f"{told}, the same on all (p = {constant:.2g})"
+        return f"{told}, the same on all ({_p(constant)})"
     line = ""
     if np.isfinite(slope["value"]):
-        line = f"; {slope['value']:+.3g} ± {slope['std']:.2g} {slope['unit']} (p = {slope['p_value']:.2g})"
-    return f"{told}, not the same on all (p = {constant:.2g}){line}"
+        rises = "+" if slope["value"] > 0 else ""
+        per = f"{unit} per {'day' if dated else 'dive'}".strip()
+        line = f"; {rises}{measured(slope['value'], slope['std'], per)[0]} ({_p(slope['p_value'])})"
+    return f"{told}, not the same on all ({_p(constant)}){line}"
+
+
+def _p(value: float) -> str:
+    # Below the smallest normal number the distribution's tail is lost: "p = 0" would claim more than is known.
+    return f"p = {value:.2g}" if value > 1e-300 else "p < 1e-300"

@@ -35,6 +35,8 @@ _ATTRIBUTES = {
     *("patternUnits", "patternTransform", "gradientUnits", "gradientTransform", "opacity", "text-anchor"),
     *("stroke-width", "fill-opacity", "stroke-opacity", "clip-rule", "fill-rule", "font-size", "font-family"),
 }
+LONGEST_WORD = 14  # letters, from which a name in a table may be broken
+_AFTER_SIGN = re.compile(r"([_+/])(?=\w)")
 _LONG_NUMBER = re.compile(r"(-?\d+\.\d\d)\d+")
 
 
@@ -105,7 +107,7 @@ def environment() -> Environment:
         from jinja2 import Environment, PackageLoader, StrictUndefined
     except ImportError as problem:
         raise MissingExtra("jinja2", "report", "the HTML report") from problem
-    return Environment(
+    found = Environment(
         loader=PackageLoader("auvnn.report", "templates"),
         autoescape=True,
         undefined=StrictUndefined,
@@ -113,11 +115,23 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    found.filters["breakable"] = breakable
+    return found
 
 
 def _finalize(value: Any) -> Any:
     # Markup is ours alone, made by `figure_markup`; everything else may come from a log.
     return value if hasattr(value, "__html__") else visible(value)
+
+
+def breakable(value: Any) -> Any:
+    """Return a cell as markup in which a long name may be broken after `_`, `+` and `/`, and nowhere inside a word."""
+    from markupsafe import Markup, escape
+
+    text = str(escape(visible(value)))
+    if max(map(len, text.split()), default=0) > LONGEST_WORD:
+        text = _AFTER_SIGN.sub(r"\1<wbr>", text)
+    return Markup(text)
 
 
 def render(part: Part) -> str:

@@ -66,9 +66,12 @@ def test_the_fleets_summary_names_every_parameter():
 
 
 def test_ours_is_said_once_and_wide_tables_are_turned():
-    answer = study() | {"assumed": ["ours: a", "ours: b", "paper: c"]}
+    answer = study() | {"assumed": ["ours: a", "steps of 1 s", "ours: b", "as the paper: c"]}
     told = STUDY.assumed(View(answer))
-    assert told == [("paper", "c"), ("Not in the paper, decided here", "1. a"), ("", "2. b")]
+    assert told == [
+        ("As in the paper", "C"), ("Not in the paper, decided here", "1. A"), ("", "2. B"),
+        ("Integration", "Steps of 1 s"),
+    ]  # fmt: skip
     assert all(len(t.head) <= 8 for t in STUDY.tables(View(answer)))
 
 
