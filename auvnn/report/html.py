@@ -35,6 +35,7 @@ _ATTRIBUTES = {
     *("patternUnits", "patternTransform", "gradientUnits", "gradientTransform", "opacity", "text-anchor"),
     *("stroke-width", "fill-opacity", "stroke-opacity", "clip-rule", "fill-rule", "font-size", "font-family"),
 }
+SHORTEST, SENTENCE = 12, 24  # letters, up to which a cell is one word, and from which it is a sentence
 LONGEST_WORD = 14  # letters, from which a name in a table may be broken
 _AFTER_SIGN = re.compile(r"([_+/])(?=\w)")
 _LONG_NUMBER = re.compile(r"(-?\d+\.\d\d)\d+")
@@ -116,6 +117,7 @@ def environment() -> Environment:
         lstrip_blocks=True,
     )
     found.filters["breakable"] = breakable
+    found.filters["room"] = room
     return found
 
 
@@ -132,6 +134,12 @@ def breakable(value: Any) -> Any:
     if max(map(len, text.split()), default=0) > LONGEST_WORD:
         text = _AFTER_SIGN.sub(r"\1<wbr>", text)
     return Markup(text)
+
+
+def room(value: Any) -> str:
+    """Return how wide a cell of words is kept on a narrow screen: `word` stays whole, `words` are not squeezed."""
+    length = len(visible(value))
+    return "word" if length <= SHORTEST else "words" if length > SENTENCE else "some"
 
 
 def render(part: Part) -> str:

@@ -68,7 +68,7 @@ def text(answer: Any, page: BenchmarkPage = WORDS) -> str:
 
 def test_it_begins_with_the_targets(answer):
     said = text(answer)
-    assert "1 of 2 targets are met. Missed: one: named first 75 % (wanted at least 90 %)." in said
+    assert "1 of 2 targets are met. Missed in “one”, named first: 75 % (wanted at least 90 %)." in said
     assert "Of 2 logs that hide several effects, 1 got all names and no other." in said
     assert "Of 2 logs that hide something outside the catalogue, 1 were answered unknown." in said
     # What is hidden beside them does not count among single effects.
@@ -81,7 +81,7 @@ def test_every_rate_has_a_name_in_words_and_few_missed_targets_are_told_first():
         {"part": f"p{k}", "rate": "named_first", "share": 0.5, "least": 0.9, "met": False} for k in range(9)
     ]
     (said,) = target_words(View({"targets": missed}))
-    assert said.startswith("0 of 9 targets are met. Missed: p0: named first 50") and said.endswith(
+    assert said.startswith("0 of 9 targets are met. Missed in “p0”, named first: 50") and said.endswith(
         "; and 6 others."
     )
 

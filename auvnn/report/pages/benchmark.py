@@ -131,7 +131,8 @@ class BenchmarkPage(Page):
             )
         parts = outcomes.by_condition(rows)
         if 1 < len(parts) <= MOST_CONDITIONS:
-            found += [_one_condition(i, *part) for i, part in enumerate(parts.items(), 1)]
+            sizes = values(outcomes.with_effect(rows), "size")
+            found += [_one_condition(i, *part, sizes) for i, part in enumerate(parts.items(), 1)]
         return found
 
     def tables(self, view: View) -> list[HtmlTable]:

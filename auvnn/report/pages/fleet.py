@@ -136,7 +136,8 @@ def _file(dive: Mapping[str, Any]) -> str:
 
 
 def _start(dive: Mapping[str, Any]) -> str:
-    return str(dive.get("start") or "–").replace("T", " ").removesuffix("+00:00")
+    # A date without a time stands as midnight.
+    return str(dive.get("start") or "–").replace("T", " ").removesuffix("+00:00").removesuffix(" 00:00:00")
 
 
 PAGE = FleetPage()

@@ -28,6 +28,7 @@ def recovery(
     *,
     target: float | None = None,
     share: str = "hidden effect named first",
+    among: Iterable[str] = (),
 ) -> Figure:
     """Draw the share of logs in which each effect was named first, a marker with its 95 % interval per size.
 
@@ -37,6 +38,7 @@ def recovery(
         found: {effect: {size: (logs in which it was named first, logs)}}.
         target: a share that is aimed at, drawn as an upright line.
         share: what is counted, for the axis.
+        among: all sizes of which these are some, so that one size looks the same in every figure.
 
     Raises:
         NoData: no log hides an effect.
@@ -46,6 +48,7 @@ def recovery(
     if not rows:
         raise NoData("no log hides an effect")
     sizes = sizes_of(rows)
+    looks = {size: look_of(size, k) for k, size in enumerate(in_order([*among, *sizes]))}
     if len(rows) > 1:
         total = {s: _sum(by[s] for by in rows.values() if s in by) for s in sizes}
         rows = {ALL: total, **rows}
@@ -60,7 +63,7 @@ def recovery(
         for k, size in enumerate(sizes):
             if size in by_size:
                 y = i + (k - (len(sizes) - 1) / 2) * step
-                handles[size] = _marker(ax, y, *by_size[size], look_of(size, k))
+                handles[size] = _marker(ax, y, *by_size[size], looks[size])
     if target is not None:
         line = ax.axvline(100 * target, color=style.BEFORE.color, ls=(0, (4, 2)), lw=1.1, zorder=1.5)
         handles[f"target: {100 * target:.0f} % of all"] = line

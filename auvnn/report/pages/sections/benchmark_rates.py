@@ -64,11 +64,11 @@ def target_words(view: View) -> list[str]:
     words = f"{count(len(aims) - len(missed))} of {plural(len(aims), 'target')} are met"
     if missed:
         which = [
-            f"{text(a, 'part')}: {_name(a)} {percent(a.get('share'))} (wanted {_wanted(a)})"
+            f"“{text(a, 'part')}”, {_name(a)}: {percent(a.get('share'))} (wanted {_wanted(a)})"
             for a in missed[:MOST_MISSED]
         ]
         more = len(missed) - len(which)
-        words += f". Missed: {'; '.join(which)}" + (f"; and {plural(more, 'other')}" if more else "")
+        words += f". Missed in {'; '.join(which)}" + (f"; and {plural(more, 'other')}" if more else "")
     return [f"{words}."]
 
 

@@ -31,16 +31,16 @@ def _confusion(rows: Sequence[Row]) -> Figure:
     return confusion(*outcomes.confusion_counts(rows), right=right)
 
 
-def _recovery(rows: Sequence[Row]) -> Figure:
-    return recovery(outcomes.found_by_size(rows), target=TARGET)
+def _recovery(rows: Sequence[Row], among: Sequence[str] = ()) -> Figure:
+    return recovery(outcomes.found_by_size(rows), target=TARGET, among=among)
 
 
-def _one_condition(i: int, condition: Sequence[str], rows: Sequence[Row]) -> Plot:
+def _one_condition(i: int, condition: Sequence[str], rows: Sequence[Row], among: Sequence[str]) -> Plot:
     vehicle, noise, excitation = condition
     return Plot(
         f"recovery_{i}",
         f"Named first: {vehicle}, noise {noise}, manoeuvre {excitation}",
-        functools.partial(_recovery, rows),
+        functools.partial(_recovery, rows, among),
         f"As the figure of this kind above, from the {plural(len(rows), 'log')} of one condition alone.",
         folded=True,
     )
