@@ -256,7 +256,7 @@ class Walk(Causes):
         ):
             if found["loses"][other]:
                 self.warnings.append(
-                    f"the model loses to {words} in {', '.join(found['loses'][other])} on {test.name}"
+                    f"in {', '.join(found['loses'][other])} the model is worse than {words} on {test.name}"
                 )
         if fall[-1] > fall[0]:
             self.warnings.append(
