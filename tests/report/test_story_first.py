@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from auvnn.report.pages.fleet import PAGE as FLEET
-from auvnn.report.pages.sections.adaptation_words import off_words, ratio_words
+from auvnn.report.pages.sections.adaptation_words import early_words, off_words, ratio_words
 from auvnn.report.pages.sections.diagnosis_words import MOST_ALIKE, in_question
 from auvnn.report.pages.study import PAGE as STUDY
 from auvnn.report.plots.error_against_horizon import error_against_horizon
@@ -75,8 +75,18 @@ def test_ours_is_said_once_and_wide_tables_are_turned():
     assert all(len(t.head) <= 8 for t in STUDY.tables(View(answer)))
 
 
+def test_a_change_at_the_very_beginning_can_be_a_model_that_never_fitted():
+    changes, history = [{"run": 0, "time": 102.0}], [{"run": 0, "t": [100.0, 100.05]}]
+    assert "auvnn diagnose" in early_words(changes, history)[0]
+    assert early_words([{"run": 0, "time": 130.0}], history) == [] and early_words([], history) == []
+    assert (
+        early_words([{"run": 1, "time": 102.0}], history) == [] and early_words(changes, [{"run": 0}]) == []
+    )
+
+
 def test_an_adaptation_that_saw_no_change_of_a_model_that_was_off_points_to_diagnose():
-    assert ratio_words(1.0) == "the error is the same as that of the model as it was"
+    assert ratio_words(1.0) == "the error is the same as that of the model without adaptation"
+    assert "8\N{NO-BREAK SPACE}% larger than" in ratio_words(1.08) and "2.5 times that of" in ratio_words(2.5)
     assert "smaller than" in ratio_words(0.7) and "larger" in ratio_words(1.3)
     steps = {"one_step_rmse_du_m_s2_adapted": 0.7, "one_step_rmse_du_m_s2_unadapted": 1.0}
     assert "auvnn diagnose" in off_words({"frozen_5_s_error_ratio": 1.0, **steps})[0]
