@@ -105,8 +105,8 @@ class DiagnosisPage(Page):
             Plot(
                 "ranking",
                 "The candidates",
-                lambda: ranking(candidates, missing),
-                lambda: _ranking_caption(candidates, missing),
+                lambda: ranking(candidates, missing, nearest=view.texts("nearest")),
+                lambda: _ranking_caption(candidates, missing, view.texts("nearest")),
             ),
             *(
                 [Plot("parameters", "What it would be", lambda: _parameters(chosen), common.INTERVALS)]

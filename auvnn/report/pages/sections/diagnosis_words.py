@@ -139,10 +139,23 @@ def _force_words(view: View) -> list[str]:
             f"{listing(nearest)} {'comes' if one else 'come'} nearest, and {'leaves' if one else 'leave'} too much of "
             "it to be the cause."
         )
+        out += _alone_words(_candidates(view), nearest)
     if axes:
         also = f", and shows in {listing(axes[1:])} too" if axes[1:] else ""
         out.append(f"What is left acts as a force in {axes[0]}{also}.")
     return out
+
+
+def _alone_words(candidates: list[Mapping[str, Any]], nearest: list[str]) -> list[str]:
+    """Say why what comes nearest is not what explains most alone, where these differ."""
+    tried = [c for c in candidates if not c.get("needs") and finite(c.get("explained")) is not None]
+    best = max(tried, key=lambda c: finite(c.get("explained")) or 0.0, default=None)
+    if best is None or str(best.get("effect")) in nearest:
+        return []
+    return [
+        f"Alone, {best.get('effect')} explains more ({percent(best.get('explained'))}); but shares of single effects "
+        f"overlap, and the search, which weighs fit against the number of parameters, chose {listing(nearest)}."
+    ]
 
 
 def _dependence_words(depends: Mapping[str, Any]) -> list[str]:
@@ -161,15 +174,19 @@ def _dependence_words(depends: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _ranking_caption(candidates: list[Mapping[str, Any]], missing: list[str]) -> str:
+def _ranking_caption(
+    candidates: list[Mapping[str, Any]], missing: list[str], nearest: list[str] | None = None
+) -> str:
     words = (
         "Left: share of the residual's energy above the noise that each effect explains. Right: how far the "
         "error falls on runs that were not fitted; left of zero the effect harms."
     )
     if missing:
-        words += " Hatched and bold, and first: what the verdict names; the others by what each explains by itself."
+        words += " Hatched and bold, and first: what the verdict names; the others by what each explains alone."
+    elif nearest:
+        words += " In italics, and first: what comes nearest; the others by what each explains alone."
     else:
-        words += " Ordered by what each explains by itself."
+        words += " Ordered by what each explains alone."
     if any(
         (finite(c.get("explained")) or 0.0) > 0.3 and (improvement(c)[0] or 0.0) < 0.05 for c in candidates
     ):
