@@ -46,7 +46,7 @@ class Similar(TypedDict):
 
 
 class Candidate(TypedDict):
-    """What a diagnosis says of one effect of the catalogue; None where the log or the fit says nothing."""
+    """What a diagnosis says about one effect of the catalogue; None where the log or the fit says nothing."""
 
     effect: str
     p_value: float | None

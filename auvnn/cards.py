@@ -24,7 +24,7 @@ _STYLE = {
 
 @dataclass(frozen=True)
 class Card:
-    """What an object says of itself.
+    """What an object says about itself.
 
     Args:
         title: what it is.
@@ -73,7 +73,7 @@ class Shown:
     """Gives a class its short `repr` and its card in a notebook: it says its `card`."""
 
     def card(self) -> Card:
-        """Return what the object says of itself."""
+        """Return what the object says about itself."""
         return Card(type(self).__name__)
 
     def __repr__(self) -> str:

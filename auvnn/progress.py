@@ -74,7 +74,7 @@ def each(items: Iterable[T], say: Callable[[str], Any] | None, words: Callable[[
     Args:
         items: what is worked through; it knows its length.
         say: to whom.
-        words: what to say of an item.
+        words: what to say about an item.
     """
     total = len(items) if isinstance(items, Sized) else 0
     for done, item in enumerate(items):

@@ -1,4 +1,4 @@
-"""What objects say of themselves: one short line, a small card that nothing in a log can break out of, a figure."""
+"""What objects say about themselves: one short line, a small card that nothing in a log can break out of, a figure."""
 
 from __future__ import annotations
 

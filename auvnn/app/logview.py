@@ -174,7 +174,7 @@ def findings(quality: Quality) -> list[dict[str, Any]]:
 
 
 # Places in time by a word of the finding that speaks of them.
-_WORDS = {"gap": "gaps in time", "restart": "the pose starts afresh"}
+_WORDS = {"gap": "gaps in time", "restart": "the pose starts again"}
 
 
 def _places(log: Log) -> dict[str, list[dict[str, Any]]]:

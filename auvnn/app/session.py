@@ -212,7 +212,7 @@ class Session(SessionState):
         with self.lock:
             self.refuse_busy()
             if len(self.history) < 2:
-                raise ConfigError("the model is as it was given: there is nothing to take back")
+                raise ConfigError("the model is as given: there is nothing to take back")
             self.taken_back.append(self.history.pop())
             self._model_changed()
 

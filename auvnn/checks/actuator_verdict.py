@@ -1,8 +1,8 @@
-"""What a regression on the actuators comes to: the likeliest assignment, which of it is known, and what to do about it.
+"""What a regression on the actuators gives: the likeliest assignment, which of it is known, and what to do about it.
 
 Thrusters that an allocation drives (eight by six commands) never move alone. Their columns are not estimable one by
 one, but the gain of each is wherever eight unknowns meet 36 measured numbers: what a reversed thruster i does to
-commanded forces, B (I - 2 e_i e_i') B^+ = I - 2 b_i (e_i' B^+), has a direction of its own. So nothing is asked about
+commanded forces, B (I - 2 e_i e_i') B^+ = I - 2 b_i (e_i' B^+), has a separate direction. So nothing is asked about
 which columns are independent; each gain's posterior standard deviation says whether the log speaks of it.
 """
 

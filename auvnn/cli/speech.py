@@ -82,7 +82,7 @@ class Speaker:
     def ticking(self, words: str) -> Iterator[None]:
         """Give signs of life while something runs that tells nothing for a while.
 
-        At a terminal the line with what is being done is drawn anew each second, time passing; redirected, it is said
+        At a terminal the line with what is being done is drawn again each second, time passing; redirected, it is said
         again now and then.
 
         Args:
@@ -139,7 +139,7 @@ class Speaker:
         done, total = getattr(words, "done", None), getattr(words, "total", None)
         if not isinstance(done, int) or not isinstance(total, int) or total < 1:
             return gone
-        # Fewer steps done than before, or fewer in all: this is other work, whose time is counted afresh.
+        # Fewer steps done than before, or fewer in all: this is other work, whose time is counted again.
         if self._count is None or total < self._count[0] or done < self._count[3]:
             self._count = (total, done, now, done, now)
         _, first, since, before, reached = self._count

@@ -1,4 +1,4 @@
-"""Predictions beside what was measured: as one trace of a run, and as a table."""
+"""Predictions and what was measured: as one trace of a run, and as a table."""
 
 from __future__ import annotations
 

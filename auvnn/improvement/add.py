@@ -58,7 +58,7 @@ def add(
         objective: "rollout" fits the error of free-running windows; "one_step" that of the acceleration one
             step ahead, which is better where lasting disturbances, not sensors, limit the prediction.
         horizons: of free running on the held-out data, s, "5" among them; fewer take less time.
-        progress: told in words what is being done.
+        progress: called with what is being done, in words.
 
     Raises:
         ConfigError: an unknown effect or objective, an effect that is there already, or one named twice.
@@ -99,7 +99,7 @@ def add(
 
 
 def _wanted(effects: str | Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the names to add, and what to say of the choice."""
+    """Return the names to add, and what to say about the choice."""
     if isinstance(effects, str):
         return [effects], []
     if isinstance(effects, OneOf) and len(effects) > 1:

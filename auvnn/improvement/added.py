@@ -18,7 +18,7 @@ class Improvement(Answer):
     Attributes:
         model: name of the model before.
         accepted: whether the held-out error fell by more than its own uncertainty, and each effect, added to the others,
-            brings a fall of its own that is beyond its own uncertainty.
+            lowers the error by more than the uncertainty of that fall.
         by_effect: effect to the fall of the held-out error that it adds to that of the others, everything else refitted,
             whether that is beyond its uncertainty, and what else to mind of it.
         baseline: what a plain regression and holding the initial velocity reach on the held-out data.

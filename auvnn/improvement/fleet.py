@@ -1,4 +1,4 @@
-"""The same effects over many dives: each dive is fitted by itself, and the values are held against one another."""
+"""The same effects over many dives: each dive is fitted separately, and the values are compared with one another."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def fleet(
     force: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Fleet:
-    """Fit the same effects to every dive by itself, and say whether their values change from dive to dive.
+    """Fit the same effects to every dive separately, and say whether their values change from dive to dive.
 
     Each file is a dive, with all its runs. The effects are fitted jointly with the coefficients that are uncertain, as
     `diagnose` does; a dive that cannot be fitted fails alone.
@@ -97,7 +97,7 @@ def fleet(
     Args:
         model: the model as known, or its name or path.
         logs: a folder, a pattern, a file or a list of these.
-        effects: names; those that the model has already are fitted anew on each dive.
+        effects: names; those that the model has already are fitted again on each dive.
         mapping: how the files' columns are named.
         window: length of the windows of free running, s.
         windows: at most so many of each dive, evenly spread: bounds time and memory.
@@ -105,7 +105,7 @@ def fleet(
         executor: who computes: `serial`, `processes`, `ray` or `dask`.
         address: of a Ray or Dask cluster that is running.
         force: fit dives that contradict themselves, or in which nothing moves or is driven, too.
-        progress: told in words what is being done.
+        progress: called with what is being done, in words.
 
     Raises:
         ConfigError: an unknown effect, or none.
@@ -176,7 +176,7 @@ def _together(model: GreyBox, names: list[str], dives: list[Dive], failed: list[
         row["words"] = _words(row, dated)
     warnings = []
     if not dated:
-        warnings.append("not every dive has a date of its own: they are taken in the order of their names")
+        warnings.append("not every dive has a separate date: they are taken in the order of their names")
     poor = [d["file"] for d in dives if d["verdict"] != "adequate"]
     if poor:
         warnings.append(

@@ -1,4 +1,4 @@
-"""The model: known physics, six damping subnetworks beside it, and a list of effects, as one `nn.Module`."""
+"""The model: known physics, six damping subnetworks, and a list of effects, as one `nn.Module`."""
 
 from __future__ import annotations
 

@@ -154,7 +154,7 @@ def adapt(
             f"the model had no damping subnetworks: {form} ones were added, giving nothing at first"
         )
     if not counts.adapted:
-        warnings.append("nothing was learned: no sample passed the guards; the model is as it was")
+        warnings.append("nothing was learned: no sample passed the guards; the model is unchanged")
     return Adaptation(
         model.vehicle.name,
         log.name,

@@ -33,7 +33,7 @@ from auvnn.threads import on_one_thread
 
 Array = NDArray[np.float64]
 
-# Every kind of random number has a stream of its own: another noise must not change the manoeuvre.
+# Every kind of random number has a separate stream: another noise must not change the manoeuvre.
 STREAMS = ("excitation", "noise", "hidden", "voltage", "added_mass", "linear_damping", "quadratic_damping",
            "inertia", "altitude", "law", "force", "sensing")  # fmt: skip
 

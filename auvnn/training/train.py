@@ -103,7 +103,7 @@ def train(
     force: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Training:
-    """Train damping subnetworks beside what a model states.
+    """Train damping subnetworks in addition to what a model states.
 
     Subnetworks that the model has already are replaced. A part of the log decides when to stop; the test log
     decides nothing and is only judged on.

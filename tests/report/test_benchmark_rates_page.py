@@ -1,4 +1,4 @@
-"""What the page of the benchmark says of a plan: targets, rates, p-values where nothing is hidden, held-out falls."""
+"""What the page of the benchmark says about a plan: targets, rates, p-values where nothing is hidden, held-out falls."""
 
 from __future__ import annotations
 

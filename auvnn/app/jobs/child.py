@@ -16,14 +16,14 @@ from auvnn.errors import AuvnnError
 
 
 class Child:
-    """A worker process that is started when it is first needed, and started anew after a stop.
+    """A worker process that is started when it is first needed, and started again after a stop.
 
-    Orders and reports are lines of JSON. The process ends by itself when its standard input closes, so that nothing
+    Orders and reports are lines of JSON. The process ends when its standard input closes, so that nothing
     goes on working for a server that was killed.
 
     Args:
         folder: for what the process says to nobody (`worker.log`).
-        hear: called with each report, from a thread of its own.
+        hear: called with each report, from a separate thread.
     """
 
     def __init__(self, folder: Path, hear: Callable[[dict[str, Any]], None]) -> None:

@@ -1,4 +1,4 @@
-"""What the child process can do: the same Python calls as the commands, each answer in a folder of its own."""
+"""What the child process can do: the same Python calls as the commands, each answer in a separate folder."""
 
 from __future__ import annotations
 

@@ -62,14 +62,14 @@ def promises(
     names: Sequence[str],
     say: Callable[[str], None],
 ) -> list[Promise]:
-    """Return what each of several effects promises beside a state, best first.
+    """Return what each of several effects promises in addition to a state, best first.
 
-    Each is linearised where its fit would begin, everything else free beside it; a fold is predicted by the others.
+    Each is linearised where its fit would begin, everything else free with it; a fold is predicted by the others.
 
     Args:
         base: the model as given.
         judge: folds and windows of the log.
-        state: beside which the effects are asked for.
+        state: to which the effects would be added.
         names: of the effects.
         say: told in words what is being done.
     """

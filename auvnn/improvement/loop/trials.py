@@ -71,8 +71,8 @@ class Trials:
         self.warnings: list[str] = [*model.vehicle.warnings, *log.quality().reservations]
         self.diagnoses: list[dict[str, Any]] = []
         self.adequate = False
-        self.stopped = "nothing more pays on what was left out"
-        # The fit that others begin from: the refitted coefficients, whether they paid by themselves or not.
+        self.stopped = "nothing more improves the prediction of what was left out"
+        # The fit that others begin from: the refitted coefficients, whether they improved the model alone or not.
         self.ground: State | None = None
 
     def told(self, words: str) -> None:

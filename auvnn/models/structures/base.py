@@ -28,7 +28,7 @@ class Structure(GreyBox):
 
     Args:
         vehicle: what is known.
-        effects: named effects beside it, in order of action.
+        effects: named effects in addition to it, in order of action.
         actuation: "thrusters" or "wrench".
     """
 

@@ -30,10 +30,10 @@ class NumpyPlant(Plant):
     name = "numpy"
 
     def refuses(self, effect: str) -> str:
-        """Return why it cannot hold an effect: it has no equations of its own for it."""
+        """Return why it cannot hold an effect: it has no equations for it."""
         if effect in SUPPORTED or effect.startswith("stranger_"):
             return ""
-        return "it has no equations of its own for it; use plant=own"
+        return "it has no equations for it; use plant=own"
 
     def move(self, task: PlantTask, look: Look) -> Motion:
         """Run the equations."""

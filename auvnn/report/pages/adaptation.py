@@ -68,7 +68,7 @@ class AdaptationPage(Page):
                 "prediction_error",
                 "Prediction error of the acceleration, with and without adaptation",
                 lambda: _one_step(view),
-                "Before each sample is learned from. Following every residual makes this small by itself: the next "
+                "Before each sample is learned from. Following every residual alone makes this small: the next "
                 f"figure shows what was learned of the vehicle. {MARKS}",
             ),
             Plot(

@@ -98,7 +98,7 @@ def rollout_table(rollout: Mapping[str, Any]) -> HtmlTable:
 
 
 def baseline_words(view: View) -> list[str]:
-    """Return where the model stands beside a plain regression and persistence, in one or two sentences."""
+    """Return how the model compares with a plain regression and persistence, in one or two sentences."""
     line = view.mapping("baseline")
     loses = line.get("loses") or {}
     if finite(line.get("total")) is None:

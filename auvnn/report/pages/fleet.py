@@ -60,7 +60,7 @@ class FleetPage(Page):
                 "over_dives",
                 "Parameters over the dives",
                 lambda: over_dives(dives, rows, view.text("along"), since),
-                "Each dive fitted by itself. Hollow: something is left that these effects do not explain, and the value "
+                "Each dive fitted separately. Hollow: something is left that these effects do not explain, and the value "
                 f"may stand in for it.{more}",
             )
         ]
@@ -97,7 +97,7 @@ class FleetPage(Page):
             ])  # fmt: skip
         failed = [[_file(f), str(f.get("words"))] for f in view.items("failed") if isinstance(f, Mapping)]
         return [
-            HtmlTable("Does it change?", head, rows, "Mean and slope ± one standard deviation; p of each test by itself, "
+            HtmlTable("Does it change?", head, rows, "Mean and slope ± one standard deviation; p of each test alone, "
                   "and “changes” where one of them holds among all parameters (5 %, Bonferroni).", words=3),
             HtmlTable("Values of each dive", ["dive", "start", "effect", "parameter", "value", "verdict"], values,
                   words=4),

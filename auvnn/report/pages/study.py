@@ -207,9 +207,9 @@ def _way(name: str) -> str:
 
 
 def _beside(ratio: float | None) -> str:
-    """Return how an error stands beside another one."""
+    """Return how an error compares with another one."""
     if ratio is None:
-        return "not known beside"
+        return "not known against"
     if abs(ratio - 1.0) <= 0.02:
         return "the same as"
     if ratio < 1.0:

@@ -27,7 +27,7 @@ def coverage(z: ArrayLike) -> Figure:
 
     Left: density, with the share of 95 % intervals that hold the true value. Right: each error against the
     value expected at its rank, with the band in which 95 % of the points of true standard errors lie, each
-    point by itself (the k-th of n uniform variables has a beta distribution with k and n + 1 - k).
+    point alone (the k-th of n uniform variables has a beta distribution with k and n + 1 - k).
 
     Args:
         z: (estimate - true value) / standard error, any shape, NaN where unknown.

@@ -1,4 +1,4 @@
-"""How much of the fall of the held-out error that the truth gives is had with what was found."""
+"""How much of the fall of the held-out error that the truth gives is reached with what was found."""
 
 from __future__ import annotations
 

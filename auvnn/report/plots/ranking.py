@@ -25,7 +25,7 @@ def ranking(
 ) -> Figure:
     """Draw the candidates: explained share, which orders them after what was chosen, and the fall of the error left out.
 
-    What was chosen is hatched and bold, what comes nearest in italics; what cannot be told apart is bracketed on the right.
+    What was chosen is hatched and bold, what comes nearest in italics; what cannot be told apart is in brackets.
 
     Args:
         candidates: best first, {effect, p_value, explained (share of one), cv_before, cv_after, cv_std

@@ -25,7 +25,7 @@ def uniformity(p_values: Mapping[str, Sequence[float]]) -> Figure:
     """Draw the p-values of each test against those expected at their ranks, and how many are below 0.05.
 
     Left: one thin line for each effect's test, with the band in which 95 % of the points of uniform p-values lie,
-    each point by itself. A line below the band is a test that rejects too often; above it, one that rejects too
+    each point alone. A line below the band is a test that rejects too often; above it, one that rejects too
     rarely. Right: the share of each effect's p-values that is below 0.05, with Wilson's 95 % interval.
 
     Args:

@@ -44,7 +44,7 @@ export class MissingScreen {
   draw(state, done) {
     const answer = this.answer, missing = answer.missing || [];
     const [tone, words] = VERDICTS[answer.verdict] || ["warn", answer.verdict];
-    // Of a partial verdict nothing is named as the cause; what predicts a part stands first all the same.
+    // Of a partial verdict nothing is named as the cause; what predicts a part stands first anyway.
     const named = missing.length ? missing : answer.verdict === "partial" ? answer.nearest || [] : [];
     const candidates = [...answer.candidates].sort((a, b) => rank(a, named) - rank(b, named));
     const judged = candidates.filter((c) => !c.needs.length), others = candidates.filter((c) => c.needs.length);

@@ -34,7 +34,7 @@ _HOLD_STEPS = 10.0
 
 @dataclass(frozen=True)
 class Series:
-    """What one topic says of some canonical columns.
+    """What one topic says about some canonical columns.
 
     Args:
         names: canonical columns.

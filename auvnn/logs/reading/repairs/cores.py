@@ -1,4 +1,4 @@
-"""Estimators that run as several cores of which one is in use: its values are taken, and a switch starts afresh."""
+"""Estimators that run as several cores of which one is in use: its values are taken, and a switch starts again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the page of `benchmark` says of rates and targets: part by part, and effect by effect."""
+"""What the page of `benchmark` says about rates and targets: part by part, and effect by effect."""
 
 from __future__ import annotations
 

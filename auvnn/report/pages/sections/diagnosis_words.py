@@ -33,7 +33,7 @@ def _channels(view: View) -> list[str]:
 
 
 def _whole_log(view: View) -> list[HtmlTable]:
-    """Return what all of a long log says, beside the sample on which the search ran."""
+    """Return what all of a long log says, compared with the sample on which the search ran."""
     whole = view.mapping("whole_log")
     if not whole:
         return []
@@ -80,7 +80,7 @@ def _first_sentence(verdict: str, missing: list[str]) -> str:
 
 
 def _further(view: View, missing: list[str]) -> list[str]:
-    """Return what was named beside an ambiguous group, and not withdrawn again."""
+    """Return what was named in addition to an ambiguous group, and not withdrawn again."""
     if view.text("verdict") != "ambiguous":
         return []
     steps = view.items("steps")
@@ -182,7 +182,9 @@ def _ranking_caption(
         "error falls on runs that were not fitted; left of zero the effect harms."
     )
     if missing:
-        words += " Hatched and bold, and first: what the verdict names; the others by what each explains alone."
+        words += (
+            " Hatched and bold, and first: what the verdict names; the others by what each explains alone."
+        )
     elif nearest:
         words += " In italics, and first: what comes nearest; the others by what each explains alone."
     else:

@@ -162,7 +162,7 @@ def by_part(rows: Sequence[Row]) -> list[PartRate]:
 
 
 def judged(rows: Sequence[Row], aims: Iterable[Mapping[str, Any]]) -> list[TargetEntry]:
-    """Return what was aimed at beside what came out, and whether it was met; None where nothing was counted.
+    """Return what was aimed at and what came out, and whether it was met; None where nothing was counted.
 
     Args:
         rows: all rows.
