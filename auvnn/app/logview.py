@@ -154,7 +154,7 @@ def traces(
 
 
 def findings(quality: Quality) -> list[dict[str, Any]]:
-    """Return the findings with the places in time that they speak of, and buttons for their cures."""
+    """Return the findings with the places in time that they concern, and buttons for their cures."""
     log = quality.log
     places = _places(log)
     found = []
@@ -173,7 +173,7 @@ def findings(quality: Quality) -> list[dict[str, Any]]:
     return found
 
 
-# Places in time by a word of the finding that speaks of them.
+# Places in time by a word of the finding that concerns them.
 _WORDS = {"gap": "gaps in time", "restart": "the pose starts again"}
 
 

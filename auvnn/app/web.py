@@ -34,7 +34,7 @@ class Pages:
     """Answers of the page's addresses.
 
     Args:
-        session: what they speak of.
+        session: what they belong to.
     """
 
     def __init__(self, session: Session) -> None:

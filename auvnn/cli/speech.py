@@ -15,7 +15,7 @@ from auvnn.errors import one_line
 
 # Seconds between two lines of progress where nobody sits at a terminal.
 NOW_AND_THEN = 30.0
-# Seconds of silence after which a person at a terminal is told that work goes on, and between two such signs.
+# Seconds of silence after which a person at a terminal is informed that work goes on, and between two such signs.
 SILENT, SIGN = 2.0, 1.0
 
 

@@ -109,7 +109,7 @@ def fit(
         initial: initial states to start from; the measured ones by default.
         sigma: (18,) fixed weights, by default estimated.
         iterations: at most this many steps.
-        progress: told in words after each step.
+        progress: called with the state of the work, in words after each step.
 
     Raises:
         FitError: at the values to start from, free running leaves what is finite. A step that does so is not taken.

@@ -19,7 +19,7 @@ from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.one_step import one_step, scores
 from auvnn.metrics.rollouts import Rolled, Scale, roll, rollout_table, scale_of
 
-# Pairs of parameters that the log cannot tell apart: their correlation, and how many are told.
+# Pairs of parameters that the log cannot tell apart: their correlation, and how many are reported.
 ALIKE, TOLD = 0.99, 5
 
 

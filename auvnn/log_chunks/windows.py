@@ -36,7 +36,7 @@ def plan_files(
     Args:
         paths: of the files.
         cut: how windows are cut.
-        say: told in words what is being done.
+        say: called with what is being done, in words.
 
     Raises:
         InputError: a file cannot be read, or none has a window.

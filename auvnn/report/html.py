@@ -153,7 +153,7 @@ def figure_markup(figure: Figure, prefix: str, alt: str, drawing: str | None = N
     Args:
         figure: what to show.
         prefix: unique on the page; every id in the SVG begins with it.
-        alt: what a reader who does not see it is told.
+        alt: the description for readers who do not see it.
         drawing: the figure as SVG, where that has been made already.
     """
     from markupsafe import Markup

@@ -40,7 +40,7 @@ class Tasks:
 
         Args:
             order: `kind`, `log` (files, mapping, max_duration, test), `model`, `out`, and what the kind takes.
-            say: told in words what is being done.
+            say: called with what is being done, in words.
 
         Raises:
             AuvnnError: what the user gave cannot be used.
@@ -75,7 +75,7 @@ class Tasks:
                 try:
                     answer.report(path)
                 except Exception as error:
-                    # The answer is whole without it; whoever saves is told.
+                    # The answer is whole without it; whoever saves is informed.
                     traceback.print_exc()
                     problem = f"{type(error).__name__}: {one_line(error, 200)}"
                 yield str(path.parent), problem

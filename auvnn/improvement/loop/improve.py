@@ -62,7 +62,7 @@ def improve(
         derivative: how accelerations are obtained where they were not measured.
         force: go on with a log that contradicts itself: signs, units, axes.
         progress: called with what is being done, in words.
-        tell: told the story, sentence by sentence, as it happens.
+        tell: called with each sentence of the story as it happens.
 
     Raises:
         ConfigError: an unknown effect, or unknown kind of what may be learned.

@@ -39,7 +39,7 @@ def ranking(
     """
     first = [*chosen, *(n for n in nearest if n not in chosen)]
     tried = [c for c in candidates if not c.get("needs")]
-    # What the verdict speaks of is drawn, however the others rank.
+    # What the verdict names is drawn, however the others rank.
     tried.sort(key=lambda c: str(c.get("effect", "?")) not in first)
     shown = tried[:most] + [c for c in candidates if c.get("needs")][: max(0, min(4, most - len(tried)))]
     if not tried:

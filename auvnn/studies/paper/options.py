@@ -1,4 +1,4 @@
-"""Options of a case study: read, checked, cut down for a smoke run, and told as assumptions of ours."""
+"""Options of a case study: read, checked, cut down for a smoke run, and reported as our assumptions."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ class Series:
 
 
 def is_command(name: str) -> bool:
-    """Say whether a canonical column is what the vehicle was told."""
+    """Say whether a canonical column is a command."""
     return name.startswith(("thruster_", "fin_")) or name in WRENCH
 
 
