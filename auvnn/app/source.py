@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from auvnn.app.jobs.messages import LogOrder
 from auvnn.app.logview import columns, findings, guesses, overview, raw_columns, traces
 from auvnn.app.traces import POINTS
 from auvnn.errors import AuvnnError, one_line
@@ -83,7 +84,7 @@ class Source:
         }
         self.findings = findings(quality)
 
-    def order(self) -> dict[str, Any]:
+    def order(self) -> LogOrder:
         """Return what the child process needs to read the same."""
         return {
             "files": [str(p) for p in self.files],

@@ -6,7 +6,7 @@ import numpy as np
 
 from auvnn.report.pages.fleet import PAGE as FLEET
 from auvnn.report.pages.sections.adaptation_words import early_words, off_words, ratio_words
-from auvnn.report.pages.sections.diagnosis_words import MOST_ALIKE, in_question
+from auvnn.report.pages.sections.diagnosis_words import MOST_ALIKE, _ranking_caption, in_question
 from auvnn.report.pages.study import PAGE as STUDY
 from auvnn.report.plots.error_against_horizon import error_against_horizon
 from auvnn.report.plots.free_running import free_running
@@ -91,3 +91,20 @@ def test_an_adaptation_that_saw_no_change_of_a_model_that_was_off_points_to_diag
     steps = {"one_step_rmse_du_m_s2_adapted": 0.7, "one_step_rmse_du_m_s2_unadapted": 1.0}
     assert "auvnn diagnose" in off_words({"frozen_5_s_error_ratio": 1.0, **steps})[0]
     assert off_words({"frozen_5_s_error_ratio": 0.99}) == []
+
+
+def test_what_comes_nearest_stands_first_and_a_larger_share_of_another_is_explained():
+    rows = [{"effect": name, "explained": share, "p_value": 0.01} for name, share in
+            (("added_mass", 1.0), ("payload", 0.5), ("cg_offset", 0.1), ("tilted_vertical", 0.01))]  # fmt: skip
+    nearest = ["cg_offset", "tilted_vertical"]
+    ax = ranking(rows, nearest=nearest).axes[0]
+    ticks = ax.get_yticklabels()
+    assert [t.get_text() for t in ticks] == [*nearest, "added_mass", "payload"]
+    assert [t.get_fontstyle() for t in ticks] == ["italic"] * 2 + ["normal"] * 2
+    said = _ranking_caption(rows, [], nearest)
+    assert (
+        "In italics, and first: what comes nearest" in said and "Alone, added_mass explains more (100" in said
+    )
+    assert "Alone," not in _ranking_caption(rows, [], ["added_mass"]) and "italics" not in _ranking_caption(
+        rows, []
+    )

@@ -10,8 +10,8 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
+from auvnn.app.jobs.messages import Order, Report
 from auvnn.errors import AuvnnError
 
 
@@ -26,7 +26,7 @@ class Child:
         hear: called with each report, from a separate thread.
     """
 
-    def __init__(self, folder: Path, hear: Callable[[dict[str, Any]], None]) -> None:
+    def __init__(self, folder: Path, hear: Callable[[Report], None]) -> None:
         self.folder = folder
         self.hear = hear
         self._lock = threading.Lock()
@@ -39,7 +39,7 @@ class Child:
             if not self._closed:
                 self._started()
 
-    def order(self, order: dict[str, Any]) -> None:
+    def order(self, order: Order) -> None:
         """Send an order.
 
         Raises:

@@ -11,6 +11,7 @@ import threading
 import warnings
 from typing import Any
 
+from auvnn.app.jobs.messages import Order
 from auvnn.errors import AuvnnError, one_line
 
 
@@ -26,7 +27,7 @@ def main() -> None:
             channel.write(json.dumps(words, allow_nan=False) + "\n")
             channel.flush()
 
-    orders: queue.Queue[dict[str, Any]] = queue.Queue()
+    orders: queue.Queue[Order] = queue.Queue()
 
     begun, skipped, turn = 0, set[int](), threading.Lock()
 

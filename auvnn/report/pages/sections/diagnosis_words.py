@@ -139,23 +139,22 @@ def _force_words(view: View) -> list[str]:
             f"{listing(nearest)} {'comes' if one else 'come'} nearest, and {'leaves' if one else 'leave'} too much of "
             "it to be the cause."
         )
-        out += _alone_words(_candidates(view), nearest)
     if axes:
         also = f", and shows in {listing(axes[1:])} too" if axes[1:] else ""
         out.append(f"What is left acts as a force in {axes[0]}{also}.")
     return out
 
 
-def _alone_words(candidates: list[Mapping[str, Any]], nearest: list[str]) -> list[str]:
+def _alone_words(candidates: list[Mapping[str, Any]], nearest: list[str]) -> str:
     """Say why what comes nearest is not what explains most alone, where these differ."""
     tried = [c for c in candidates if not c.get("needs") and finite(c.get("explained")) is not None]
     best = max(tried, key=lambda c: finite(c.get("explained")) or 0.0, default=None)
     if best is None or str(best.get("effect")) in nearest:
-        return []
-    return [
-        f"Alone, {best.get('effect')} explains more ({percent(best.get('explained'))}); but shares of single effects "
-        f"overlap, and the search, which weighs fit against the number of parameters, chose {listing(nearest)}."
-    ]
+        return ""
+    return (
+        f" Alone, {best.get('effect')} explains more ({percent(best.get('explained'))}); but shares of single effects "
+        "overlap, and the search, which weighs fit against the number of parameters, chose those in italics."
+    )
 
 
 def _dependence_words(depends: Mapping[str, Any]) -> list[str]:
@@ -187,6 +186,7 @@ def _ranking_caption(
         )
     elif nearest:
         words += " In italics, and first: what comes nearest; the others by what each explains alone."
+        words += _alone_words(candidates, nearest)
     else:
         words += " Ordered by what each explains alone."
     if any(
