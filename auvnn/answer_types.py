@@ -240,3 +240,15 @@ class FrozenErrors(TypedDict):
     adapted: list[list[float]]
     unadapted: list[list[float]]
     diverged: NotRequired[list[int]]
+
+
+class WaterfallStep(TypedDict):
+    """The held-out error after a step, the last one that of noise alone; `kind` and `left_out` in the whole loop only.
+
+    `left_out` is the step's error on what was left out of the log that was fitted; None where it was not judged so.
+    """
+
+    step: str
+    error: float
+    kind: NotRequired[str]
+    left_out: NotRequired[float | None]

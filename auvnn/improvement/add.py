@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from auvnn.answer_types import WaterfallStep
 from auvnn.catalogue import unknown_name
 from auvnn.comparison.baseline import compare_with_baseline
 from auvnn.comparison.compare import floor_of
@@ -125,7 +126,9 @@ def _assembled(
     """Return the answer."""
     layout, best, last, key = fits.layout, fits.best, names[-1], judged.key
     results, rolled = judged.results, judged.rolled
-    waterfall = [{"step": s, "error": results[s]["rollout"][key]["total"]} for s, _ in fits.steps]
+    waterfall: list[WaterfallStep] = [
+        {"step": s, "error": results[s]["rollout"][key]["total"]} for s, _ in fits.steps
+    ]
     for horizon, free in rolled[last].items():
         results[last]["rollout"][horizon]["noise_floor"] = floor_of(fits.final, free, test, judged.scale)
     waterfall.append(

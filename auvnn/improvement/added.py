@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from auvnn.answer_types import ByEffect, OwnFall
+from auvnn.answer_types import ByEffect, OwnFall, WaterfallStep
 from auvnn.answers import PLOTTED, Answer, plain
 from auvnn.cards import PARAMETER_HEAD, Card, figure, parameter_rows
+from auvnn.comparison.predictions import RefittedTraces
 from auvnn.models import GreyBox
 
 
@@ -40,14 +41,14 @@ class Improvement(Answer):
     refitted: dict[str, Any]
     after: dict[str, Any]
     gain: dict[str, float]
-    waterfall: list[dict[str, Any]]
+    waterfall: list[WaterfallStep]
     parameters: ByEffect
     coefficients: ByEffect
     held_out: str
     model: GreyBox
     refitted_model: GreyBox
     warnings: list[str] = field(default_factory=list)
-    series: list[dict[str, Any]] = field(default_factory=list)
+    series: list[RefittedTraces] = field(default_factory=list)
     objective: str = "rollout"
     left_out: dict[str, float] | None = None
     steps: list[dict[str, Any]] = field(default_factory=list)
