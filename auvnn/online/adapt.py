@@ -88,7 +88,7 @@ def adapt(
         guards: "full", "none", or numbers by name.
         damping: form of the subnetworks for a model that has none.
         state: folder for the adapter's state at the end, from which `Adapter.restore` goes on.
-        progress: called with the state of the work, in words after each run.
+        progress: called with the state of the work, in words, after each run.
 
     Raises:
         ConfigError: an unknown scheme, guard or option.

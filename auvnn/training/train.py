@@ -121,7 +121,7 @@ def train(
         checkpoint: folder of checkpoints, from which `resume` goes on, bit for bit.
         resume: go on from the newest checkpoint; "force" even where data or options have changed.
         force: go on with a log that contradicts itself: signs, units, axes.
-        progress: called with the state of the work, in words every few iterations.
+        progress: called with the state of the work, in words, every few iterations.
 
     Raises:
         ConfigError: an unknown scheme, form or option.
