@@ -16,10 +16,10 @@ class ThrustAsymmetry(Effect):
     """One asymmetry per thruster: T_i <- T_i (1 + a_i sign(T_i)). With a commanded wrench, one per axis.
 
     The thrust ahead is 1 + a times, the one astern 1 - a times the stated one: their mean gain stays, which is
-    `thruster_gain`. A thruster that works in both directions leaves a mean force where a is not zero, which a constant
-    force imitates as long as it works equally hard. Propellers and ducts are made for one direction: of one type of thruster
-    the curve astern reaches about 80 % of that ahead. Reference: Blue Robotics (2019), T200 data; Carlton (2012), Marine
-    Propellers and Propulsion, chapter 6 (four quadrants).
+    `thruster_gain`. A thruster that works in both directions leaves a mean force where a is not zero, which a
+    constant force imitates as long as it works equally hard. Propellers and ducts are made for one direction: of one
+    type of thruster the curve astern reaches about 80 % of that ahead. Reference: Blue Robotics (2019), T200 data;
+    Carlton (2012), Marine Propellers and Propulsion, chapter 6 (four quadrants).
     """
 
     name = "thrust_asymmetry"
