@@ -46,7 +46,7 @@ export class MissingScreen {
     const [tone, words] = VERDICTS[answer.verdict] || ["warn", answer.verdict];
     // Of a partial verdict nothing is named as the cause; what predicts a part stands first anyway.
     const named = missing.length ? missing : answer.verdict === "partial" ? answer.nearest || [] : [];
-    const candidates = [...answer.candidates].sort((a, b) => rank(a, named) - rank(b, named));
+    const candidates = bestFirst(answer.candidates, [...named, ...(answer.nearest || [])]);
     const judged = candidates.filter((c) => !c.needs.length), others = candidates.filter((c) => c.needs.length);
     const first = judged.slice(0, Math.max(6, named.length)), rest = judged.slice(first.length);
     show(this.element,
@@ -152,7 +152,11 @@ export class MissingScreen {
   close() {}
 }
 
-function rank(candidate, named) { const at = named.indexOf(candidate.effect); return at >= 0 ? at - 1000 : 0; }
+// As the report ranks them: what the verdict names, then what comes nearest, then by what each explains alone.
+export function bestFirst(candidates, named) {
+  const place = (c) => { const at = named.indexOf(c.effect); return at >= 0 ? at - 1000 : -(Number.isFinite(c.explained) ? c.explained : -1); };
+  return [...candidates].sort((a, b) => place(a) - place(b));
+}
 
 function capital(text) { return text.slice(0, 1).toUpperCase() + text.slice(1); }
 

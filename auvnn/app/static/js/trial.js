@@ -3,7 +3,7 @@
 import { attempt, complain, get, post } from "./api.js";
 import { waterfall } from "./charts.js";
 import { card, choice, DOF, duration, h, measured, number, percent, show } from "./dom.js";
-import { parameters } from "./missing.js";
+import { bestFirst, parameters } from "./missing.js";
 import { Group, key } from "./plot.js";
 
 export class TryScreen {
@@ -80,7 +80,7 @@ export class TryScreen {
 
   toggles() {
     const first = this.entries.filter((e) => e.on || e.effect.present || (this.diagnosis && (this.diagnosis.missing || []).includes(e.effect.name)));
-    const likely = this.diagnosis ? this.diagnosis.candidates.filter((c) => !c.needs.length && !first.some((e) => e.effect.name === c.effect)).slice(0, 4).map((c) => this.entries.find((e) => e.effect.name === c.effect)).filter(Boolean) : [];
+    const likely = this.diagnosis ? bestFirst(this.diagnosis.candidates, this.diagnosis.nearest || []).filter((c) => !c.needs.length && !first.some((e) => e.effect.name === c.effect)).slice(0, 4).map((c) => this.entries.find((e) => e.effect.name === c.effect)).filter(Boolean) : [];
     const top = [...first, ...likely], others = this.entries.filter((e) => !top.includes(e));
     const opened = this.list.querySelector("details[open]") !== null;
     show(this.list, top.map((e) => this.entry(e)),
