@@ -1,4 +1,4 @@
-"""Graphs of scalar operations as C99: straight-line functions without memory of their own."""
+"""Graphs of scalar operations as C99: straight-line functions without memory."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class Judged:
         key: the horizon of the gain, s.
         scale: what errors are measured by.
         gain: fall of the total from the refitted model to the one with all effects, and its standard error.
-        by_effect: effect to the same of its own, in addition to the others.
+        by_effect: effect to the same for it alone, in addition to the others.
     """
 
     results: dict[str, dict[str, Any]]

@@ -207,7 +207,7 @@ def simulate(
         known = replace(
             task, effects={str(e.name): e.values() for e in bare.members}, strangers={}, model=bare
         )
-        # A controller keeps a memory, so the trial is flown by one of its own.
+        # A controller keeps a memory, so the trial is flown by another one.
         own = manner.plan(model, t, [_generator(seed, "excitation", i) for i in range(runs)])
         forces = [_generator(seed, "force", i) for i in range(runs)]
         known, wandering = disturbed(

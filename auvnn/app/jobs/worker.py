@@ -17,7 +17,7 @@ from auvnn.errors import AuvnnError, one_line
 
 def main() -> None:
     """Take orders until standard input closes."""
-    # Reports have a channel of their own: what a library prints must not get between them.
+    # Reports have a separate channel: what a library prints must not get between them.
     channel = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     lock = threading.Lock()

@@ -62,7 +62,7 @@ def _disagreeing(agreement: dict[str, Agreement]) -> list[Finding]:
             elif abs(correlation) < LOOSE:
                 words = f"{name} correlates with it by {correlation:.2f} (other runs: {pooled:.2f})"
                 bad.setdefault(number, []).append(words)
-    cure = "look at this run by itself; leave it out, or correct its clock, headings or signs"
+    cure = "look at this run alone; leave it out, or correct its clock, headings or signs"
     return [
         Finding(
             "warning",

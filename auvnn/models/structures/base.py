@@ -1,4 +1,4 @@
-"""What the structures have in common: the vehicle without its damping, and a grey box with learned parts of its own."""
+"""What the structures have in common: the vehicle without its damping, and a grey box with further learned parts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The plant `numpy`: equations of its own in vectors, integrated by scipy between commands."""
+"""The plant `numpy`: separate equations in vectors, integrated by scipy between commands."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ Array = np.ndarray
 # Seeds of what is held out, far from those of what is fitted.
 HELD_OUT_SEED = 100_000
 HELD_OUT = ("multisine", "manoeuvre")
-# Structures under a name of their own: with options that make them something else.
+# Structures under another name: with options that make them something else.
 VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
     "one_network": ("damping", {"networks": "one"}),
     "separate_all": ("separate", {"inertia": "learned", "damping": "learned", "restoring": "learned"}),

@@ -1,4 +1,4 @@
-"""Counting in worlds that break the model's assumptions: what was visible, what is true by itself, what counts as wrong.
+"""Counting in worlds that break the model's assumptions: what was visible, what is true anyway, what counts as wrong.
 
 A hidden effect is *visible* where an oracle that knows the world's law sees it at five standard errors or more and it
 costs a tenth of the 5 s error or more. Names that are true in a world itself count neither as hits nor as errors.
