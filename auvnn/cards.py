@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -122,6 +121,8 @@ def parameter_rows(fitted: Any) -> list[list[str]]:
 
 
 def _safe(text: Any) -> str:
+    import html  # for cards alone: every command imports this file
+
     # A file name that is not UTF-8 stands in Python's strings as lone surrogates, which no page can hold.
     return html.escape(str(text).encode("utf-8", "replace").decode("utf-8"))
 
