@@ -78,7 +78,7 @@ def diagnose(
             share of the actuators', or a mapping with `cost` and `force`; by default 0.1 and 0.02. At 0 everything
             matters that is there.
         costs: also work out what each name costs in free running, which takes about as long as naming it.
-        progress: told in words what is being done.
+        progress: called with what is being done, in words.
 
     Raises:
         ConfigError: an unknown effect.
@@ -139,7 +139,7 @@ def searched(
         force: go on with a log that contradicts itself: signs, units, axes.
         tolerance: what counts as small: a `Tolerance`, its options, or None.
         costs: say what each name costs in free running.
-        progress: told in words what is being done.
+        progress: called with what is being done, in words.
     """
     say = Counted(progress, 8 + 4 * bool(costs) + bool(whiteness) + 3 * bool(advice), rough=True)
     if max_effects < 1:

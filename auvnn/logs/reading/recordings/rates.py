@@ -34,7 +34,7 @@ _HOLD_STEPS = 10.0
 
 @dataclass(frozen=True)
 class Series:
-    """What one topic says of some canonical columns.
+    """What one topic says about some canonical columns.
 
     Args:
         names: canonical columns.
@@ -84,7 +84,7 @@ class Series:
 
 
 def is_command(name: str) -> bool:
-    """Say whether a canonical column is what the vehicle was told."""
+    """Say whether a canonical column is a command."""
     return name.startswith(("thruster_", "fin_")) or name in WRENCH
 
 
