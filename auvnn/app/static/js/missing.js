@@ -55,7 +55,7 @@ export class MissingScreen {
         h("p", { class: "word" }, words, named.length ? ": " : ".", named.length > 0 && h("b", {}, named.join(answer.verdict === "ambiguous" ? " or " : ", "))),
         (answer.story || []).map((line) => h("p", {}, line.replaceAll(" +- ", " ± "))),
         this.next(named, done)),
-      h("div", { class: "two" }, this.left(), this.costs(), this.drive()),
+      h("div", { class: "two tables" }, this.left(), this.costs(), this.drive()),
       answer.warnings.length > 0 && h("details", { class: "note" }, h("summary", {}, `${answer.warnings.length} ${answer.warnings.length === 1 ? "warning" : "warnings"}`), h("ul", {}, answer.warnings.map((w) => h("li", {}, w)))),
       h("h2", {}, "Candidates, best first"),
       h("div", { class: "cards" }, first.map((c) => this.candidate(c, named))),
