@@ -1,0 +1,36 @@
+"""Columns side by side in one array, without a copy where they lie so already: a log may fill half of the memory."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def stacked(columns: list[Array]) -> Array:
+    """Return columns (N,) as one array (N, k); the array itself whose columns they are, in their order and all of them.
+
+    Args:
+        columns: at least one; the list is empty afterwards, so that what is held nowhere else is given up.
+    """
+    whole = _one(columns)
+    if whole is None:
+        whole = np.empty((len(columns[0]), len(columns)))
+        for i in reversed(range(len(columns))):
+            whole[:, i] = columns.pop()
+    columns.clear()
+    return whole
+
+
+def _one(columns: list[Array]) -> Array | None:
+    whole = columns[0].base
+    if not isinstance(whole, np.ndarray) or whole.shape != (len(columns[0]), len(columns)):
+        return None
+    if whole.dtype != np.float64 or not whole.flags.c_contiguous:
+        return None
+    same = all(
+        c.base is whole and c.strides == whole.strides[:1] and c.ctypes.data == whole.ctypes.data + 8 * i
+        for i, c in enumerate(columns)
+    )
+    return whole if same else None
