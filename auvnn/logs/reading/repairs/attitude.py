@@ -61,9 +61,11 @@ def from_quaternions(raw: Array, where: str) -> tuple[Array, list[Repair]]:
         cure = "interpolate attitudes as rotations, not number by number"
         repairs.append(Repair(words, where, n_wrong, cure=cure))
     quaternion = raw.copy()
-    quaternion[wrong | ~present] = np.nan
+    if n_wrong or not present.all():
+        quaternion[wrong | ~present] = np.nan
     uneven = present & ~wrong & (np.abs(norm - 1.0) > _EXACT)
-    quaternion /= np.where(uneven, norm, 1.0)[:, None]
+    if uneven.any():
+        quaternion /= np.where(uneven, norm, 1.0)[:, None]
     visible = int((np.abs(norm[present & ~wrong] / typical - 1.0) > 1e-6).sum())
     if visible:
         repairs.append(Repair("quaternions scaled to unit length", where, visible, "info"))

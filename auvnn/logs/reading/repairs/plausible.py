@@ -66,6 +66,8 @@ def _reaches(values: Array, limit: float) -> bool:
 
 
 def _units(run: Run, where: str) -> None:
+    if not _reaches(run.nu[:, :3], _MAX_SPEED) and not _reaches(run.nu[:, 3:], _MAX_RATE):
+        return  # nor does any quantile of them
     typical = [float(np.nanquantile(np.abs(c), 0.99)) if np.isfinite(c).any() else 0.0 for c in run.nu.T]
     for name, value in zip(VELOCITY[3:], typical[3:], strict=True):
         if value > _MAX_RATE:
@@ -93,6 +95,9 @@ def _commands(run: Run, where: str) -> None:
 
 
 def _missing(run: Run, where: str) -> None:
+    blocks = (run.nu, run.quaternion, run.thrusters if run.thrusters is not None else run.wrench)
+    if all(np.isfinite(b.sum()) for b in blocks if b is not None):
+        return
     needed = [*zip(VELOCITY, run.nu.T, strict=True), ("attitude", run.quaternion.sum(axis=1))]
     if run.thrusters is not None:
         needed += [(f"thruster_{i + 1}", c) for i, c in enumerate(run.thrusters.T)]
