@@ -36,6 +36,7 @@ EFFECTS = Catalogue(
         "payload": "auvnn.effects.payload:Payload",
         "flooding": "auvnn.effects.flooding:Flooding",
         "thruster_gain": "auvnn.effects.thruster_gain:ThrusterGain",
+        "thrust_asymmetry": "auvnn.effects.thrust_asymmetry:ThrustAsymmetry",
         "thruster_deadband": "auvnn.effects.thruster_deadband:ThrusterDeadband",
         "thruster_lag": "auvnn.effects.thruster_lag:ThrusterLag",
         "thrust_overshoot": "auvnn.effects.thrust_overshoot:ThrustOvershoot",

@@ -185,6 +185,26 @@ def noisy():
     return truth, windows, fit(model, windows, list(hidden), free_priors(model, hidden))
 
 
+def test_a_fit_that_is_still_falling_goes_on_beyond_its_steps_and_one_that_creeps_does_not(noisy):
+    """From far away two steps do not suffice, and where they end says nothing of the effect."""
+    _, windows, found = noisy
+    names = list(found.names)
+    far = GreyBox(small_vehicle()).with_effects(
+        {
+            "ocean_current": {"v_north": 1.5, "v_east": 1.2},
+            "net_buoyancy": {"force": -80.0},
+            "linear_damping": dict.fromkeys("XYZKMN", 9.0),
+        }
+    )
+    priors = free_priors(far, names)
+    again = fit(far, windows, names, priors, initial=found.initial, sigma=found.sigma, iterations=2)
+    long = fit(far, windows, names, priors, initial=found.initial, sigma=found.sigma, iterations=50)
+    assert 2 < again.iterations <= prediction_error.PATIENCE * 2
+    assert again.cost == pytest.approx(long.cost, rel=0.02)
+    near = fit(found.model, windows, names, priors, initial=found.initial, sigma=found.sigma, iterations=2)
+    assert near.iterations <= 2
+
+
 def test_hidden_values_are_found_within_their_standard_errors(noisy):
     truth, _, found = noisy
     std = np.sqrt(np.diag(found.covariance()))

@@ -160,6 +160,9 @@ class Actuators:
         for name, values in self.effects.items():
             if name == "thruster_gain":
                 thrust = thrust * np.array([values[n] for n in self.names()])
+            elif name == "thrust_asymmetry":
+                lean = np.array([values[n] for n in self.names()])
+                thrust = np.where(thrust > 0.0, thrust + lean * thrust, thrust - lean * thrust)
             elif name == "thrust_inflow_loss":
                 along = flow @ self.forces
                 if not self.wrench:
