@@ -5,7 +5,7 @@ Whoever indexes an answer (`found.candidates[0]["parameters"]`) finds here which
 
 from __future__ import annotations
 
-from typing import TypedDict
+from typing import NotRequired, TypedDict
 
 
 class ParameterValue(TypedDict):
@@ -46,7 +46,7 @@ class Similar(TypedDict):
 
 
 class Candidate(TypedDict):
-    """What a diagnosis says of one effect of the catalogue; None where the log or the fit says nothing."""
+    """What a diagnosis says about one effect of the catalogue; None where the log or the fit says nothing."""
 
     effect: str
     p_value: float | None
@@ -188,3 +188,67 @@ class ParameterTrend(TypedDict):
     scatter: float
     changes: bool
     words: str
+
+
+class SkippedSamples(TypedDict):
+    """How many samples an adapter did not learn from for one reason, and the reason in words."""
+
+    count: int
+    words: str
+
+
+class ChangeKind(TypedDict):
+    """What one kind of change would explain: logarithm of the odds against no change, and the share of the residual."""
+
+    kind: str
+    evidence: float
+    explained: float
+
+
+class ChangeEntry(TypedDict):
+    """A change of the vehicle that an adaptation saw; times in s, see `auvnn.online` for the kinds."""
+
+    run: int
+    time: float
+    detected: float
+    kind: str
+    effect: str | None
+    parameters: Parameters
+    evidence: float
+    explained: float
+    kinds: list[ChangeKind]
+    words: str
+
+
+class AdaptationHistory(TypedDict):
+    """A run's adaptation over time: six errors of acceleration for each stretch, how far weights moved, and why not."""
+
+    run: int
+    t: list[float]
+    prediction_error: list[list[float | None]]
+    unadapted_error: list[list[float | None]]
+    moved: list[float]
+    cause: list[str]
+
+
+class FrozenErrors(TypedDict):
+    """A run's errors of free running with the weights of each moment, and with those at the start; diverged of both."""
+
+    run: int
+    horizon: float
+    t: list[float]
+    adapted: list[list[float]]
+    unadapted: list[list[float]]
+    diverged: NotRequired[list[int]]
+
+
+class WaterfallStep(TypedDict):
+    """The held-out error after a step, the last one that of noise alone; `kind` and `left_out` in the whole loop only.
+
+    `left_out` is the step's error on what was left out of the log that was fitted; None where it was not judged so.
+    """
+
+    step: str
+    error: float
+    kind: NotRequired[str]
+    left_out: NotRequired[float | None]

@@ -75,7 +75,7 @@ def read_start(path: Path, most: int, folder: str) -> bytes:
     Args:
         path: the file.
         most: how many bytes.
-        folder: what to say of a folder in its place.
+        folder: what to say about a folder in its place.
 
     Raises:
         InputError: it is not there, is a folder, or cannot be read.
@@ -123,7 +123,7 @@ class Answer(Shown):
     kind: ClassVar[str]
 
     def card(self) -> Card:
-        """Return what the answer says of itself in one line, and what a notebook shows of it."""
+        """Return what the answer says about itself in one line, and what a notebook shows of it."""
         said = {n: getattr(self, n, None) for n in ("model", "name", "log")}
         words = " with ".join(v for v in said.values() if isinstance(v, str) and v)
         return Card(self.kind.capitalize(), words, foot=PLOTTED)

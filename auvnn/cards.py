@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -24,7 +23,7 @@ _STYLE = {
 
 @dataclass(frozen=True)
 class Card:
-    """What an object says of itself.
+    """What an object says about itself.
 
     Args:
         title: what it is.
@@ -73,7 +72,7 @@ class Shown:
     """Gives a class its short `repr` and its card in a notebook: it says its `card`."""
 
     def card(self) -> Card:
-        """Return what the object says of itself."""
+        """Return what the object says about itself."""
         return Card(type(self).__name__)
 
     def __repr__(self) -> str:
@@ -122,6 +121,8 @@ def parameter_rows(fitted: Any) -> list[list[str]]:
 
 
 def _safe(text: Any) -> str:
+    import html  # for cards alone: every command imports this file
+
     # A file name that is not UTF-8 stands in Python's strings as lone surrogates, which no page can hold.
     return html.escape(str(text).encode("utf-8", "replace").decode("utf-8"))
 

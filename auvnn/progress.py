@@ -36,7 +36,7 @@ class Counted:
     """Tells what is being done with a count: each call begins a step, and all before it are done.
 
     How many steps a search takes shows only as it goes. `expected` is what such work usually takes; where it takes more,
-    the total grows. Words that carry a count of their own, of work inside a step, are told with it and are no steps.
+    the total grows. Words that carry another count, of work inside a step, are shown with it and are no steps.
 
     Args:
         say: to whom.
@@ -74,7 +74,7 @@ def each(items: Iterable[T], say: Callable[[str], Any] | None, words: Callable[[
     Args:
         items: what is worked through; it knows its length.
         say: to whom.
-        words: what to say of an item.
+        words: what to say about an item.
     """
     total = len(items) if isinstance(items, Sized) else 0
     for done, item in enumerate(items):

@@ -42,7 +42,7 @@ def one_thread() -> Iterator[None]:
     from threadpoolctl import threadpool_limits
 
     before = torch.get_num_threads()
-    # Of torch itself, and of the linear algebra of numpy and scipy, which have pools of their own.
+    # Of torch itself, and of the linear algebra of numpy and scipy, which have separate pools.
     with threadpool_limits(limits=1):
         torch.set_num_threads(1)
         try:

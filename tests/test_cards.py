@@ -1,4 +1,4 @@
-"""What objects say of themselves: one short line, a small card that nothing in a log can break out of, a figure."""
+"""What objects say about themselves: one short line, a small card that nothing in a log can break out of, a figure."""
 
 from __future__ import annotations
 
@@ -169,3 +169,25 @@ def test_what_is_more_precise_than_the_model_or_no_number_says_how_to_convert():
 
 def test_text_shows_itself_without_quotes():
     assert repr(Text("a\nb")) == "a\nb"
+
+
+def test_a_simulation_and_a_free_run_are_one_line_too(model, made):
+    assert "array(" not in repr(made) and len(repr(made)) < 200
+    assert "ocean_current" in repr(made) and "v_east" in made._repr_html_()
+    run = model.rollout([0.0] * 6, [0.0] * 6, np.zeros((11, 8)), np.arange(11) * 0.05)
+    assert (
+        repr(run) == "<Trajectory: 11 rows over 0.5 s; no divergence>" and "tensor(" not in run._repr_html_()
+    )
+
+
+def test_a_run_that_is_not_there_is_named(made):
+    with pytest.raises(IndexError, match="has no run at place 99: it has 2, at 0 to 1"):
+        made.log[99]
+
+
+def test_a_neutral_vehicle_is_called_neutral(model):
+    """10 kg times 9.81 m/s2 is 98.1 N but for the last digit."""
+    from dataclasses import replace
+
+    v = replace(model.vehicle, mass=10.0, gravity=9.81, buoyancy=98.1)
+    assert v.weight != v.buoyancy and "+0 N, neutral" in v.summary()

@@ -1,4 +1,4 @@
-"""Vehicles that no reader would accept: what the equations do with them is asked all the same."""
+"""Vehicles that no reader would accept: what the equations do with them is asked anyway."""
 
 from __future__ import annotations
 

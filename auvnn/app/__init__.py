@@ -1,7 +1,7 @@
 """The loop as a page on this machine: look at a log, see where a model fails, name what is missing, try it, save it.
 
 The page is a thin shell over the same Python calls as the commands: `Log.read`, `quality`, `compare`, `diagnose`,
-`add`, `rollout`. It states no physics and no statistics of its own. What takes long runs in a child process
+`add`, `rollout`. It adds no physics and no statistics. What takes long runs in a child process
 (`jobs`), which can be stopped; what must follow a slider runs in the server (`trial`), by the compiled engine.
 
 The server answers this machine alone: it listens on the loopback address, each address begins with a random token,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import re
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NotRequired, TypedDict
 
 import yaml
 
@@ -15,7 +15,15 @@ NUMBER = r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?"
 OFFERS = ("Did you mean (mapping file): ", "Mapping: ")
 
 
-def buttons(where: str, what: str, cure: str) -> list[dict[str, Any]]:
+class Button(TypedDict):
+    """What can be done about a finding: a label, and the change of the mapping to make or the effect to try."""
+
+    label: str
+    change: NotRequired[dict[str, Any]]
+    effect: NotRequired[str]
+
+
+def buttons(where: str, what: str, cure: str) -> list[Button]:
     """Return what can be done about a finding: a label, and the change of the mapping or the effect to try.
 
     Args:
@@ -26,7 +34,7 @@ def buttons(where: str, what: str, cure: str) -> list[dict[str, Any]]:
     Returns:
         Entries with `label`, and either `change` (for `changed`) or `effect`.
     """
-    found: list[dict[str, Any]] = []
+    found: list[Button] = []
 
     def offer(label: str, **change: Any) -> None:
         found.append({"label": label, "change": change})

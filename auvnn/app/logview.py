@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import weakref
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -40,13 +40,40 @@ GROUPS = {
 }
 
 
-def raw_columns(path: Path) -> list[dict[str, Any]]:
+class RawColumn(TypedDict):
+    """A column of a file under its own name, with a few values; text has none."""
+
+    name: str
+    values: list[float | None]
+    text: bool
+
+
+class ColumnView(TypedDict):
+    """A canonical column: where it came from, its unit, range, what the mapping does to it, a few values to draw."""
+
+    name: str
+    source: str
+    unit: str | None
+    low: float | None
+    high: float | None
+    missing: int
+    scale: float
+    offset: float
+    delay: float
+    spark: list[float | None]
+
+
+# A place in time, s: `run`, `from` and `to`, of which one is a keyword.
+Mark = TypedDict("Mark", {"run": int, "from": float, "to": float})
+
+
+def raw_columns(path: Path) -> list[RawColumn]:
     """Return the columns of a file under their own names, with their first values; empty where it cannot be read."""
     try:
         table = choose(path)[0].read_rows(path, 0, HEAD)
     except (AuvnnError, OSError):
         return []
-    found = []
+    found: list[RawColumn] = []
     for name in table.names:
         if name in table.columns:
             values = np.asarray(table.columns[name], dtype=np.float64)
@@ -56,7 +83,7 @@ def raw_columns(path: Path) -> list[dict[str, Any]]:
     return found
 
 
-def guesses(raw: list[dict[str, Any]]) -> dict[str, str]:
+def guesses(raw: list[RawColumn]) -> dict[str, str]:
     """Return which columns of a file probably hold canonical columns that it does not name."""
     names = [str(c["name"]) for c in raw]
     found = {}
@@ -68,11 +95,11 @@ def guesses(raw: list[dict[str, Any]]) -> dict[str, str]:
     return found
 
 
-def columns(log: Log, mapping: dict[str, Any]) -> list[dict[str, Any]]:
+def columns(log: Log, mapping: dict[str, Any]) -> list[ColumnView]:
     """Return the canonical columns of a log: where each came from, its unit, range, and a few values to draw."""
     plan = Mapping.read(mapping or None)
     run = log.runs[0]
-    found = []
+    found: list[ColumnView] = []
     for name in log.columns:
         if name == "run" or not is_canonical(name):
             continue
@@ -154,12 +181,12 @@ def traces(
 
 
 def findings(quality: Quality) -> list[dict[str, Any]]:
-    """Return the findings with the places in time that they speak of, and buttons for their cures."""
+    """Return the findings with the places in time that they concern, and buttons for their cures."""
     log = quality.log
     places = _places(log)
     found = []
     for finding in quality.findings:
-        marks: list[dict[str, Any]] = []
+        marks: list[Mark] = []
         for kind, where in places.items():
             if kind == finding.where or (kind in _WORDS and _WORDS[kind] in finding.what):
                 marks += [
@@ -173,12 +200,12 @@ def findings(quality: Quality) -> list[dict[str, Any]]:
     return found
 
 
-# Places in time by a word of the finding that speaks of them.
-_WORDS = {"gap": "gaps in time", "restart": "the pose starts afresh"}
+# Places in time by a word of the finding that concerns them.
+_WORDS = {"gap": "gaps in time", "restart": "the pose starts again"}
 
 
-def _places(log: Log) -> dict[str, list[dict[str, Any]]]:
-    found: dict[str, list[dict[str, Any]]] = {
+def _places(log: Log) -> dict[str, list[Mark]]:
+    found: dict[str, list[Mark]] = {
         "gap": [],
         "restart": [],
         "spikes": [],
@@ -188,7 +215,7 @@ def _places(log: Log) -> dict[str, list[dict[str, Any]]]:
     }
 
     def add(kind: str, run: Run, spans: list[list[float]]) -> None:
-        found[kind] += [{"run": run.number, "from": a, "to": b} for a, b in spans]
+        found[kind].extend({"run": run.number, "from": a, "to": b} for a, b in spans)
 
     for run in log.runs:
         wide = np.flatnonzero(np.diff(run.t) > default_gap(run.t))

@@ -53,7 +53,7 @@ def serve(
         max_duration: s, of each file.
         port: on which to listen; 0 for any that is free.
         browser: open the page in the user's browser.
-        say: told the address.
+        say: called with the address.
 
     Raises:
         MissingExtra: Starlette or uvicorn is not installed.

@@ -6,9 +6,10 @@ import shutil
 import threading
 import time
 from pathlib import Path
-from typing import Any
+from typing import cast
 
 from auvnn.app.jobs.child import Child
+from auvnn.app.jobs.messages import AddJob, Example, LogJob, Order, Report, Summary
 from auvnn.app.records import ANSWERS, KINDS, MODELS, Job, Step, step_of, words_of
 from auvnn.app.session_state import SessionState
 from auvnn.app.source import Source
@@ -100,22 +101,26 @@ class Session(SessionState):
             raise ConfigError(f"no job called '{kind}'; there are: {', '.join(KINDS)}")
         with self.lock:
             self.refuse_busy()
-            order: dict[str, Any] = {"kind": kind, "force": force}
+            number = self._numbers + 1
+            out = self.work / "answers" / f"{number}_{kind}"
+            order: Order = {"kind": kind, "job": number, "out": str(out)}
             if kind != "example":
                 if self.source is None or self.source.log is None:
                     raise ConfigError("there is no log yet: drop a file, or choose one")
                 if not self.history:
                     raise ConfigError("there is no model yet: choose a vehicle, a YAML file or a saved model")
-                order.update(log=self.source.order(), model=self.history[-1].source)
-            if kind == "add":
-                if not effects:
-                    raise ConfigError("no effect is switched on: switch one on first")
-                order["effects"] = effects
-            self._numbers += 1
+                on_log: LogJob = {
+                    **order, "force": force, "log": self.source.order(), "model": self.history[-1].source,
+                }  # fmt: skip
+                order = on_log
+                if kind == "add":
+                    if not effects:
+                        raise ConfigError("no effect is switched on: switch one on first")
+                    adding: AddJob = {**on_log, "effects": effects}
+                    order = adding
+            self._numbers = number
             words = words_of(kind, effects or [])
-            out = self.work / "answers" / f"{self._numbers}_{kind}"
-            order.update(job=self._numbers, out=str(out))
-            self.job = Job(self._numbers, kind, words, out, time.monotonic(), effects=tuple(effects or ()))
+            self.job = Job(number, kind, words, out, time.monotonic(), effects=tuple(effects or ()))
             self.version += 1
             try:
                 self.child.order(order)
@@ -141,7 +146,7 @@ class Session(SessionState):
         shutil.rmtree(job.out, ignore_errors=True)
         self.child.warm()
 
-    def _hear(self, report: dict[str, Any]) -> None:
+    def _hear(self, report: Report) -> None:
         """Take a report of the child process."""
         opened: Source | None = None
         with self.lock:
@@ -152,8 +157,8 @@ class Session(SessionState):
                 self._left_out.set()
                 return
             if "drawn" in report:
-                if report["problem"]:
-                    self.undrawn[report["drawn"]] = report["problem"]
+                if problem := report.get("problem"):
+                    self.undrawn[report["drawn"]] = problem
                 return
             if job is None or job.state != "running":
                 return
@@ -172,15 +177,16 @@ class Session(SessionState):
             elif "done" in report:
                 job.state = "done"
                 if job.kind == "example":
-                    self.history, self.taken_back = [Step(report["done"]["model"], "as given")], []
-                    opened = Source([Path(report["done"]["file"])])
+                    made = cast(Example, report["done"])
+                    self.history, self.taken_back = [Step(made["model"], "as given")], []
+                    opened = Source([Path(made["file"])])
                 else:
                     self._keep_answer(job, report["done"])
             job.seconds = time.monotonic() - job.began
         if opened is not None:
             self.open(opened)
 
-    def _keep_answer(self, job: Job, summary: dict[str, Any]) -> None:
+    def _keep_answer(self, job: Job, summary: Summary) -> None:
         kind = ANSWERS[job.kind]
         old = self.answers.get(kind)
         if old is not None and old not in [s.answer for s in self.history]:
@@ -212,7 +218,7 @@ class Session(SessionState):
         with self.lock:
             self.refuse_busy()
             if len(self.history) < 2:
-                raise ConfigError("the model is as it was given: there is nothing to take back")
+                raise ConfigError("the model is as given: there is nothing to take back")
             self.taken_back.append(self.history.pop())
             self._model_changed()
 

@@ -8,6 +8,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
+from auvnn.app.jobs.messages import Summary
 from auvnn.app.records import Job, Step
 from auvnn.app.script import Told
 from auvnn.app.source import Source
@@ -31,7 +32,7 @@ class SessionState:
         self.history: list[Step] = [Step(model, "as given")] if model else []
         self.taken_back: list[Step] = []
         self.answers: dict[str, Path] = {}
-        self.summaries: dict[str, dict[str, Any]] = {}
+        self.summaries: dict[str, Summary] = {}
         self.stale: set[str] = set()
         self.job: Job | None = None
         self.saved: list[str] = []

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from auvnn.app.logview import columns, findings, guesses, overview, raw_columns, traces
+from auvnn.app.jobs.messages import LogOrder
+from auvnn.app.logview import ColumnView, RawColumn, columns, findings, guesses, overview, raw_columns, traces
 from auvnn.app.traces import POINTS
 from auvnn.errors import AuvnnError, one_line
 from auvnn.logs import Log
@@ -39,7 +40,7 @@ class Source:
     mapping: dict[str, Any] = field(default_factory=dict)
     max_duration: float | None = None
     test: list[Path] = field(default_factory=list)
-    raw: list[dict[str, Any]] = field(default_factory=list)
+    raw: list[RawColumn] = field(default_factory=list)
     log: Log | None = None
     fit: Log | None = None
     held: Log | None = None
@@ -47,7 +48,7 @@ class Source:
     error: str = ""
     findings: list[dict[str, Any]] | None = None
     sizes: dict[str, Any] = field(default_factory=dict)
-    columns: list[dict[str, Any]] = field(default_factory=list)
+    columns: list[ColumnView] = field(default_factory=list)
     overview: dict[str, Any] | None = None
     guesses: dict[str, str] = field(default_factory=dict)
 
@@ -83,7 +84,7 @@ class Source:
         }
         self.findings = findings(quality)
 
-    def order(self) -> dict[str, Any]:
+    def order(self) -> LogOrder:
         """Return what the child process needs to read the same."""
         return {
             "files": [str(p) for p in self.files],

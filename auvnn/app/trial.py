@@ -59,7 +59,7 @@ class Trial:
 
         Args:
             effects: name to values by parameter; what is not stated is at its null.
-            horizon: of `HORIZONS`: how long it runs before it starts anew from a measured state.
+            horizon: of `HORIZONS`: how long it runs before it starts again from a measured state.
             number: of the run whose traces are returned.
             low: s, begin of the traces.
             high: s, end of the traces.
@@ -114,7 +114,7 @@ class Trial:
         return {k: v if np.isfinite(v) else None for k, v in found.items()}
 
     def _tried(self, effects: Effects) -> GreyBox:
-        # Built anew to be checked: names, bounds, and effects that exclude one another.
+        # Built again to be checked: names, bounds, and effects that exclude one another.
         vehicle, how = self.model.vehicle, self.model.actuation
         wanted = [effect_class(name).build(vehicle, how, values) for name, values in effects.items()]
         key = tuple(str(e.name) for e in wanted)

@@ -34,7 +34,7 @@ class Pages:
     """Answers of the page's addresses.
 
     Args:
-        session: what they speak of.
+        session: what they belong to.
     """
 
     def __init__(self, session: Session) -> None:
@@ -135,7 +135,7 @@ class Pages:
         return self.session.state()
 
     def mapping(self, asked: Asked) -> Any:
-        """Read the log anew: with a whole mapping, or with the change that a cure makes."""
+        """Read the log again: with a whole mapping, or with the change that a cure makes."""
         source = self._source()
         mapping = changed(source.mapping, asked["change"]) if "change" in asked else asked.get("mapping")
         if not isinstance(mapping, dict):

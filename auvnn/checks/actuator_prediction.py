@@ -23,7 +23,7 @@ GAIN = 3.0
 
 
 def predicts_better(model: GreyBox, log: Log, allocation: Array) -> bool:
-    """Whether a model with another allocation runs free beside a log better than it does as it is.
+    """Whether a model with another allocation follows a log better in free running than it does as it is.
 
     Args:
         model: as stated.

@@ -1,9 +1,9 @@
-"""What a regression on the actuators comes to: the likeliest assignment, which of it is known, and what to do about it.
+"""What a regression on the actuators gives: the likeliest assignment, which of it is known, and what to do about it.
 
 Thrusters that an allocation drives (eight by six commands) never move alone. Their columns are not estimable one by
 one, but the gain of each is wherever eight unknowns meet 36 measured numbers: what a reversed thruster i does to
-commanded forces, B (I - 2 e_i e_i') B^+ = I - 2 b_i (e_i' B^+), has a direction of its own. So nothing is asked about
-which columns are independent; each gain's posterior standard deviation says whether the log speaks of it.
+commanded forces, B (I - 2 e_i e_i') B^+ = I - 2 b_i (e_i' B^+), has a separate direction. So nothing is asked about
+which columns are independent; each gain's posterior standard deviation says whether the log determines it.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def judged(problem: _ActuatorRegression) -> Judged:
     gains, spread = problem.gains(best), problem.spread(best)
     told = spread < TOLD
     dead = told & (gains < DEAD) & (gains + QUANTILE * spread < WEAK)
-    # The sign of what is dead is no difference, nor is anything of what the log does not speak of.
+    # The sign of what is dead is no difference, and neither is anything that the log does not determine.
     known = np.flatnonzero(told & ~dead)
     cost = np.array(list(costs.values()))
     odds = np.exp(-0.5 * (cost - cost.min()))

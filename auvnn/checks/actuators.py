@@ -1,7 +1,7 @@
 """Are the thrusters where the model file puts them? Reversed, exchanged or dead ones, by the pattern they leave.
 
 What acceleration follows each command is estimated from the log by regression, drag, products of velocities, gravity
-and constants fitted beside, and held against the columns of M^-1 B of the model: a reversed thruster has its column
+and constants fitted along, and compared with the columns of M^-1 B of the model: a reversed thruster has its column
 turned round, two exchanged ones each other's. Assignments are searched by turning and exchanging, each weighed by
 chi-square with a free positive gain per actuator (thrust curves are never exact), and given with the odds against
 every other assignment that was looked at.
@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ActuatorCheck:
-    """What a log says of a model's actuators.
+    """What a log says about a model's actuators.
 
     Args:
         names: of the actuators.

@@ -1,7 +1,7 @@
-"""Accelerations of a log as a linear regression: what drives the vehicle beside all that merely resists or pulls.
+"""Accelerations of a log as a linear regression: what drives the vehicle, apart from what resists or pulls.
 
 Both sides pass the same filter, as in one-step residuals. Drag, restoring and constant forces are nuisance: they are
-fitted beside and never believed, so that a model whose coefficients are guesses does not turn into a verdict on its
+fitted along and never believed, so that a model whose coefficients are guesses does not turn into a verdict on its
 thrusters. Errors are correlated in time; how much is taken from the residuals themselves.
 """
 
@@ -31,7 +31,7 @@ class RegressionRows:
 
     Args:
         gap: measured minus the model's acceleration, (N, 6).
-        nuisance: what is fitted beside, (N, m).
+        nuisance: what is fitted along, (N, m).
         thrust: settled thrust of each actuator through the same filter, N, (N, n); zero where it is not needed.
         rotation: (N, 3, 3), body to world.
         run: (N,) number of the run.

@@ -48,7 +48,7 @@ def blind(log: Log) -> list[str]:
 
 
 def words(log: Log, actuators: bool = False) -> list[str]:
-    """Return what a check tells of what has no sensor: what is assumed, and what cannot be told.
+    """Return what a check reports on quantities without a sensor: what is assumed, and what cannot be known.
 
     Args:
         log: as recorded.

@@ -19,7 +19,7 @@ def doubts(model: GreyBox, log: Log) -> list[str]:
     """Warn of a current that the model's residual shows and nothing in the model accounts for.
 
     The acceleration that a steady current would add is linear in it; its two coefficients are fitted to what one-step
-    predictions leave, with drag, products of velocities, gravity and constants in body axes beside them, so that only
+    predictions leave, with drag, products of velocities, gravity and constants in body axes added to them, so that only
     what stays put in the world while the vehicle turns can count.
 
     Args:

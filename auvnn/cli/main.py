@@ -10,10 +10,12 @@ import warnings
 from collections.abc import Sequence
 from typing import Any
 
+from auvnn.catalogue import unknown_name
 from auvnn.cli.faults import INTERRUPTED, OK, TERMINATED, Terminated, outcome
 from auvnn.cli.pages import PAGES
 from auvnn.cli.speech import complain
 from auvnn.cli.verbs import VERBS
+from auvnn.errors import ConfigError
 from auvnn.executors.safe_path import keep_safe
 from auvnn.threads import sleep_when_idle
 
@@ -47,6 +49,9 @@ def _dispatch(verb: str, rest: list[str]) -> int:
     if verb in PAGES:
         print(PAGES[verb](rest))
         return OK
+    if verb not in VERBS:
+        # What is no verb of a model or a log can be meant too: `verson` is `version`.
+        raise ConfigError(unknown_name("verb", verb, [*VERBS.names(), *PAGES, "version", "help"]))
     found = VERBS.get(verb)
     from auvnn.cli.runs.application import run_verb
 

@@ -1,7 +1,7 @@
 """What was noted while files were read, each thing once: the same note of several files is one line.
 
 Notes that change nothing about a result (level "info") are `check`'s to tell; the other commands count them. What was
-corrected or is doubted is told by every command that computes with it.
+corrected or is doubted is reported by every command that computes with it.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ from typing import Any
 
 
 def horizons(rollout: dict[str, dict[str, Any]]) -> list[str]:
-    """Return one line per horizon: the error, and that of standing still in velocity beside it."""
+    """Return one line per horizon: the error, and that of holding the velocity."""
     return [f"{_seconds(horizon)}: {_result(result)}" for horizon, result in rollout.items()]
 
 

@@ -15,7 +15,7 @@ from auvnn.errors import one_line
 
 # Seconds between two lines of progress where nobody sits at a terminal.
 NOW_AND_THEN = 30.0
-# Seconds of silence after which a person at a terminal is told that work goes on, and between two such signs.
+# Seconds of silence after which a person at a terminal is informed that work goes on, and between two such signs.
 SILENT, SIGN = 2.0, 1.0
 
 
@@ -82,7 +82,7 @@ class Speaker:
     def ticking(self, words: str) -> Iterator[None]:
         """Give signs of life while something runs that tells nothing for a while.
 
-        At a terminal the line with what is being done is drawn anew each second, time passing; redirected, it is said
+        At a terminal the line with what is being done is drawn again each second, time passing; redirected, it is said
         again now and then.
 
         Args:
@@ -139,7 +139,7 @@ class Speaker:
         done, total = getattr(words, "done", None), getattr(words, "total", None)
         if not isinstance(done, int) or not isinstance(total, int) or total < 1:
             return gone
-        # Fewer steps done than before, or fewer in all: this is other work, whose time is counted afresh.
+        # Fewer steps done than before, or fewer in all: this is other work, whose time is counted again.
         if self._count is None or total < self._count[0] or done < self._count[3]:
             self._count = (total, done, now, done, now)
         _, first, since, before, reached = self._count

@@ -113,5 +113,5 @@ def words(line: Mapping[str, Any]) -> list[str]:
     ]
     for key, what in (("baseline", "the plain regression"), ("persistence", "holding the initial velocity")):
         if line["loses"][key]:
-            out.append(f"The model loses to {what} in {', '.join(line['loses'][key])}.")
+            out.append(f"In {', '.join(line['loses'][key])} the model is worse than {what}.")
     return out

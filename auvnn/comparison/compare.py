@@ -16,8 +16,8 @@ from auvnn.cards import Card, figure
 from auvnn.checks.doubts import doubts
 from auvnn.checks.unmeasured import blind
 from auvnn.comparison.baseline import compare_with_baseline, standing
-from auvnn.comparison.locate import AXES, failures, locate
-from auvnn.comparison.predictions import stitch, write_predictions
+from auvnn.comparison.locate import AXES, Regime, failures, locate
+from auvnn.comparison.predictions import RunTraces, stitch, write_predictions
 from auvnn.errors import ConfigError
 from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
@@ -50,8 +50,8 @@ class Comparison(Answer):
     residual_wrench: dict[str, dict[str, float]]
     failures: list[Failure]
     warnings: list[str] = field(default_factory=list)
-    series: list[dict[str, Any]] = field(default_factory=list)
-    regimes: dict[str, dict[str, Any]] = field(default_factory=dict)
+    series: list[RunTraces] = field(default_factory=list)
+    regimes: dict[str, Regime] = field(default_factory=dict)
     noise_floor: Array = field(default_factory=lambda: np.zeros(6))
     quality: Any = None
     baseline: dict[str, Any] = field(default_factory=dict)
@@ -205,7 +205,7 @@ def _wrench_noise(parts: list[OneStep]) -> Array:
     return np.sqrt(np.average([p.wrench_noise**2 for p in parts], axis=0, weights=weight))
 
 
-def _series(number: int, nu: Array, part: OneStep, rolled: Rolled | None) -> dict[str, Any]:
+def _series(number: int, nu: Array, part: OneStep, rolled: Rolled | None) -> RunTraces:
     """Return a run's traces for plots: windows of free running stitched one after the other."""
     stitched = np.full_like(nu, np.nan)
     if rolled is not None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any
+from collections.abc import Mapping
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,13 +51,22 @@ def regimes(run: Run) -> dict[str, Array]:
     return found
 
 
-def locate(log: Log, parts: list[OneStep]) -> dict[str, dict[str, Any]]:
+class Regime(TypedDict):
+    """The residual sorted by one quantity: the bins' edges in `unit`, its rms, (6, bins), and the samples by bin."""
+
+    edges: list[float]
+    unit: str
+    rms: Array
+    count: NDArray[np.intp]
+
+
+def locate(log: Log, parts: list[OneStep]) -> dict[str, Regime]:
     """Return by regime the bins' edges, the residual's root mean square (6, bins) and the samples in each bin."""
     values = [regimes(run) for run in log.runs]
     wrench = np.concatenate([p.wrench for p in parts])
     # Degrees of freedom without a sensor have no residual.
     told = np.isfinite(wrench[:, np.isfinite(wrench).any(0)]).all(1)
-    found: dict[str, dict[str, Any]] = {}
+    found: dict[str, Regime] = {}
     for name in UNITS:
         if not all(name in v for v in values):
             continue
@@ -86,7 +96,7 @@ def locate(log: Log, parts: list[OneStep]) -> dict[str, dict[str, Any]]:
     return found
 
 
-def members(run: Run, located: dict[str, Any], name: str, number: int) -> NDArray[np.bool_]:
+def members(run: Run, located: Mapping[str, Regime], name: str, number: int) -> NDArray[np.bool_]:
     """Return which samples of a run lie in one bin of one regime, (N,).
 
     Args:
@@ -108,7 +118,7 @@ def _bins(x: Array, edges: Array) -> NDArray[np.intp]:
 
 
 def failures(
-    parts: list[OneStep], located: dict[str, dict[str, Any]], floor: Array, limit: int = 8
+    parts: list[OneStep], located: Mapping[str, Regime], floor: Array, limit: int = 8
 ) -> list[Failure]:
     """Return where the error sits, in plain words, largest first.
 

@@ -1,10 +1,10 @@
-"""Predictions beside what was measured: as one trace of a run, and as a table."""
+"""Predictions and what was measured: as one trace of a run, and as a table."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,35 @@ def stitch(rolled: Rolled, number: int, nu: Array) -> Array:
     return trace
 
 
-def write_predictions(series: list[dict[str, Any]] | Mapping[str, list[dict[str, Any]]], path: Path) -> Path:
+class RunTraces(TypedDict):
+    """A run's traces, T rows: velocity and acceleration, measured and of the model, and the residual wrench."""
+
+    run: int
+    t: Array
+    measured: Array
+    model: Array
+    measured_acc: Array
+    model_acc: Array
+    residual: Array
+
+
+class BeforeAfterTraces(TypedDict):
+    """A held-out run's velocities, (T, 6): measured, and of the model before and after."""
+
+    run: int
+    t: Array
+    measured: Array
+    before: Array
+    after: Array
+
+
+class RefittedTraces(BeforeAfterTraces):
+    """The same, with the model whose uncertain coefficients were refitted and nothing was added."""
+
+    refitted: Array
+
+
+def write_predictions(series: list[RunTraces] | Mapping[str, list[RunTraces]], path: Path) -> Path:
     """Write measured and predicted velocities and accelerations and the residual wrench as one Parquet table.
 
     Args:

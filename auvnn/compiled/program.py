@@ -78,7 +78,7 @@ class Numbers:
         for name, tensor in zip(self.names, self.tensors, strict=True):
             flat = tensor.detach().reshape(-1)
             plain = (flat == 0.0) | (flat.abs() == 1.0)
-            # A parameter changes: its code would be compiled anew whenever it comes to zero.
+            # A parameter changes: its code would be compiled again whenever it reaches zero.
             parts.append(
                 plain if not isinstance(tensor, nn.Parameter) and name not in self.wanted else plain & False
             )

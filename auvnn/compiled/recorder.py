@@ -20,7 +20,7 @@ class Recorder(TorchDispatchMode):
     """A dispatch mode that follows tensors through torch's basic operations, element by element.
 
     Below autograd, so that what `torch.autograd.grad` does inside is recorded like anything else. Each storage is
-    mirrored by one of scalar nodes: views, in-place writing and strides then need no rules of their own.
+    mirrored by one of scalar nodes: views, in-place writing and strides then need no separate rules.
 
     Tensors that were not declared by `track` count as constants.
 

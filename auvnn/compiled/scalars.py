@@ -36,7 +36,7 @@ class Scalars:
 
     Equal operations are one node. Constants are folded, and x + 0, x 0, x 1 and their like vanish: constant tables
     and matrices, most of which is zeros, then cost only what they hold. (0 times infinity is 0 here: a state that
-    overflows is not finite in other elements, and reported all the same.)
+    overflows is not finite in other elements, and reported anyway.)
 
     Attributes:
         operation: per node: "constant", "input", "take", or what it does.

@@ -71,7 +71,7 @@ class Advice:
             return (
                 f"No manoeuvre of the library would tell {apart} apart: the best, {manoeuvre} "
                 f"({WORDS.get(manoeuvre, 'see auvnn simulate')}), reaches {errors:.1f} standard errors in "
-                f"{DURATION:g} s. Measure one of them by itself."
+                f"{DURATION:g} s. Measure one of them separately."
             )
         return (
             f"Drive {manoeuvre} ({WORDS.get(manoeuvre, 'see auvnn simulate')}) for {DURATION:g} s: it would tell "
@@ -107,7 +107,7 @@ def advise(
         layout: stated values and their uncertainty.
         rivals: at least two fitted explanations.
         cut: length of the windows of free running and of the actuators' history before them, s.
-        progress: told in words what is being done.
+        progress: called with what is being done, in words.
         seed: of the manoeuvres' random parts.
     """
     say = progress or (lambda words: None)

@@ -20,6 +20,7 @@ from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.answer import answer_with_force
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.runaway import windows_that_hold
+from auvnn.diagnosis.stages.shorter_windows import search_over_shorter
 from auvnn.diagnosis.stages.state import Searched, Setting
 from auvnn.diagnosis.stages.what_is_left import settled
 from auvnn.errors import ConfigError, InputError
@@ -77,7 +78,7 @@ def diagnose(
             share of the actuators', or a mapping with `cost` and `force`; by default 0.1 and 0.02. At 0 everything
             matters that is there.
         costs: also work out what each name costs in free running, which takes about as long as naming it.
-        progress: told in words what is being done.
+        progress: called with what is being done, in words.
 
     Raises:
         ConfigError: an unknown effect.
@@ -138,7 +139,7 @@ def searched(
         force: go on with a log that contradicts itself: signs, units, axes.
         tolerance: what counts as small: a `Tolerance`, its options, or None.
         costs: say what each name costs in free running.
-        progress: told in words what is being done.
+        progress: called with what is being done, in words.
     """
     say = Counted(progress, 8 + 4 * bool(costs) + bool(whiteness) + 3 * bool(advice), rough=True)
     if max_effects < 1:
@@ -173,6 +174,8 @@ def searched(
     )
     try:
         state, told, words = search(asked, windows), {}, []
+        if window is None:
+            asked, state = search_over_shorter(asked, state, search)
         if stochastic:
             state, told, words = answer_with_force(asked, state)
         state = settled(asked, state)

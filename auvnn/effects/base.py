@@ -155,7 +155,7 @@ class Effect(nn.Module):
         """Return shapes around the best one that a closer look has found, to look again: level 0, then 1, and so on.
 
         Asked for until the list is empty, which it is by default. An onset or a frequency that is off by more than the
-        errors can tell ends in a valley of its own, out of which no fit gets.
+        errors can tell ends in another local minimum, out of which no fit gets.
 
         Args:
             parameters: of the effect, as `describe` returns them.
@@ -215,7 +215,7 @@ class Effect(nn.Module):
         return bool((shape | (self.theta.detach().cpu().double() == null)).all())
 
     def words(self) -> str:
-        """Return what the effect has to say of itself once it is fitted, beyond its parameters; or nothing."""
+        """Return what the effect has to say about itself once it is fitted, beyond its parameters; or nothing."""
         return ""
 
     def values(self) -> dict[str, float]:

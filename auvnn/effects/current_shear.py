@@ -12,7 +12,7 @@ from auvnn.effects.hooks import Moment, Parameter
 
 
 class CurrentShear(Effect):
-    """Horizontal current in proportion to depth: v = z [north east 0], beside a steady one.
+    """Horizontal current in proportion to depth: v = z [north east 0], in addition to a steady one.
 
     The vehicle that rises or sinks meets a changing current, with acceleration z_dot [north east 0]. The
     rotation of the water, half the gradient, is left out. Reference: DNV-RP-C205 (2010), section 4.

@@ -43,7 +43,7 @@ class DragCurve(Effect):
         return tuple(Parameter(axis, "1", 2.0, 0.3, 1.0, 3.5) for axis in AXES)
 
     def settle(self, vehicle: Any, actuation: str) -> None:
-        """Keep the speeds at which the laws agree, and where parts with drag of their own are."""
+        """Keep the speeds at which the laws agree, and where parts with separate drag are."""
         self.keep("speed", usual_speeds(vehicle))
         self.parts = len(vehicle.damping_elements)
         if self.parts:

@@ -13,7 +13,7 @@ from auvnn.effects.hooks import Body, Moment, Parameter
 class InertiaFactors(Effect):
     """Factors on the moments of inertia about the centre of gravity: I <- S I S, S = diag(sqrt(f)).
 
-    It stands for the stated uncertainty of the inertia. As a cause of its own it can hardly be told from
+    It stands for the stated uncertainty of the inertia. As a separate cause it can hardly be told from
     added mass in roll, pitch and yaw, so the catalogue does not offer it.
     Reference: Fossen (2011), section 3.3.
     """

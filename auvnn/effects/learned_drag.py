@@ -19,7 +19,7 @@ class LearnedDrag(Effect):
 
     tau_i <- tau_i - sum_j a_ij nu_j - sum_jk b_ikj |nu_k| nu_j, all of the velocity through the water. Drag at a
     centre of its own, such as |v + x r| (v + x r), is close to such a sum. It stands for what a diagnosis cannot
-    know of damping that was learned: it is uncertain together with what else is, and as a cause of its own it names
+    know of damping that was learned: it is uncertain together with what else is, and as a separate cause it names
     nothing, so the catalogue does not offer it. Reference: Fossen (2011), section 6.4.
     """
 

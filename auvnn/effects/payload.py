@@ -24,7 +24,7 @@ SURE = 1.0
 
 
 class Payload(Effect):
-    """From `time` on the vehicle carries a point mass at r with a buoyancy of its own, and drags more.
+    """From `time` on the vehicle carries a point mass at r with its own buoyancy, and drags more.
 
     s(t) = 1 / (1 + exp(-(t - time) / (0.3 sqrt(L/g)))) switches on: mass s m_p with weight s m_p g and buoyancy
     s B_p, both at r; the inertia follows by the parallel axes. The load was at rest in the water, so the grasp

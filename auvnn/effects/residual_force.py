@@ -30,7 +30,7 @@ class ResidualForce(Effect):
     is left. Only outer weights are fitted, so the fit has one minimum and the weights say which inputs count.
     The inputs are chosen when it is built, by default all; a model that was saved keeps its choice, by the
     parameters that it states. As a cause it names nothing, so the catalogue does not offer it.
-    Reference: Van de Ven et al. (2004), section 3, for networks beside known physics; Hastie and Tibshirani (1990)
+    Reference: Van de Ven et al. (2004), section 3, for networks added to known physics; Hastie and Tibshirani (1990)
     for additive models.
     """
 

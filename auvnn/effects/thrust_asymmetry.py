@@ -17,8 +17,8 @@ class ThrustAsymmetry(Effect):
 
     The thrust ahead is 1 + a times, the one astern 1 - a times the stated one: their mean gain stays, which is
     `thruster_gain`. A thruster that works in both directions leaves a mean force where a is not zero, which a constant
-    force imitates as long as it works equally hard. Propellers and ducts are made for one direction: of one type of thruster
-    the curve astern reaches about 80 % of that ahead. Reference: Blue Robotics (2019), T200 data; Carlton (2012), Marine
+    force imitates as long as it works equally hard. Propellers and ducts are made for one direction: of the T200 the
+    curve astern reaches about 80 % of that ahead. Reference: Blue Robotics (2019), T200 data; Carlton (2012), Marine
     Propellers and Propulsion, chapter 6 (four quadrants).
     """
 

@@ -47,7 +47,7 @@ class ThrustOvershoot(Effect):
         """Add the excess; the flow is taken as settled at the first row."""
         tau, excess = self.theta[0].to(command), self.theta[1:].to(command)
         steps = (times[..., 1:] - times[..., :-1]).unsqueeze(-1)
-        # The last row has no length of its own: as long as the one before, as if the record went on.
+        # The last row has no known length: as long as the one before, as if the record went on.
         last = steps[..., -1:, :] if steps.shape[-2] else torch.zeros_like(times[..., :1].unsqueeze(-1))
         steps = torch.cat([steps, last], dim=-2)
         return command + excess * (command - self._flow(command, times, tau)) * _left(steps / tau)

@@ -65,7 +65,7 @@ def fit_one_step(
             standard errors and runs left out are worked out from these sums.
         sigma: (18,) fixed weights as in `Fitted`, by default estimated.
         iterations: at most this many steps.
-        progress: told in words after each step.
+        progress: called with the state of the work, in words, after each step.
 
     Raises:
         InputError: no sample has a state, a command and an acceleration.

@@ -112,7 +112,7 @@ def fit(
         sigma: (18,) fixed weights, by default estimated.
         iterations: at most this many steps, and up to five times as many while each still takes a hundredth off the
             squared error: a fit stopped on its way would be judged by where it happened to be.
-        progress: told in words after each step.
+        progress: called with the state of the work, in words, after each step.
 
     Raises:
         FitError: at the values to start from, free running leaves what is finite. A step that does so is not taken.

@@ -1,4 +1,4 @@
-"""What free-running windows say of parameters, as small sums: memory does not grow with the log.
+"""What free-running windows say about parameters, as small sums: memory does not grow with the log.
 
 Of each window the best change of its initial state is projected out, so that windows, and runs, can be left out
 without another pass.
@@ -51,7 +51,7 @@ class Statistics:
         run: (B,) run numbers.
         first: (B,) index of the first sample.
         spent: (B, 18) degrees of freedom that initial state and stochastic force have taken; None without a force.
-        volume: (B,) logarithm of the determinant of what the data say of both; None without a force.
+        volume: (B,) logarithm of the determinant of what the data say about both; None without a force.
     """
 
     hessian: Array

@@ -1,7 +1,7 @@
 """Processes on this machine, each with one thread, that may die without harm.
 
 A worker is a fresh interpreter at the other end of a socket. It gets the function and what all tasks share once,
-then one task at a time. When its socket closes it is dead, killed by the system for want of memory perhaps: its task
+then one task at a time. When its socket closes it is dead, killed by the system for lack of memory perhaps: its task
 goes back to the front of the queue and a new worker takes its place. The pools of the standard library do not go on
 after a death, which is why this one is here.
 """

@@ -63,7 +63,7 @@ def keep_safe() -> None:
 
 @contextlib.contextmanager
 def kept_safe() -> Iterator[None]:
-    """Do the same as `keep_safe` for a while: for libraries that start processes by themselves."""
+    """Do the same as `keep_safe` for a while: for libraries that start processes without being asked."""
     names = ("PYTHONPATH", "PYTHONSAFEPATH")
     before, path = {name: os.environ.get(name) for name in names}, list(sys.path)
     keep_safe()

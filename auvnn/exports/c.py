@@ -64,7 +64,7 @@ def header(system: System, precision: str) -> str:
     return f"""/* {name}: equations of motion of an underwater vehicle, written by {ORIGIN}.
  *
  * SI units and radians; positions in NED, velocities in the body frame x forward, y starboard, z down;
- * the quaternion (w, x, y, z) turns body vectors into NED ones. No function allocates, and none has a state of its own.
+ * the quaternion (w, x, y, z) turns body vectors into NED ones. No function allocates, and none has a separate state.
  *
  * State x in continuous time:
 {listed(flow.state_names())}

@@ -1,4 +1,4 @@
-"""Graphs of scalar operations as C99: straight-line functions without memory of their own."""
+"""Graphs of scalar operations as C99: straight-line functions without memory."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ class Dialect:
     def function_of(
         self, head: str, graph: Graph, targets: Mapping[str, Sequence[int]], also: Sequence[str] = ()
     ) -> str:
-        """Return a whole function; arguments (and those in `also`) that may be without use are named all the same.
+        """Return a whole function; arguments (and those in `also`) that may be without use are named anyway.
 
         Args:
             head: of the function in the target's language.

@@ -20,7 +20,7 @@ def relative(mine: Any, theirs: Any) -> float:
     if not mine.size:
         return 0.0
     size = np.abs(theirs).max(axis=0)
-    # A column of nothing but rounding has no size of its own.
+    # A column of nothing but rounding has no size.
     return float((np.abs(mine - theirs).max(axis=0) / np.maximum(size, max(1e-9 * size.max(), 1e-300))).max())
 
 

@@ -184,7 +184,7 @@ def _build(system: System) -> bytes:
 
 
 def _binary(name: str, code: dict[str, str]) -> tuple[tuple[str, bytes] | None, str]:
-    """Return the place and the content of this machine's binary, or None, and what to say of it."""
+    """Return the place and the content of this machine's binary, or None, and what to say about it."""
     command = toolchain.compiler()
     if command is None:
         return None, "no C compiler here: the FMU holds sources alone, for importers that compile them"

@@ -1,4 +1,4 @@
-"""What files say of where they come from."""
+"""What files say about where they come from."""
 
 from importlib.metadata import PackageNotFoundError, version
 

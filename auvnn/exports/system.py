@@ -165,7 +165,7 @@ class System:
 
 
 class StepModule(nn.Module):
-    """A step as a module of its own, for formats that hold modules: forward(state, inputs, time, h)."""
+    """A step as a separate module, for formats that hold modules: forward(state, inputs, time, h)."""
 
     def __init__(self, space: StateSpace) -> None:
         super().__init__()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from auvnn.answer_types import WaterfallStep
 from auvnn.catalogue import unknown_name
 from auvnn.comparison.baseline import compare_with_baseline
 from auvnn.comparison.compare import floor_of
@@ -58,7 +59,7 @@ def add(
         objective: "rollout" fits the error of free-running windows; "one_step" that of the acceleration one
             step ahead, which is better where lasting disturbances, not sensors, limit the prediction.
         horizons: of free running on the held-out data, s, "5" among them; fewer take less time.
-        progress: told in words what is being done.
+        progress: called with what is being done, in words.
 
     Raises:
         ConfigError: an unknown effect or objective, an effect that is there already, or one named twice.
@@ -99,7 +100,7 @@ def add(
 
 
 def _wanted(effects: str | Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the names to add, and what to say of the choice."""
+    """Return the names to add, and what to say about the choice."""
     if isinstance(effects, str):
         return [effects], []
     if isinstance(effects, OneOf) and len(effects) > 1:
@@ -125,7 +126,9 @@ def _assembled(
     """Return the answer."""
     layout, best, last, key = fits.layout, fits.best, names[-1], judged.key
     results, rolled = judged.results, judged.rolled
-    waterfall = [{"step": s, "error": results[s]["rollout"][key]["total"]} for s, _ in fits.steps]
+    waterfall: list[WaterfallStep] = [
+        {"step": s, "error": results[s]["rollout"][key]["total"]} for s, _ in fits.steps
+    ]
     for horizon, free in rolled[last].items():
         results[last]["rollout"][horizon]["noise_floor"] = floor_of(fits.final, free, test, judged.scale)
     waterfall.append(

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from auvnn.answer_types import ByEffect, OwnFall
+from auvnn.answer_types import ByEffect, OwnFall, WaterfallStep
 from auvnn.answers import PLOTTED, Answer, plain
 from auvnn.cards import PARAMETER_HEAD, Card, figure, parameter_rows
+from auvnn.comparison.predictions import RefittedTraces
 from auvnn.models import GreyBox
 
 
@@ -18,7 +19,7 @@ class Improvement(Answer):
     Attributes:
         model: name of the model before.
         accepted: whether the held-out error fell by more than its own uncertainty, and each effect, added to the others,
-            brings a fall of its own that is beyond its own uncertainty.
+            lowers the error by more than the uncertainty of that fall.
         by_effect: effect to the fall of the held-out error that it adds to that of the others, everything else refitted,
             whether that is beyond its uncertainty, and what else to mind of it.
         baseline: what a plain regression and holding the initial velocity reach on the held-out data.
@@ -40,14 +41,14 @@ class Improvement(Answer):
     refitted: dict[str, Any]
     after: dict[str, Any]
     gain: dict[str, float]
-    waterfall: list[dict[str, Any]]
+    waterfall: list[WaterfallStep]
     parameters: ByEffect
     coefficients: ByEffect
     held_out: str
     model: GreyBox
     refitted_model: GreyBox
     warnings: list[str] = field(default_factory=list)
-    series: list[dict[str, Any]] = field(default_factory=list)
+    series: list[RefittedTraces] = field(default_factory=list)
     objective: str = "rollout"
     left_out: dict[str, float] | None = None
     steps: list[dict[str, Any]] = field(default_factory=list)

@@ -65,7 +65,7 @@ def fit_steps(
         objective: "rollout" or "one_step".
         window: length of the windows that are fitted, s.
         derivative: how accelerations are obtained.
-        say: told in words what is being done.
+        say: called with what is being done, in words.
 
     Raises:
         ConfigError: the objective cannot fit one of the effects.

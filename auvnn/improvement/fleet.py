@@ -1,4 +1,4 @@
-"""The same effects over many dives: each dive is fitted by itself, and the values are held against one another."""
+"""The same effects over many dives: each dive is fitted separately, and the values are compared with one another."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from auvnn.answer_types import Dive, ParameterTrend
 from auvnn.answers import Answer, plain
+from auvnn.cards import measured
 from auvnn.diagnosis.full_data.large_logs import SEARCH
 from auvnn.diagnosis.hypotheses.candidates import (
     check_window_length,
@@ -88,7 +89,7 @@ def fleet(
     force: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Fleet:
-    """Fit the same effects to every dive by itself, and say whether their values change from dive to dive.
+    """Fit the same effects to every dive separately, and say whether their values change from dive to dive.
 
     Each file is a dive, with all its runs. The effects are fitted jointly with the coefficients that are uncertain, as
     `diagnose` does; a dive that cannot be fitted fails alone.
@@ -96,7 +97,7 @@ def fleet(
     Args:
         model: the model as known, or its name or path.
         logs: a folder, a pattern, a file or a list of these.
-        effects: names; those that the model has already are fitted anew on each dive.
+        effects: names; those that the model has already are fitted again on each dive.
         mapping: how the files' columns are named.
         window: length of the windows of free running, s.
         windows: at most so many of each dive, evenly spread: bounds time and memory.
@@ -104,7 +105,7 @@ def fleet(
         executor: who computes: `serial`, `processes`, `ray` or `dask`.
         address: of a Ray or Dask cluster that is running.
         force: fit dives that contradict themselves, or in which nothing moves or is driven, too.
-        progress: told in words what is being done.
+        progress: called with what is being done, in words.
 
     Raises:
         ConfigError: an unknown effect, or none.
@@ -175,7 +176,7 @@ def _together(model: GreyBox, names: list[str], dives: list[Dive], failed: list[
         row["words"] = _words(row, dated)
     warnings = []
     if not dated:
-        warnings.append("not every dive has a date of its own: they are taken in the order of their names")
+        warnings.append("not every dive has a separate date: they are taken in the order of their names")
     poor = [d["file"] for d in dives if d["verdict"] != "adequate"]
     if poor:
         warnings.append(
@@ -218,12 +219,19 @@ def _words(row: ParameterTrend, dated: bool) -> str:
     label = f"{row['effect']}.{row['parameter']}"
     if row["dives"] < 2:
         return f"{label}: {row['dives']} dives say something of it, too few to compare"
-    mean, slope, unit = row["mean"], row["slope"], "" if row["unit"] in ("", "1") else f" {row['unit']}"
+    mean, slope, unit = row["mean"], row["slope"], "" if row["unit"] in ("", "1") else row["unit"]
     constant = row["constancy"]["p_value"]
-    told = f"{label}: mean {mean['value']:.3g} ± {mean['std']:.2g}{unit} over {row['dives']} dives"
+    told = f"{label}: mean {measured(mean['value'], mean['std'], unit)[0]} over {row['dives']} dives"
     if not row["changes"]:
-        return f"{told}, the same on all (p = {constant:.2g})"
+        return f"{told}, the same on all ({_p(constant)})"
     line = ""
     if np.isfinite(slope["value"]):
-        line = f"; {slope['value']:+.3g} ± {slope['std']:.2g} {slope['unit']} (p = {slope['p_value']:.2g})"
-    return f"{told}, not the same on all (p = {constant:.2g}){line}"
+        rises = "+" if slope["value"] > 0 else ""
+        per = f"{unit} per {'day' if dated else 'dive'}".strip()
+        line = f"; {rises}{measured(slope['value'], slope['std'], per)[0]} ({_p(slope['p_value'])})"
+    return f"{told}, not the same on all ({_p(constant)}){line}"
+
+
+def _p(value: float) -> str:
+    # Below the smallest normal number the distribution's tail is lost: "p = 0" would claim more than is known.
+    return f"p = {value:.2g}" if value > 1e-300 else "p < 1e-300"

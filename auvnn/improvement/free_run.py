@@ -73,7 +73,7 @@ class FreeRunFit:
         hessian: (B, P, P).
         slope: (B, P).
         cost: (B,), robust squared error of each window.
-        weight: of the priors beside the errors: the variance of one independent error.
+        weight: of the priors relative to the errors: the variance of one independent error.
         converged: whether the last step was negligible.
     """
 

@@ -19,7 +19,7 @@ from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.one_step import one_step, scores
 from auvnn.metrics.rollouts import Rolled, Scale, roll, rollout_table, scale_of
 
-# Pairs of parameters that the log cannot tell apart: their correlation, and how many are told.
+# Pairs of parameters that the log cannot tell apart: their correlation, and how many are reported.
 ALIKE, TOLD = 0.99, 5
 
 
@@ -33,7 +33,7 @@ class Judged:
         key: the horizon of the gain, s.
         scale: what errors are measured by.
         gain: fall of the total from the refitted model to the one with all effects, and its standard error.
-        by_effect: effect to the same of its own, in addition to the others.
+        by_effect: effect to the same for it alone, in addition to the others.
     """
 
     results: dict[str, dict[str, Any]]

@@ -1,4 +1,4 @@
-"""One dive of a fleet: the question, and the fit of one dive by itself."""
+"""One dive of a fleet: the question, and the fit of one dive alone."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Question:
 
     Attributes:
         model: as known.
-        effects: to be fitted, beside the uncertain coefficients.
+        effects: to be fitted together with the uncertain coefficients.
         mapping: of the columns.
         window: length of the windows, s; None: 5, or less where the dive is short.
         windows: at most so many of a dive, evenly spread.

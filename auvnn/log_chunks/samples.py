@@ -130,7 +130,7 @@ def pieces_of_file(reading: Reading, path: Path) -> Pieces:
 
 
 def concatenate_pieces(found: Sequence[Pieces]) -> Pieces:
-    """Return the pieces of several files; runs get numbers of their own where they clash with earlier ones.
+    """Return the pieces of several files; runs get their own numbers where they clash with earlier ones.
 
     Raises:
         InputError: the files do not have the same columns, or two hold the same bytes.

@@ -23,7 +23,7 @@ ROWS, WINDOWS = 100_000, 96
 
 
 # s before a window that its part has at least, beside the actuators' history, and s at the end of a portion in which
-# nothing is believed yet: fresh starts of the pose are told by the two seconds around them.
+# nothing is believed yet: new starts of the pose are recognised by the two seconds around them.
 BEFORE, HOLD = 5.0, 2.5
 
 

@@ -36,7 +36,7 @@ def plan_files(
     Args:
         paths: of the files.
         cut: how windows are cut.
-        say: told in words what is being done.
+        say: called with what is being done, in words.
 
     Raises:
         InputError: a file cannot be read, or none has a window.
@@ -48,7 +48,7 @@ def plan_files(
 
 
 def concatenate_windows(found: Sequence[Plan]) -> Plan:
-    """Return the plan of several files; runs get numbers of their own where they clash with earlier ones.
+    """Return the plan of several files; runs get their own numbers where they clash with earlier ones.
 
     Raises:
         InputError: there is no window in any of them.
@@ -107,7 +107,7 @@ def windows_of(part: Part, cut: WindowCut) -> Windows:
 
 
 def runs_of(parts: Sequence[Part], cut: WindowCut) -> list[Run]:
-    """Return the stretches that some parts cover, each as a run of its own, numbered from 1.
+    """Return the stretches that some parts cover, each as a separate run, numbered from 1.
 
     Raises:
         InputError: a file is no longer what the plan saw.

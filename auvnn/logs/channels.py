@@ -14,7 +14,7 @@ SCALARS = ("altitude", "voltage", "ballast", "density", "moving_mass")
 DRIVES = ("ballast", "moving_mass")
 """What moves a vehicle without thrusters: a volume that changes, m3, larger is lighter; the shift of a mass, m."""
 RESET = "reset"
-"""Counter of the estimator's resets, or number of its core: where it changes, the pose starts afresh."""
+"""Counter of the estimator's resets, or number of its core: where it changes, the pose starts again."""
 FIXED = ("run", "t", *EULER, *QUATERNION, *VELOCITY, *ACCELERATION, *POSITION, *WRENCH, *SCALARS, RESET)
 
 _NUMBERED = re.compile(r"(thruster|fin)_([1-9][0-9]*)")

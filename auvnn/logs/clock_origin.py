@@ -50,7 +50,7 @@ def counted_from(t: Array, origin: float) -> Array:
 
 
 def note(origin: float, where: str, count: int) -> Repair:
-    """Return what a reader of the log is told.
+    """Return what the reader of the log should know.
 
     Args:
         origin: what was taken off the stamps, s.
@@ -64,7 +64,7 @@ def note(origin: float, where: str, count: int) -> Repair:
 
 
 def from_their_beginning(runs: Iterable[Run], name: str) -> tuple[tuple[Run, ...], tuple[Repair, ...]]:
-    """Return the runs of a log on one clock that begins near zero, and what is to be told of it.
+    """Return the runs of a log on one clock that begins near zero, and what should be reported about it.
 
     Args:
         runs: stamped by one clock; they are returned as they are where it shows no dates.

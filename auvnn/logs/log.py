@@ -148,7 +148,7 @@ class Log(ShownLog):
         """Make a log of runs in memory.
 
         Args:
-            runs: in their order, each with a number of its own.
+            runs: in their order, each with a separate number.
             name: of the log.
             repairs: what was corrected on the way here.
         """

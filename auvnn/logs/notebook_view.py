@@ -66,7 +66,13 @@ class ShownLog(Shown):
             if not self.runs[key]:
                 raise ConfigError(f"log '{self.name}' has {len(self)} runs; the slice takes none of them")
             return replace(cast(Any, self), runs=self.runs[key])
-        return self.runs[key]
+        try:
+            return self.runs[key]
+        except IndexError:
+            last = len(self) - 1
+            raise IndexError(
+                f"log '{self.name}' has no run at place {key}: it has {len(self)}, at 0{f' to {last}' if last else ''}"
+            ) from None
 
     def card(self) -> Card:
         """Return the log's runs, rate and channels."""

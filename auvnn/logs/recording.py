@@ -91,7 +91,7 @@ class Recording:
     Args:
         topics: by name.
         repairs: what was corrected or doubted.
-        facts: what the file says of the vehicle beside its messages, such as parameters.
+        facts: what the file says about the vehicle beside its messages, such as parameters.
         parts: times, s, at which a further recording within the same file begins.
     """
 

@@ -53,7 +53,7 @@ class Run(Shown):
         ballast: volume that changes at constant mass, m3, (N,); larger is lighter.
         density: of the water, kg/m3, (N,).
         moving_mass: shift of a moving mass along its axis, m, (N,).
-        reset: counter of the estimator's resets or number of its core, (N,): where it changes, the pose starts afresh.
+        reset: counter of the estimator's resets or number of its core, (N,): where it changes, the pose starts again.
         extra: columns outside the contract, kept as they were, (N,) each.
         estimated: channels whose values were not measured but estimated, where a vehicle has no sensor for them: free
             running starts from them, and nothing is scored or fitted by them.
@@ -247,7 +247,7 @@ class Run(Shown):
 
     @cached_property
     def restarts(self) -> NDArray[np.intp]:
-        """First samples after the pose has started afresh: an estimator's reset, a moved origin, another core."""
+        """First samples after the pose has started again: an estimator's reset, a moved origin, another core."""
         from auvnn.logs.reading.repairs.resets import restarts
 
         return restarts(self)
@@ -274,7 +274,7 @@ class Run(Shown):
         return self.unbroken(self.valid, max_gap, min_samples)
 
     def cut(self, part: slice, number: int | None = None) -> Run:
-        """Return a part of the run as a run of its own, under the same number unless another is given."""
+        """Return a part of the run as a separate run, under the same number unless another is given."""
         changes: dict[str, Any] = {"number": self.number if number is None else number}
         for item in fields(self):
             value = getattr(self, item.name)

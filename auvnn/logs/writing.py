@@ -113,7 +113,7 @@ def _placed(frame: pl.DataFrame, path: Path) -> Path:
             f"{path} cannot be written: {problem.strerror or one_line(problem, 200)}"
         ) from problem
     except Exception as problem:
-        # What polars says of a full disk is no OSError.
+        # What polars says about a full disk is no OSError.
         if type(problem).__module__.split(".")[0] != "polars":
             raise
         raise InputError(f"{path} cannot be written: {one_line(problem, 200)}") from problem

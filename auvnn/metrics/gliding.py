@@ -102,8 +102,8 @@ def _held(values: Array) -> Array:
 def _rates(run: Run) -> Array:
     """Return body rates (N, 3) at the samples; straight lines between them turn the run as its attitude was measured.
 
-    omega_k is the mean of what the attitude says of the steps on both sides, and what makes up for a share of the angle
-    by which the attitude that these rates add up to has come off the measured one: no error grows along a run.
+    omega_k is the mean rate of the attitude over the steps on both sides, plus a share of the angle by which the attitude
+    that these rates add up to has come off the measured one: no error grows along a run.
     """
     middle, mean = of_attitudes(run.t, run.quaternion)
     if len(middle) < 1:

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 def white(run: Run, x: Array) -> Array:
-    """Return the standard deviation of the white noise of each column, (k,); zero where it cannot be told."""
+    """Return the standard deviation of the white noise of each column, (k,); zero where it cannot be estimated."""
     return np.nan_to_num(np.asarray(noise_std(run.t, x), dtype=float))
 
 

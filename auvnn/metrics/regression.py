@@ -188,7 +188,7 @@ def _free_run(coefficients: Array, windows: Windows, fins: bool, max_step: float
 
 
 def baseline(found: Regression, like: Rolled, scale: Scale, *, left_out: bool) -> dict[str, Any]:
-    """Return the errors of the regression over the windows of a free run, and those of persistence beside it.
+    """Return the errors of the regression over the windows of a free run, and those of persistence.
 
     Args:
         found: the regression.

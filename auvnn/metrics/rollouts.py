@@ -1,4 +1,4 @@
-"""Free-running error by horizon: windows restarted from measured states, persistence beside them."""
+"""Free-running error by horizon: windows restarted from measured states, compared with persistence."""
 
 from __future__ import annotations
 
@@ -222,7 +222,7 @@ def rollout_table(
             rmse = np.sqrt(rolled.squared.sum(0) / rolled.count.sum(0))
         nrmse = rolled.nrmse(scale)
         out[horizon] = {
-            # Of a velocity without a sensor nothing is known; what stands in its place has a name of its own.
+            # Of a velocity without a sensor nothing is known; what stands in its place has a separate name.
             **{n: {"rmse": float("nan"), "nrmse": float("nan")} for n in NAMES if n not in scale.names},
             **{n: {"rmse": float(rmse[k]), "nrmse": float(nrmse[k])} for k, n in enumerate(scale.names)},
             "total": rolled.total(scale),

@@ -230,7 +230,7 @@ def gathered(pieces: Sequence[Piece], warmup: float) -> Windows:
         return gather(lambda run, _: np.asarray(known[run.number]))
 
     times = gather(lambda run, _: run.t)
-    # Repeated history gets times of its own, so that the actuators have time to settle in it.
+    # Repeated history gets separate times, so that the actuators have time to settle in it.
     for row, (run, _, a, _, begin) in enumerate(pieces):
         missing = max(0, before - (a - begin))
         times[row, :missing] = run.t[begin] - run.dt * np.arange(missing, 0, -1)

@@ -1,4 +1,4 @@
-"""The model: known physics, six damping subnetworks beside it, and a list of effects, as one `nn.Module`."""
+"""The model: known physics, six damping subnetworks, and a list of effects, as one `nn.Module`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 def _tensor(value: Any) -> Tensor:
-    """Return numbers as a double tensor of their own; a vehicle's arrays are read-only."""
+    """Return numbers as a separate double tensor; a vehicle's arrays are read-only."""
     if isinstance(value, Tensor):
         return value.detach().clone()
     return torch.tensor(np.array(value, dtype=np.float64))
@@ -165,14 +165,14 @@ class GreyBox(ShownModel, EquationsOfMotion):
     def with_effects(self, wanted: Sequence[str] | Mapping[str, Mapping[str, float] | None]) -> GreyBox:
         """Return the model with further effects (names, classes, instances), at the given values or at their nulls.
 
-        The new model has parameters of its own; damping subnetworks and present effects are copied.
+        The new model has separate parameters; damping subnetworks and present effects are copied.
         """
         values = values_of(wanted)
         new = [effect_class(n).build(self.vehicle, self.actuation, v) for n, v in values.items()]
         return self.rebuilt([*self.copied_effects(), *new])
 
     def copied_effects(self) -> list[Effect]:
-        """Return copies of the effects, with parameters of their own."""
+        """Return copies of the effects, with separate parameters."""
         return [copy.deepcopy(e) for e in self.effects if isinstance(e, Effect)]
 
     def rebuilt(

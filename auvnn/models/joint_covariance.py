@@ -69,7 +69,7 @@ class JointCovariance:
         std = np.sqrt(np.maximum(np.diag(matrix), 0.0))
         if (np.abs(matrix - matrix.T) > ROUNDING * np.outer(std, std)).any():
             raise ModelError(f"{where}: covariance.matrix is not symmetric: {again}")
-        # In units of the standard deviations: parameters have units of their own, and a large one would hide others.
+        # In units of the standard deviations: parameters have different units, and a large one would hide others.
         unit = np.where(std > 0.0, std, 1.0)
         even = matrix / np.outer(unit, unit)
         if (np.diag(matrix) < 0.0).any() or (

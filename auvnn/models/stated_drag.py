@@ -1,4 +1,4 @@
-"""The drag that a vehicle's file states, by itself: what limits the damping subnetworks beside it."""
+"""The drag that a vehicle's file states, alone: what limits the damping subnetworks beside it."""
 
 from __future__ import annotations
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from auvnn.answer_types import AdaptationHistory, ChangeEntry, FrozenErrors, SkippedSamples
 from auvnn.answers import Answer, plain
 from auvnn.damping.bank import Description
 from auvnn.errors import ConfigError, InputError
@@ -46,10 +47,10 @@ class Adaptation(Answer):
     scheme: dict[str, Any]
     guards: dict[str, Any]
     metrics: dict[str, Any]
-    skipped: dict[str, dict[str, Any]]
-    changes: list[dict[str, Any]]
-    history: list[dict[str, Any]]
-    frozen: list[dict[str, Any]]
+    skipped: dict[str, SkippedSamples]
+    changes: list[ChangeEntry]
+    history: list[AdaptationHistory]
+    frozen: list[FrozenErrors]
     compared: str
     model: GreyBox
     adapter: Adapter
@@ -87,7 +88,7 @@ def adapt(
         guards: "full", "none", or numbers by name.
         damping: form of the subnetworks for a model that has none.
         state: folder for the adapter's state at the end, from which `Adapter.restore` goes on.
-        progress: told in words after each run.
+        progress: called with the state of the work, in words, after each run.
 
     Raises:
         ConfigError: an unknown scheme, guard or option.
@@ -115,7 +116,7 @@ def adapt(
         )
     adapter = Adapter(model, scheme, guards=guards, damping=damping)
     started = adapter.snapshot()
-    changes: list[dict[str, Any]] = []
+    changes: list[ChangeEntry] = []
     updates: list[list[Update]] = []
     history, frozen, warnings = [], [], []
     each = max(1, -(-log.samples // ROWS))
@@ -125,7 +126,7 @@ def adapt(
         seen = len(adapter.changes)
         own, rows, snapshots, moved = _through(adapter, run, started)
         updates.append(own)
-        changes += [{"run": run.number, **c.to_dict()} for c in adapter.changes[seen:]]
+        changes += [c.entry(run.number) for c in adapter.changes[seen:]]
         history.append(_history(run, own, moved, each))
         frozen.append(_frozen(adapter, run, rows, snapshots, started, warnings))
         if progress is not None:
@@ -135,14 +136,11 @@ def adapt(
     if state is not None:
         adapter.save(state)
     every = [u for own in updates for u in own]
-    measured = all(run.nu_dot is not None for run in log.runs)
-    compared = (
-        "measured accelerations"
-        if measured
-        else "increments of velocity over each sample, measured and of the model alike"
-    )
+    compared = "increments of velocity over each sample, measured and of the model alike"
+    if all(run.nu_dot is not None for run in log.runs):
+        compared = "measured accelerations"
     counts = adapter.counts
-    skipped = {
+    skipped: dict[str, SkippedSamples] = {
         name: {"count": counts.skipped[name], "words": REASONS[name]}
         for name in REASONS
         if counts.skipped[name]
@@ -154,7 +152,7 @@ def adapt(
             f"the model had no damping subnetworks: {form} ones were added, giving nothing at first"
         )
     if not counts.adapted:
-        warnings.append("nothing was learned: no sample passed the guards; the model is as it was")
+        warnings.append("nothing was learned: no sample passed the guards; the model is unchanged")
     return Adaptation(
         model.vehicle.name,
         log.name,
@@ -210,20 +208,26 @@ def _distance(now: dict[str, Tensor], started: dict[str, Tensor]) -> float:
     return away / size if size > 0.0 else away
 
 
-def _history(run: Run, own: list[Update], moved: Array, each: int) -> dict[str, Any]:
+def _history(run: Run, own: list[Update], moved: Array, each: int) -> AdaptationHistory:
     """Return a run's time histories: root mean squares over `each` samples, null where nothing was compared."""
     starts = range(0, run.samples, each)
-    told: dict[str, Any] = {"run": run.number, "t": [float(run.t[k]) for k in starts]}
-    for name in ("prediction_error", "unadapted_error"):
+
+    def errors(name: str) -> list[list[float | None]]:
         values = np.full((run.samples, 6), np.nan)
         for k, update in enumerate(own):
             found = getattr(update, name)
             if found is not None:
                 values[k] = found.numpy()
-        told[name] = [_rms(values[k : k + each]) for k in starts]
-    told["moved"] = [float(moved[k]) for k in starts]
-    told["cause"] = [_commonest([u.cause for u in own[k : k + each]]) for k in starts]
-    return told
+        return [_rms(values[k : k + each]) for k in starts]
+
+    return {
+        "run": run.number,
+        "t": [float(run.t[k]) for k in starts],
+        "prediction_error": errors("prediction_error"),
+        "unadapted_error": errors("unadapted_error"),
+        "moved": [float(moved[k]) for k in starts],
+        "cause": [_commonest([u.cause for u in own[k : k + each]]) for k in starts],
+    }
 
 
 def _rms(values: Array) -> list[float | None]:
@@ -240,9 +244,9 @@ def _commonest(causes: list[str]) -> str:
 def _frozen(
     adapter: Adapter, run: Run, rows: list[int], snapshots: list[dict[str, Tensor]],
     started: dict[str, Tensor], warnings: list[str],
-) -> dict[str, Any]:  # fmt: skip
+) -> FrozenErrors:  # fmt: skip
     """Return errors of free runs with the weights of each moment, and with those at the start."""
-    told: dict[str, Any] = {"run": run.number, "horizon": HORIZON, "t": [], "adapted": [], "unadapted": []}
+    told: FrozenErrors = {"run": run.number, "horizon": HORIZON, "t": [], "adapted": [], "unadapted": []}
     try:
         adapted = frozen_errors(adapter.model, run, snapshots, rows, horizon=HORIZON)
         before = frozen_errors(adapter.model, run, started, rows, horizon=HORIZON)
@@ -258,7 +262,7 @@ def _frozen(
     }
 
 
-def _metrics(adapter: Adapter, updates: list[Update], frozen: list[dict[str, Any]]) -> dict[str, Any]:
+def _metrics(adapter: Adapter, updates: list[Update], frozen: list[FrozenErrors]) -> dict[str, Any]:
     counts = adapter.counts
     found: dict[str, Any] = {
         "samples": counts.samples,

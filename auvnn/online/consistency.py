@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 OVER = 1.0  # s over which disagreement is summed up
 SURE = 6.0  # standard deviations of the sum
-# Mean disagreement that is never held against a sensor: turning rate against attitude (rad/s), velocity against
+# Mean disagreement that is never blamed on a sensor: turning rate against attitude (rad/s), velocity against
 # position (m/s), velocity against accelerations (m/s2, rad/s2).
 ALLOWED = np.array([0.02] * 3 + [0.05] * 3 + [0.15] * 6)
 STUCK = 5  # samples of exactly the same value in one channel while others move

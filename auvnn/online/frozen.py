@@ -130,7 +130,7 @@ def _free(
     model: GreyBox, weights: Mapping[str, Tensor], eta0: Tensor, nu0: Tensor, inputs: list[Tensor | None],
     times: Tensor, max_step: float,
 ) -> Tensor:  # fmt: skip
-    # All windows share one clock: their times since the start differ by rounding, or the caller is told.
+    # All windows share one clock: their times since the start differ by rounding, or it is an error.
     first = times[0]
     if float((times - first).abs().max()) > 1e-3 * float(first[-1]):
         raise ConfigError("frozen_errors: the run is not evenly sampled: resample it first")

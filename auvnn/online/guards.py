@@ -37,7 +37,7 @@ class Guards:
     """Numbers of the guards; `Guards.none()` leaves only what no adapter can do without.
 
     Attributes:
-        max_gap: a longer step in time starts the history afresh, s.
+        max_gap: a longer step in time starts the history again, s.
         max_age: a sample older than this when it arrives is stale, s; needs `now` at each step.
         rest: speeds below this share of the subnetworks' velocity scale do not excite the damping.
         idle: at rest samples are looked at ever more rarely, in the end one in this many; the others cost next to

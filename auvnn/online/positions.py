@@ -28,9 +28,9 @@ SPANS = (1.0, 3.0, 10.0)  # s
 SURE = 6.0  # standard deviations of D
 # Mean velocity (m/s) and share of the way by which both may differ without a fault: levers, scales, alignment.
 ALLOWED, SHARE = 0.05, 0.25
-# A step beyond this many times the usual one, and m, is a position set anew: the ways begin again behind it.
+# A step beyond this many times the usual one, and m, is a position reset: the ways begin again behind it.
 ANEW, LEAST = 10.0, 0.2
-# Scale of the velocity against the positions that is never held against it, and what confirms it.
+# Scale of the velocity against the positions that is never blamed on it, and what confirms it.
 SCALE, CLOSE = 0.3, 0.15
 # The way is confirmed when it is this many times longer than what D leaves open.
 CLEAR = 3.0
@@ -49,7 +49,7 @@ class Positions:
         self.forget()
 
     def forget(self) -> None:
-        """Start again: another run, or positions that were set anew."""
+        """Start again: another run, or positions that were reset."""
         self._nodes: Array = np.zeros((0, 8))  # t, position, integral of the velocity, its length
         self._steps: Array = np.zeros((0, 4))  # dt, velocity: the last samples
         self._sum: Array = np.zeros(4)

@@ -1,4 +1,4 @@
-"""What one sample says of the damping: the wrench that the model lacks, from an acceleration or an increment.
+"""What one sample says about the damping: the wrench that the model lacks, from an acceleration or an increment.
 
 With a measured acceleration, M nu_dot + ... is compared at the sample itself. Without one, the model is run over
 the interval since the last sample, from the measured state and under the command that was held, and its increment
@@ -119,7 +119,7 @@ class Predictor:
         return self._last
 
     def forget(self) -> None:
-        """Drop the history: the next sample starts afresh."""
+        """Drop the history: the next sample starts again."""
         self.history.clear()
 
     def forget_all(self) -> None:

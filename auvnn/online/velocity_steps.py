@@ -97,7 +97,7 @@ class VelocitySteps:
         return {**{k: torch.tensor(v) for k, v in parts.items()}, "since": torch.tensor(self._since)}
 
     def load(self, state: Mapping[str, Tensor]) -> None:
-        """Take up a state; one that was saved before there was this test begins anew."""
+        """Take up a state; one that was saved before there was this test begins again."""
         if state:
             self._rates = state["rates"].numpy().copy()
             self._first, self._sum = state["first"].numpy().copy(), state["sum"].numpy().copy()

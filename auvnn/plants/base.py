@@ -185,7 +185,7 @@ def refuse_laws(plant: Plant, task: PlantTask) -> None:
 
 
 def refuse_learned(plant: Plant, task: PlantTask) -> None:
-    """Refuse a model with learned damping, for plants that have equations of their own.
+    """Refuse a model with learned damping, for plants that have separate equations.
 
     Raises:
         ConfigError: there are damping subnetworks.

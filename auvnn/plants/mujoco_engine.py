@@ -75,7 +75,7 @@ class MujocoPlant(Plant):
             return f"{REFUSED[effect]}; use plant=numpy"
         if effect in SUPPORTED or effect.startswith("stranger_"):
             return ""
-        return "it has no equations of its own for it; use plant=own"
+        return "it has no equations for it; use plant=own"
 
     def move(self, task: PlantTask, look: Look) -> Motion:
         """Run the engine."""

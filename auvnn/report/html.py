@@ -35,6 +35,9 @@ _ATTRIBUTES = {
     *("patternUnits", "patternTransform", "gradientUnits", "gradientTransform", "opacity", "text-anchor"),
     *("stroke-width", "fill-opacity", "stroke-opacity", "clip-rule", "fill-rule", "font-size", "font-family"),
 }
+SHORTEST, SENTENCE = 12, 24  # letters, up to which a cell is one word, and from which it is a sentence
+LONGEST_WORD = 14  # letters, from which a name in a table may be broken
+_AFTER_SIGN = re.compile(r"([_+/])(?=\w)")
 _LONG_NUMBER = re.compile(r"(-?\d+\.\d\d)\d+")
 
 
@@ -105,7 +108,7 @@ def environment() -> Environment:
         from jinja2 import Environment, PackageLoader, StrictUndefined
     except ImportError as problem:
         raise MissingExtra("jinja2", "report", "the HTML report") from problem
-    return Environment(
+    found = Environment(
         loader=PackageLoader("auvnn.report", "templates"),
         autoescape=True,
         undefined=StrictUndefined,
@@ -113,11 +116,30 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    found.filters["breakable"] = breakable
+    found.filters["room"] = room
+    return found
 
 
 def _finalize(value: Any) -> Any:
     # Markup is ours alone, made by `figure_markup`; everything else may come from a log.
     return value if hasattr(value, "__html__") else visible(value)
+
+
+def breakable(value: Any) -> Any:
+    """Return a cell as markup in which a long name may be broken after `_`, `+` and `/`, and nowhere inside a word."""
+    from markupsafe import Markup, escape
+
+    text = str(escape(visible(value)))
+    if max(map(len, text.split()), default=0) > LONGEST_WORD:
+        text = _AFTER_SIGN.sub(r"\1<wbr>", text)
+    return Markup(text)
+
+
+def room(value: Any) -> str:
+    """Return how wide a cell of words is kept on a narrow screen: `word` stays whole, `words` are not squeezed."""
+    length = len(visible(value))
+    return "word" if length <= SHORTEST else "words" if length > SENTENCE else "some"
 
 
 def render(part: Part) -> str:
@@ -131,7 +153,7 @@ def figure_markup(figure: Figure, prefix: str, alt: str, drawing: str | None = N
     Args:
         figure: what to show.
         prefix: unique on the page; every id in the SVG begins with it.
-        alt: what a reader who does not see it is told.
+        alt: the description for readers who do not see it.
         drawing: the figure as SVG, where that has been made already.
     """
     from markupsafe import Markup

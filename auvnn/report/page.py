@@ -36,7 +36,7 @@ class Plot:
         draw: draws it, or raises NoData with what is missing in words.
         caption: what to see in it; a function is called after drawing.
         folded: closed until it is opened.
-        lone: another one where the truth is known, so that a report of several answers must draw it anew.
+        lone: another one where the truth is known, so that a report of several answers must draw it again.
     """
 
     name: str

@@ -18,7 +18,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import PlaceHolderLayoutEngine
-from matplotlib.ticker import ScalarFormatter
+from matplotlib.ticker import FuncFormatter, ScalarFormatter
 
 P = ParamSpec("P")
 
@@ -178,6 +178,24 @@ def axis_label(symbol: str, unit: str = "") -> str:
 def show_grid(axes: Axes, axis: Literal["x", "y", "both"] = "y") -> None:
     """Lay a faint grid under the data."""
     axes.grid(True, axis=axis, which="major")
+
+
+def log_scale(axes: Axes, axis: Literal["x", "y"]) -> None:
+    """Make an axis logarithmic, its ticks in plain numbers; ticks between the decades are named where these are few."""
+    getattr(axes, f"set_{axis}scale")("log")
+    own = getattr(axes, f"{axis}axis")
+
+    def plain(value: float, _: int | None = None) -> str:
+        return f"{value:g}" if 1e-4 < value < 1e5 else f"$10^{{{np.log10(value):.0f}}}$"
+
+    def between(value: float, _: int | None = None) -> str:
+        low, high = own.get_view_interval()
+        few = low > 0 and np.log10(high / low) < 1.5
+        leading = round(value / 10.0 ** np.floor(np.log10(value) + 1e-9))
+        return plain(value) if few and leading in (2, 5) else ""
+
+    own.set_major_formatter(FuncFormatter(plain))
+    own.set_minor_formatter(FuncFormatter(between))
 
 
 def note(axes: Axes, text: str, **where: Any) -> None:

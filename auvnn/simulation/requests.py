@@ -1,4 +1,4 @@
-"""What is asked of a simulation: whether it can be made, and what is told of it."""
+"""What is asked of a simulation: whether it can be made, and what is reported about it."""
 
 from __future__ import annotations
 

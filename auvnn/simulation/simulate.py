@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from auvnn.cards import Card, Shown, figure
 from auvnn.effects import EFFECTS
 from auvnn.effects.sizes import radius
 from auvnn.errors import ConfigError
@@ -32,13 +33,13 @@ from auvnn.threads import on_one_thread
 
 Array = NDArray[np.float64]
 
-# Every kind of random number has a stream of its own: another noise must not change the manoeuvre.
+# Every kind of random number has a separate stream: another noise must not change the manoeuvre.
 STREAMS = ("excitation", "noise", "hidden", "voltage", "added_mass", "linear_damping", "quadratic_damping",
            "inertia", "altitude", "law", "force", "sensing")  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Simulation:
+@dataclass(frozen=True, repr=False)
+class Simulation(Shown):
     """A made log and the truth behind it.
 
     Attributes:
@@ -57,6 +58,23 @@ class Simulation:
     set_points: dict[str, Array] = field(default_factory=dict)
     task: PlantTask | None = None
     motion: Motion | None = None
+
+    def card(self) -> Card:
+        """Return what was made, and what is hidden in it."""
+        hidden = self.truth.get("hidden") or {}
+        rows = [
+            [effect, name, figure(value, 4)]
+            for effect, values in hidden.items()
+            for name, value in values.items()
+        ]
+        inner = self.log.card()
+        return Card(
+            f"Simulation of {self.truth.get('model')}",
+            f"{inner.line}; hidden: {', '.join(hidden) or 'nothing'}",
+            head=("hidden effect", "parameter", "value"),
+            rows=rows,
+            foot=".log, .truth, .plant",
+        )
 
 
 @on_one_thread
@@ -189,7 +207,7 @@ def simulate(
         known = replace(
             task, effects={str(e.name): e.values() for e in bare.members}, strangers={}, model=bare
         )
-        # A controller keeps a memory, so the trial is flown by one of its own.
+        # A controller keeps a memory, so the trial is flown by another one.
         own = manner.plan(model, t, [_generator(seed, "excitation", i) for i in range(runs)])
         forces = [_generator(seed, "force", i) for i in range(runs)]
         known, wandering = disturbed(

@@ -49,7 +49,7 @@ def write_folder(
     for name in files:
         check_name(name, path)
     if MANIFEST in files:
-        raise InputError(f"{path}: '{MANIFEST}' is written by itself: leave it out")
+        raise InputError(f"{path}: '{MANIFEST}' is written automatically: leave it out")
     content = {name: data.encode() if isinstance(data, str) else bytes(data) for name, data in files.items()}
     listing = {n: {"sha256": hashlib.sha256(d).hexdigest(), "bytes": len(d)} for n, d in content.items()}
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -78,7 +78,7 @@ def run_demo(out: Path, seed: int = 0, say: Callable[[str], None] = print) -> De
     Args:
         out: folder; gets one subfolder per verb and `report.html`.
         seed: of manoeuvre and noise.
-        say: told the story line by line.
+        say: called with each line of the story.
     """
     import time
 

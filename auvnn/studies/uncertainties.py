@@ -92,7 +92,7 @@ def uncertainties(
             uncertain by their plausible scales.
         seed: of the manoeuvres and of the networks.
         networks: whether to train networks on each effect's trace as well, which takes most of the time.
-        progress: told in words what is being done.
+        progress: called with what is being done, in words.
 
     Raises:
         ConfigError: an option is out of range.
@@ -111,7 +111,7 @@ def uncertainties(
         found[name] = information(vehicle, log, prior, networks)
         shares: dict[str, Any] = {}
         if networks:
-            # What was learned on the paper's single curve is held against a motion that goes everywhere.
+            # What was learned on the paper's single curve is compared with a motion that goes everywhere.
             other = logs.get("multisine") if name == "paper" else None
             for effect in SWALLOWED:
                 if effect not in vehicle.effect_names:

@@ -1,4 +1,4 @@
-"""What an effect says of itself, and which values it refuses."""
+"""What an effect says about itself, and which values it refuses."""
 
 from __future__ import annotations
 

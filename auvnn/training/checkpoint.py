@@ -43,7 +43,7 @@ class Checkpoints:
         return sorted(names, key=lambda path: int(path.name.rpartition("-")[2]), reverse=True)
 
     def refuse_if_used(self) -> None:
-        """Refuse to start afresh over the checkpoints of another fit.
+        """Refuse to start again over the checkpoints of another fit.
 
         Raises:
             InputError: there are checkpoints.

@@ -136,7 +136,7 @@ def fit_structure(
         seed: of the starting points.
         restarts: starting points of joint problems.
         max_iterations: of joint problems.
-        progress: told in words.
+        progress: called with the state of the work, in words.
     """
     began = time.perf_counter()
     data = OneStepData.of(log, model)

@@ -103,7 +103,7 @@ def train(
     force: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Training:
-    """Train damping subnetworks beside what a model states.
+    """Train damping subnetworks in addition to what a model states.
 
     Subnetworks that the model has already are replaced. A part of the log decides when to stop; the test log
     decides nothing and is only judged on.
@@ -121,7 +121,7 @@ def train(
         checkpoint: folder of checkpoints, from which `resume` goes on, bit for bit.
         resume: go on from the newest checkpoint; "force" even where data or options have changed.
         force: go on with a log that contradicts itself: signs, units, axes.
-        progress: told in words every few iterations.
+        progress: called with the state of the work, in words, every few iterations.
 
     Raises:
         ConfigError: an unknown scheme, form or option.

@@ -10,7 +10,7 @@
 
 Memory is that of a piece and of a few groups, whatever the log; time is linear in the samples. What needs the log in one
 place (its quality, and whether something that is not damping was learned) is judged on a sample, evenly spread, and the
-answer says of how many.
+answer says about how many.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def train_files(
             Workers on other machines share it if they can see it.
         group: samples whose sums are made in one place. The answer is that of `train` to the last bit where this is
             left as it is.
-        progress: told in words what is being done.
+        progress: called with what is being done, in words.
 
     Raises:
         ConfigError: an unknown scheme, form, option or executor, or one that cannot be spread.

@@ -117,7 +117,7 @@ def check_drives(vehicle: Any, where: str) -> None:
     """Refuse what does not go together.
 
     Raises:
-        ModelError: thrusters beside a ballast, a moving mass or a measured attitude.
+        ModelError: thrusters together with a ballast, a moving mass or a measured attitude.
     """
     glides = vehicle.ballast is not None or vehicle.moving_mass is not None
     if vehicle.thrusters and (glides or vehicle.reduced.attitude == "measured"):

@@ -17,9 +17,11 @@ def summary(vehicle: Vehicle) -> Text:
     """Return a few lines: weight and buoyancy, centres, inertia, damping, actuators, uncertainty, what is doubtful."""
     v = vehicle
     net = v.buoyancy - v.weight
+    # mass * gravity seldom meets the stated buoyancy to the last digit.
+    net = 0.0 if abs(net) < 1e-9 * v.weight else net
     floats = "floats up" if net > 0 else "sinks" if net < 0 else "neutral"
     height = float(v.center_of_gravity[2] - v.center_of_buoyancy[2])
-    upright = "upright at rest" if height > 0 else "not upright at rest by itself"
+    upright = "upright at rest" if height > 0 else "not upright at rest"
     rows = [
         ("mass", f"{v.mass:.6g} kg; length {v.length:.4g} m"),
         ("weight, buoyancy", f"{v.weight:.6g} N, {v.buoyancy:.6g} N: {net:+.4g} N, {floats}"),

@@ -183,6 +183,12 @@ def test_a_partial_verdict_claims_no_cause(page):
     assert (
         cards[0].startswith("net_buoyancy") and "predicts" in cards[0] and not cards[2].endswith("predicts")
     )
+    # After what predicts, by what each explains alone.
+    assert [c.split()[0].removesuffix("predicts") for c in cards] == [
+        "net_buoyancy",
+        "constant_force",
+        "waves",
+    ]
     assert found.locator("#try").inner_text() == "Try net_buoyancy, constant_force"
     assert not barriers(found, "partial")
 

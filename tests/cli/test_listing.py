@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 
@@ -72,3 +73,16 @@ def test_the_composed_options_can_be_shown(auvnn, verb):
     status, out, err = auvnn(verb, "--cfg", "job")
     assert (status, err) == (0, "")
     assert {"out", "overwrite", "json", "dry_run"} <= set(yaml.safe_load(out))
+
+
+@pytest.mark.parametrize("verb", ["adapt", "train", "study"])
+def test_the_help_lists_the_choices_of_its_own_groups_and_no_others(auvnn, verb):
+    """Of each group of configurations that the verb composes, every member; a list of all groups would mislead."""
+    listed = dict(
+        re.findall(r"^\s+(\w+): ([\w, ]+)$", auvnn(verb, "--help")[1].partition("choices,")[2], re.M)
+    )
+    composed = yaml.safe_load((config_dir() / f"{verb}.yaml").read_text(encoding="utf-8"))["defaults"]
+    groups = {name for entry in composed if isinstance(entry, dict) for name in entry if "/" not in name}
+    assert set(listed) == groups
+    for group, members in listed.items():
+        assert members.split(", ") == sorted(p.stem for p in (config_dir() / group).glob("*.yaml"))

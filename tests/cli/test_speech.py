@@ -113,7 +113,7 @@ def test_redirected_progress_is_a_line_now_and_then(capsys):
     assert capsys.readouterr().err.splitlines() == [
         f"progress  working ({t})" for t in ("30 s", "1 min 00 s", "1 min 30 s")
     ]
-    say("a line of its own")
+    say("a separate line")
     clock.now += 29.0
     say.progress("working")
     assert capsys.readouterr().err == ""
@@ -148,7 +148,7 @@ def test_at_a_terminal_one_line_tells_what_is_done_and_to_come_and_the_time_left
     clock.now -= 10.0
     say.progress(Progress("dive", 2, 6))
     assert last_line(terminal) == "dive (2 of 6 done, 50 s, about 1 min 10 s left)"
-    # The next work begins a count of its own, without a guess from the one before.
+    # The next work begins a separate count, without a guess from the one before.
     say.progress(Progress("weights", 0, 4, rough=True))
     assert last_line(terminal) == "weights (0 of about 4 done, 50 s)"
 

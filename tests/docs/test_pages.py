@@ -100,7 +100,7 @@ def test_yaml_blocks_are_models_or_mappings(name):
 
 def test_the_page_of_effects_is_made_from_the_classes():
     made = describe_all([EFFECTS.get(name) for name in EFFECTS.names()])
-    assert page("effects") == made, "write it anew: auvnn effects all > auvnn/docs/effects.md"
+    assert page("effects") == made, "write it again: auvnn effects all > auvnn/docs/effects.md"
 
 
 @pytest.mark.parametrize("name", EFFECTS.names())

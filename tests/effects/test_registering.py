@@ -14,7 +14,7 @@ pytestmark = pytest.mark.usefixtures("catalogue_as_before")
 
 
 def net_drag(name: str = "net_drag") -> type[Effect]:
-    """Return a class of its own each time, as a notebook's cell does that runs again."""
+    """Return a separate class each time, as a notebook's cell does that runs again."""
 
     class NetDrag(Effect):
         """A net that is towed: X = -drag |u_r| u_r."""

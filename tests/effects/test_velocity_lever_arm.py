@@ -36,7 +36,7 @@ def test_the_motion_itself_does_not_change(plain, level, still, vector):
 
 
 def test_it_is_the_velocity_of_the_place_of_the_sensor():
-    """Follow p + R r through a free run and differentiate; the same for what it says of accelerations."""
+    """Follow p + R r through a free run and differentiate; the same for what it says about accelerations."""
     model = GreyBox(load_vehicle("rov95"), actuation="wrench").with_effects({"velocity_lever_arm": ARM})
     arm = torch.tensor(list(ARM.values()), dtype=torch.float64)
     step = 1e-3

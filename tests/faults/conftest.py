@@ -25,7 +25,7 @@ def good() -> str:
 
 @pytest.fixture(autouse=True)
 def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, good: str) -> Path:
-    """Stand in a folder of its own, with the good log and the file of a vehicle in it."""
+    """Stand in a separate folder, with the good log and the file of a vehicle in it."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "good.csv").write_text(good)
     put()

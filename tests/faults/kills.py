@@ -78,7 +78,7 @@ class Told:
 
 
 def forked(call: Callable[[], int], log: Path) -> int:
-    """Start a call in a child with a process group of its own, and return its number."""
+    """Start a call in a child with a separate process group, and return its number."""
     sys.stdout.flush()
     sys.stderr.flush()
     pid = os.fork()

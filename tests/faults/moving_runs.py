@@ -1,4 +1,4 @@
-"""Runs whose positions and velocities belong together, and what check says of a log."""
+"""Runs whose positions and velocities belong together, and what check says about a log."""
 
 from __future__ import annotations
 

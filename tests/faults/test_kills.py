@@ -15,7 +15,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL and for
 
 @pytest.mark.long
 def test_row_75_two_hundred_kills_leave_nothing_half_written():
-    """In a process of its own: it is forked, which one that has other threads must not be."""
+    """In a separate process: it is forked, which one that has other threads must not be."""
     command = [sys.executable, "-m", "tests.faults.kills", "200"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=6 * 3600)
     assert done.returncode == 0, done.stderr[-3000:]

@@ -33,7 +33,7 @@ def test_a_clean_log_gives_none_of_these_findings():
     for subject in (
         "clock",
         "delay",
-        "afresh",
+        "starts again",
         "lever arm",
         "situation",
         "current:",
@@ -130,7 +130,7 @@ def test_row_49_a_reset_of_the_estimate_cuts_the_run():
     windows = cut_windows(Log.from_runs([run]), 5.0)
     assert not ((windows.first < 700) & (windows.first + windows.length > 700)).any()
     words = found(Log.from_runs([run]))
-    assert "repair: run 1: the pose starts afresh 1 times (1 by a jump against the velocities" in words
+    assert "repair: run 1: the pose starts again once (1 by a jump against the velocities" in words
     assert jumped(500, step=(0, 0, 0), turn=0.5).restarts.tolist() == [500], "a heading that is reset"
     assert jumped(700, until=710).restarts.tolist() == [], "a jump that is taken back is a glitch"
     assert jumped(700, step=(0.02, 0, 0)).restarts.tolist() == [], "noise is no reset"

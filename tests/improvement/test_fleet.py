@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -96,6 +97,9 @@ def test_a_change_is_seen_and_put_in_words(found):
     (row,) = found.trends
     assert row["changes"] and row["constancy"]["p_value"] < 1e-6
     assert "net_buoyancy.force" in row["words"] and "not the same on all" in row["words"]
+    # Values to two digits of their standard deviation, slopes by the day; no probability of nothing at all.
+    assert re.search(r"mean \d+\.\d{2,3} ± 0\.0\d{1,2} N over 3 dives", row["words"]), row["words"]
+    assert " N per day (p" in row["words"] and "p = 0)" not in row["words"]
     assert found.metrics["parameters_changing"] == 1
 
 

@@ -64,7 +64,7 @@ def test_the_gain_and_its_uncertainty_are_those_of_leaving_blocks_out():
         keep = np.arange(60) // 3 != block
         without.append(error(before, keep) - error(after, keep))
     assert std == pytest.approx(np.sqrt(19 / 20 * np.sum((np.array(without) - np.mean(without)) ** 2)))
-    # About what the windows' own scatter says of a mean of sixty.
+    # About what the windows' own scatter says about a mean of sixty.
     assert 0.05 < std / value < 0.3
 
 

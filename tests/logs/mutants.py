@@ -55,7 +55,7 @@ def read_all(name: str, count: int, seed: int = 0) -> tuple[float, float, int]:
     """Read damaged files of one format.
 
     Returns:
-        The longest time of a file, s; the largest memory of this process, bytes; the number that was read all the same.
+        The longest time of a file, s; the largest memory of this process, bytes; the number that was read anyway.
     """
     import resource
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from html.parser import HTMLParser
 
-VOID = {"meta", "img", "br", "hr", "link", "input"}
+VOID = {"meta", "img", "br", "hr", "link", "input", "wbr"}
 FORBIDDEN = {
     *("script", "iframe", "object", "embed", "base", "form", "link", "foreignobject", "animate", "set"),
     *("audio", "video", "source", "template"),
@@ -44,7 +44,11 @@ class PageText(HTMLParser):
             self.open.pop()
 
     def handle_data(self, data):
-        (self.styles if self.open[-1:] == ["style"] else self.words).append(data)
+        if self.words and self.tags[-1][0] == "wbr":
+            # A place where a word may be broken, and no end of it.
+            self.words[-1] += data
+        else:
+            (self.styles if self.open[-1:] == ["style"] else self.words).append(data)
 
     def handle_comment(self, data):
         self.comments.append(data)

@@ -1,4 +1,4 @@
-"""What the page of the benchmark says of a plan: targets, rates, p-values where nothing is hidden, held-out falls."""
+"""What the page of the benchmark says about a plan: targets, rates, p-values where nothing is hidden, held-out falls."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ from scipy import stats
 
 from auvnn.report.pages.benchmark import PAGE, BenchmarkPage
 from auvnn.report.pages.sections import outcomes
+from auvnn.report.pages.sections.benchmark_rates import WORDS as NAMES
+from auvnn.report.pages.sections.benchmark_rates import target_words
 from auvnn.report.panels import NoData
 from auvnn.report.plots.falls import HIGH, LOW, falls
 from auvnn.report.plots.recovery import ALL
 from auvnn.report.plots.uniformity import uniformity
 from auvnn.report.view import View
 from auvnn.studies.benchmark import summarise
+from auvnn.studies.benchmark.counts.rates import NUMBERS, RATES
 from tests.report.html_reading import PageText, broken_references, dangers
 
 WORDS = BenchmarkPage(without=("confusion", "recovery", "coverage", "uniformity", "falls"))
@@ -65,11 +68,22 @@ def text(answer: Any, page: BenchmarkPage = WORDS) -> str:
 
 def test_it_begins_with_the_targets(answer):
     said = text(answer)
-    assert "1 of 2 targets are met; missed: named first in one (75 %, wanted at least 90 %)." in said
+    assert "1 of 2 targets are met. Missed in “one”, named first: 75 % (wanted at least 90 %)." in said
     assert "Of 2 logs that hide several effects, 1 got all names and no other." in said
     assert "Of 2 logs that hide something outside the catalogue, 1 were answered unknown." in said
     # What is hidden beside them does not count among single effects.
     assert "In 3 of 4 logs the hidden effect is named first" in said
+
+
+def test_every_rate_has_a_name_in_words_and_few_missed_targets_are_told_first():
+    assert set(NAMES) == {*RATES, *NUMBERS}
+    missed = [
+        {"part": f"p{k}", "rate": "named_first", "share": 0.5, "least": 0.9, "met": False} for k in range(9)
+    ]
+    (said,) = target_words(View({"targets": missed}))
+    assert said.startswith("0 of 9 targets are met. Missed in “p0”, named first: 50") and said.endswith(
+        "; and 6 others."
+    )
 
 
 def test_the_tables_hold_targets_rates_and_effects(answer):

@@ -1,4 +1,4 @@
-"""The plot over dives, and what a diagnosis page says of all of a long log."""
+"""The plot over dives, and what a diagnosis page says about all of a long log."""
 
 from __future__ import annotations
 

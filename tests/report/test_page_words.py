@@ -1,4 +1,4 @@
-"""What each kind of page says of its answer, in words."""
+"""What each kind of page says about its answer, in words."""
 
 import numpy as np
 import pytest

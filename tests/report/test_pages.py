@@ -11,20 +11,11 @@ import pytest
 from auvnn.answers import DRAWERS
 from auvnn.report import page as page_module
 from auvnn.report import style
-from auvnn.report.html import SECURITY
+from auvnn.report.html import SECURITY, breakable
 from auvnn.report.page import Page
+from tests.report.fake_signals import HOSTILE, Fake
 from tests.report.html_reading import PageText, broken_references, dangers
-from tests.report.report_fakes import (
-    HOSTILE,
-    KINDS,
-    Fake,
-    comparison,
-    demo,
-    diagnosis,
-    drawer,
-    make,
-    training,
-)
+from tests.report.report_fakes import KINDS, comparison, demo, diagnosis, drawer, make, training
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -36,7 +27,7 @@ ELEMENTS = {
     "html", "head", "meta", "title", "style", "body", "main", "header", "h1", "h2", "h3", "p", "section", "nav",
     "ul", "ol", "li", "a", "figure", "figcaption", "b", "div", "img", "details", "summary", "table", "thead",
     "tbody", "tr", "th", "td", "dl", "dt", "dd", "footer", "svg", "g", "defs", "path", "use", "clippath", "rect",
-    "image", "pattern",
+    "image", "pattern", "wbr",
 }  # fmt: skip
 
 
@@ -313,3 +304,12 @@ def test_a_figure_that_cannot_be_rendered_leaves_a_note(tmp_path, monkeypatch):
     )
     assert not (tmp_path / "figures" / "ranking.png").exists()
     assert (tmp_path / "figures" / "parameters.png").exists()
+
+
+def test_a_long_name_in_a_table_may_be_broken_after_its_signs_and_nowhere_else():
+    assert breakable("velocity_misalignment") == "velocity_<wbr>misalignment"
+    assert breakable("ocean_current") == "ocean_current", "a short name stays whole"
+    assert (
+        breakable("<b>_long_hostile_name</b>") == "&lt;b&gt;_<wbr>long_<wbr>hostile_<wbr>name&lt;/<wbr>b&gt;"
+    )
+    assert breakable("1.234 ± 0.005 m/s over all dives") == "1.234 ± 0.005 m/s over all dives"

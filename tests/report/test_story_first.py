@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from auvnn.report.pages.fleet import PAGE as FLEET
-from auvnn.report.pages.sections.adaptation_words import off_words, ratio_words
-from auvnn.report.pages.sections.diagnosis_words import MOST_ALIKE, in_question
+from auvnn.report.pages.sections.adaptation_words import early_words, off_words, ratio_words
+from auvnn.report.pages.sections.diagnosis_words import MOST_ALIKE, _ranking_caption, in_question
 from auvnn.report.pages.study import PAGE as STUDY
 from auvnn.report.plots.error_against_horizon import error_against_horizon
 from auvnn.report.plots.free_running import free_running
@@ -66,15 +66,45 @@ def test_the_fleets_summary_names_every_parameter():
 
 
 def test_ours_is_said_once_and_wide_tables_are_turned():
-    answer = study() | {"assumed": ["ours: a", "ours: b", "paper: c"]}
+    answer = study() | {"assumed": ["ours: a", "steps of 1 s", "ours: b", "as the paper: c"]}
     told = STUDY.assumed(View(answer))
-    assert told == [("paper", "c"), ("Not in the paper, decided here", "1. a"), ("", "2. b")]
+    assert told == [
+        ("As in the paper", "C"), ("Not in the paper, decided here", "1. A"), ("", "2. B"),
+        ("Integration", "Steps of 1 s"),
+    ]  # fmt: skip
     assert all(len(t.head) <= 8 for t in STUDY.tables(View(answer)))
 
 
+def test_a_change_at_the_very_beginning_can_be_a_model_that_never_fitted():
+    changes, history = [{"run": 0, "time": 102.0}], [{"run": 0, "t": [100.0, 100.05]}]
+    assert "auvnn diagnose" in early_words(changes, history)[0]
+    assert early_words([{"run": 0, "time": 130.0}], history) == [] and early_words([], history) == []
+    assert (
+        early_words([{"run": 1, "time": 102.0}], history) == [] and early_words(changes, [{"run": 0}]) == []
+    )
+
+
 def test_an_adaptation_that_saw_no_change_of_a_model_that_was_off_points_to_diagnose():
-    assert ratio_words(1.0) == "the error is the same as that of the model as it was"
+    assert ratio_words(1.0) == "the error is the same as that of the model without adaptation"
+    assert "8\N{NO-BREAK SPACE}% larger than" in ratio_words(1.08) and "2.5 times that of" in ratio_words(2.5)
     assert "smaller than" in ratio_words(0.7) and "larger" in ratio_words(1.3)
     steps = {"one_step_rmse_du_m_s2_adapted": 0.7, "one_step_rmse_du_m_s2_unadapted": 1.0}
     assert "auvnn diagnose" in off_words({"frozen_5_s_error_ratio": 1.0, **steps})[0]
     assert off_words({"frozen_5_s_error_ratio": 0.99}) == []
+
+
+def test_what_comes_nearest_stands_first_and_a_larger_share_of_another_is_explained():
+    rows = [{"effect": name, "explained": share, "p_value": 0.01} for name, share in
+            (("added_mass", 1.0), ("payload", 0.5), ("cg_offset", 0.1), ("tilted_vertical", 0.01))]  # fmt: skip
+    nearest = ["cg_offset", "tilted_vertical"]
+    ax = ranking(rows, nearest=nearest).axes[0]
+    ticks = ax.get_yticklabels()
+    assert [t.get_text() for t in ticks] == [*nearest, "added_mass", "payload"]
+    assert [t.get_fontstyle() for t in ticks] == ["italic"] * 2 + ["normal"] * 2
+    said = _ranking_caption(rows, [], nearest)
+    assert (
+        "In italics, and first: what comes nearest" in said and "Alone, added_mass explains more (100" in said
+    )
+    assert "Alone," not in _ranking_caption(rows, [], ["added_mass"]) and "italics" not in _ranking_caption(
+        rows, []
+    )

@@ -49,7 +49,7 @@ def test_the_page_holds_all_figures_and_says_that_it_is_a_smoke_run():
     assert (
         html.count("<svg") == 4 and "could not be drawn" not in html and "There is no figure here" not in html
     )
-    assert "A smoke run" in html and "the vehicle is rov95" in html
+    assert "A smoke run" in html and "The vehicle is rov95" in html
     assert "17.7" in html or "18 times" in html
 
 

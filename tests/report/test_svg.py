@@ -6,8 +6,8 @@ from auvnn.report.html import VECTOR_POINTS, figure_markup, sanitize_svg
 from auvnn.report.plots.measured_against_model import measured_against_model
 from auvnn.report.plots.ranking import ranking
 from auvnn.report.plots.timeline import timeline
+from tests.report.fake_signals import motion, times
 from tests.report.html_reading import PageText, broken_references, dangers
-from tests.report.report_fakes import motion, times
 
 EVIL = """<?xml version="1.0"?>
 <!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd">

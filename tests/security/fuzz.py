@@ -1,8 +1,8 @@
 """Files of our own formats, damaged at random, their checksums put right again: what a stranger would write.
 
 A wrong checksum is refused before anything is read (`test_flips`), so that here the checksums of a folder are worked out
-anew after each change: what is read is what was damaged. `python -m tests.security.fuzz model 1000` prints the longest
-time of a file, s, the largest memory, bytes, and how many were read all the same.
+again after each change: what is read is what was damaged. `python -m tests.security.fuzz model 1000` prints the longest
+time of a file, s, the largest memory, bytes, and how many were read anyway.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def damaged(content: bytes, random: np.random.Generator, text: bool) -> bytes:
 
 
 def resummed(folder: Path) -> None:
-    """Write the checksums of a folder anew, if its manifest is still one."""
+    """Write the checksums of a folder again, if its manifest is still one."""
     manifest = folder / "manifest.json"
     try:
         told = json.loads(manifest.read_bytes())
@@ -195,7 +195,7 @@ TEXTS = (".yaml", ".json", ".jsonl", ".csv", ".sdf", ".sha256")
 
 
 def fuzz(kind: str, count: int, seed: int = 0) -> tuple[float, float, int]:
-    """Read `count` damaged files; return the longest time, s, the memory, bytes, and how many were read all the same.
+    """Read `count` damaged files; return the longest time, s, the memory, bytes, and how many were read anyway.
 
     Raises:
         AssertionError: a reader ended otherwise than with a result or one line.

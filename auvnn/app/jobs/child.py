@@ -10,23 +10,23 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
+from auvnn.app.jobs.messages import Order, Report
 from auvnn.errors import AuvnnError
 
 
 class Child:
-    """A worker process that is started when it is first needed, and started anew after a stop.
+    """A worker process that is started when it is first needed, and started again after a stop.
 
-    Orders and reports are lines of JSON. The process ends by itself when its standard input closes, so that nothing
+    Orders and reports are lines of JSON. The process ends when its standard input closes, so that nothing
     goes on working for a server that was killed.
 
     Args:
         folder: for what the process says to nobody (`worker.log`).
-        hear: called with each report, from a thread of its own.
+        hear: called with each report, from a separate thread.
     """
 
-    def __init__(self, folder: Path, hear: Callable[[dict[str, Any]], None]) -> None:
+    def __init__(self, folder: Path, hear: Callable[[Report], None]) -> None:
         self.folder = folder
         self.hear = hear
         self._lock = threading.Lock()
@@ -39,7 +39,7 @@ class Child:
             if not self._closed:
                 self._started()
 
-    def order(self, order: dict[str, Any]) -> None:
+    def order(self, order: Order) -> None:
         """Send an order.
 
         Raises:

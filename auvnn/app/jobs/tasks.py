@@ -1,4 +1,4 @@
-"""What the child process can do: the same Python calls as the commands, each answer in a folder of its own."""
+"""What the child process can do: the same Python calls as the commands, each answer in a separate folder."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 import torch
 
 from auvnn.answers import Answer, plain, write_text
+from auvnn.app.jobs.messages import AddJob, LogJob, Order, Summary
 from auvnn.app.source import split
 from auvnn.comparison import compare
 from auvnn.comparison.predictions import write_predictions
@@ -35,17 +36,17 @@ class Tasks:
         self._log: tuple[str, Log, Log | None] | None = None
         self._pending: list[tuple[Answer, Path]] = []
 
-    def do(self, order: dict[str, Any], say: Say) -> dict[str, Any]:
+    def do(self, order: Order, say: Say) -> Summary:
         """Do what an order says and return a summary; the answer is in the folder `out` then, or nothing is.
 
         Args:
             order: `kind`, `log` (files, mapping, max_duration, test), `model`, `out`, and what the kind takes.
-            say: told in words what is being done.
+            say: called with what is being done, in words.
 
         Raises:
             AuvnnError: what the user gave cannot be used.
         """
-        kinds = {
+        kinds: dict[str, Callable[[Any, Path, Say], tuple[Summary, Answer | None]]] = {
             "compare": self._compare,
             "diagnose": self._diagnose,
             "add": self._add,
@@ -75,7 +76,7 @@ class Tasks:
                 try:
                     answer.report(path)
                 except Exception as error:
-                    # The answer is whole without it; whoever saves is told.
+                    # The answer is whole without it; whoever saves is informed.
                     traceback.print_exc()
                     problem = f"{type(error).__name__}: {one_line(error, 200)}"
                 yield str(path.parent), problem
@@ -85,7 +86,7 @@ class Tasks:
         while self._pending:
             yield from self.draw_one()
 
-    def _logs(self, order: dict[str, Any], say: Say) -> tuple[Log, Log | None]:
+    def _logs(self, order: LogJob, say: Say) -> tuple[Log, Log | None]:
         wanted = order["log"]
         key = json.dumps(wanted, sort_keys=True)
         if self._log is None or self._log[0] != key:
@@ -97,10 +98,10 @@ class Tasks:
                 self._log = (key, *split(log)[:2])
         return self._log[1], self._log[2]
 
-    def _model(self, order: dict[str, Any], log: Log) -> GreyBox:
+    def _model(self, order: LogJob, log: Log) -> GreyBox:
         return load(order["model"], actuation=log.kind)
 
-    def _compare(self, order: dict[str, Any], out: Path, say: Say) -> tuple[dict[str, Any], Answer]:
+    def _compare(self, order: LogJob, out: Path, say: Say) -> tuple[Summary, Answer]:
         log, _ = self._logs(order, say)
         model = self._model(order, log)
         say("one step ahead, and free running from 0.5 s to the whole run")
@@ -122,13 +123,13 @@ class Tasks:
             "floor": floors.get("5"),
         }, comparison
 
-    def _diagnose(self, order: dict[str, Any], out: Path, say: Say) -> tuple[dict[str, Any], Answer]:
+    def _diagnose(self, order: LogJob, out: Path, say: Say) -> tuple[Summary, Answer]:
         log, _ = self._logs(order, say)
         diagnosis = diagnose(self._model(order, log), log, progress=say, force=bool(order.get("force")))
         _write(diagnosis, out, {"story": diagnosis.story})
         return {"verdict": diagnosis.verdict, "missing": diagnosis.missing}, diagnosis
 
-    def _add(self, order: dict[str, Any], out: Path, say: Say) -> tuple[dict[str, Any], Answer]:
+    def _add(self, order: AddJob, out: Path, say: Say) -> tuple[Summary, Answer]:
         log, test = self._logs(order, say)
         model = self._model(order, log)
         if test is None:
@@ -145,7 +146,7 @@ class Tasks:
             np.savez(stream, **arrays)
         return {"accepted": better.accepted, "waterfall": better.waterfall, "gain": better.gain}, better
 
-    def _improve(self, order: dict[str, Any], out: Path, say: Say) -> tuple[dict[str, Any], Answer]:
+    def _improve(self, order: LogJob, out: Path, say: Say) -> tuple[Summary, Answer]:
         log, test = self._logs(order, say)
         if test is None:
             raise AuvnnError("the log is too short to hold a part of it out: name a further log to judge by")
@@ -155,7 +156,7 @@ class Tasks:
         _write(found, out, more)
         return {"verdict": found.verdict, "waterfall": found.waterfall}, found
 
-    def _example(self, order: dict[str, Any], out: Path, say: Say) -> tuple[dict[str, Any], Answer | None]:
+    def _example(self, order: Order, out: Path, say: Say) -> tuple[Summary, Answer | None]:
         from auvnn.studies.demo import VEHICLE, made_logs
 
         say("simulating four runs of 60 s in a current that the model does not know")

@@ -11,12 +11,13 @@ import threading
 import warnings
 from typing import Any
 
+from auvnn.app.jobs.messages import Order
 from auvnn.errors import AuvnnError, one_line
 
 
 def main() -> None:
     """Take orders until standard input closes."""
-    # Reports have a channel of their own: what a library prints must not get between them.
+    # Reports have a separate channel: what a library prints must not get between them.
     channel = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     lock = threading.Lock()
@@ -26,7 +27,7 @@ def main() -> None:
             channel.write(json.dumps(words, allow_nan=False) + "\n")
             channel.flush()
 
-    orders: queue.Queue[dict[str, Any]] = queue.Queue()
+    orders: queue.Queue[Order] = queue.Queue()
 
     begun, skipped, turn = 0, set[int](), threading.Lock()
 

@@ -90,7 +90,7 @@ class Composer:
         for override in parsed:
             key, _, value = str(override.input_line).partition("=")
             if override.is_sweep_override() and key == "out":
-                raise ConfigError(f"out={value}: each job gets a folder of its own below one out=")
+                raise ConfigError(f"out={value}: each job gets a separate folder below one out=")
             if override.is_sweep_override() and not sweep:
                 raise ConfigError(f"{key}={value}: write a list as {key}=[{value}], or add --multirun")
             if override.key_or_group in self.groups:

@@ -111,7 +111,7 @@ _ENDINGS = {
 
 
 def meant(verb: str, words: Sequence[str], bare: Sequence[str], known: Iterable[str]) -> str:
-    """Return what somebody meant who left out the keys: the whole command with them, as far as they can be told.
+    """Return what somebody meant who left out the keys: the whole command with them, as far as they can be guessed.
 
     Args:
         verb: of the command.

@@ -24,7 +24,7 @@ class Words:
         shows: whether something is only to be shown.
         multirun: whether to run once for each value.
         config_dir: further folder of configs.
-        jobs: processes at a time, each for a job of its own; 0: as Hydra's launcher does it.
+        jobs: processes at a time, each for a separate job; 0: as Hydra's launcher does it.
     """
 
     flags: list[str]

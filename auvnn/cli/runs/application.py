@@ -175,7 +175,7 @@ def _run(verb: Verb, composer: Composer, config: DictConfig, out: Path) -> None:
             say(f"would write  {', '.join(verb.writes)} in {out}")
         return
     if not verb.writes:
-        # It writes what its user asks for while it runs, and nothing of its own.
+        # It writes what its user asks for while it runs, and nothing else.
         say.answer(verb.run(Job(options, out, out, say)).to_dict())
         return
     with written(out, overwrite=options["overwrite"]) as folder:

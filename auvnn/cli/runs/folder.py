@@ -1,4 +1,4 @@
-"""The folder of a run: taken by one run at a time, and either complete or as it was before."""
+"""The folder of a run: taken by one run at a time, and either complete or unchanged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Many jobs of one verb: each a process of its own with `-j N`, or by a launcher of Hydra's; how they ended.
+"""Many jobs of one verb: each a separate process with `-j N`, or by a launcher of Hydra's; how they ended.
 
 A job that fails, is killed or cannot start is its own affair: the others go on, and the last line lists it. Where
 launchers put jobs into other processes, each leaves its exit status in a small file, for the one who counts them.
@@ -60,7 +60,7 @@ def statuses(out: Path, count: int) -> Iterator[list[int]]:
 
 
 def run_jobs(verb: str, flags: Sequence[str], overrides: Sequence[str], out: Path, workers: int) -> list[int]:
-    """Run each job of a sweep as a process of its own, several at a time, and return their exit statuses.
+    """Run each job of a sweep as a separate process, several at a time, and return their exit statuses.
 
     Args:
         verb: name of the verb.

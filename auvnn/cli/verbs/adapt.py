@@ -8,7 +8,8 @@ from auvnn.cli.runs.job import Answering, Job, Verb
 
 def _run(job: Job) -> Answering:
     from auvnn.online import adapt
-    from auvnn.report.pages.sections.adaptation_words import off_words, ratio_words, worse_words
+    from auvnn.report.pages.sections.adaptation_words import early_words, off_words, ratio_words, worse_words
+    from auvnn.report.words import plural
 
     log = job.log()
     model = job.model(log)
@@ -26,9 +27,11 @@ def _run(job: Job) -> Answering:
     metrics = data["metrics"]
     job.say(f"learned   from {metrics['samples_learned']} of {metrics['samples']} samples")
     for name, told in data["skipped"].items():
-        job.say(f"skipped   {told['count']} samples ({name}): {told['words']}")
+        job.say(f"skipped   {plural(told['count'], 'sample')} ({name}): {told['words']}")
     for change in data["changes"]:
         job.say(f"change    run {change['run']}: {change['words']}")
+    for words in early_words(data["changes"], data["history"]):
+        job.say(f"early     {words}", style="yellow")
     if not data["changes"]:
         job.say("change    none was seen")
         for words in off_words(metrics):

@@ -41,7 +41,7 @@ def _run(job: Job) -> Answering:
 
 
 VERB = Verb(
-    summary="the whole loop until nothing pays: check, compare, diagnose, add, learn, and the error budget",
+    summary="the whole loop until nothing improves the model: check, compare, diagnose, add, learn, and the error budget",
     reads=("log", "mapping", "model", "test"),
     writes=("improve.json", "model/", "history/", "report.html", "figures/"),
     run=_run,

@@ -27,7 +27,7 @@ from auvnn.diagnosis.stages.partial import without
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.estimation.prediction_error import FitError
 
-# A force of one measured input that is surer than this is told where no smooth function of the inputs was sure enough.
+# A force of one measured input surer than this is reported where no smooth function of the inputs was sure enough.
 SURE = 0.01
 
 

@@ -10,8 +10,8 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, shapes
 
 Array = NDArray[np.float64]
-# Share of a name's trace that other parameters must be able to imitate to be told; parameters that are told; and the
-# least share of the largest movement, in plausible sizes, that is worth a word.
+# Share of a name's trace that other parameters must be able to imitate to be reported; parameters that are reported; and
+# the least share of the largest movement, in plausible sizes, that is worth a word.
 IMITATED, TOLD, LEAST = 0.8, 4, 0.2
 # Gains of all thrusters within so many hundredths of one another are one gain.
 EVEN = 0.15
@@ -22,7 +22,7 @@ def confounded_with(layout: Layout, found: FittedHypothesis, name: str) -> list[
     """Return in words what else could do on this log what a name does.
 
     What the name's fitted departure from its null does is imitated by all other parameters, what was stated of them set
-    aside: x = H_oo^-1 H_on d. Where that takes most of its trace, the parameters that would move most are told.
+    aside: x = H_oo^-1 H_on d. Where that takes most of its trace, the parameters that would move most are reported.
 
     Args:
         layout: stated values.

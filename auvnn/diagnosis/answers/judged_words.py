@@ -52,9 +52,7 @@ def predicts(diagnosis: Diagnosis) -> list[str]:
         shares = {a: s for a, s in entry["explained_by_dof"].items() if s >= WORTH_A_WORD}
         where = ", ".join(f"{s:.0%} in {MOTIONS[a]}" for a, s in sorted(shares.items(), key=lambda x: -x[1]))
         words = (
-            f"{name} explains {where} of the force"
-            if where
-            else f"{name} explains little of the force by itself"
+            f"{name} explains {where} of the force" if where else f"{name} alone explains little of the force"
         )
         if entry["gain"] is not None:
             gain = entry["gain"]

@@ -16,7 +16,7 @@ def moved(layout: Layout, found: FittedHypothesis) -> list[MovedCoefficient]:
     """Return stated coefficients that moved by more than two of their standard deviations, the furthest first.
 
     Each is a factor on what the vehicle's file states, which is one; `deviations` says by how many of the stated standard
-    deviations it has left that. Groups that were asked for as effects are told as effects.
+    deviations it has left that. Groups that were asked for as effects are reported as effects.
     """
     out: list[MovedCoefficient] = []
     for name, own in layout.places(found.names).items():

@@ -1,4 +1,4 @@
-"""The table of candidates: each by its test at the null, the leading ones by a fit of their own."""
+"""The table of candidates: each by its test at the null, the leading ones by a separate fit."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ def values(layout: Layout, found: FittedHypothesis, wanted: Sequence[str]) -> By
     Args:
         layout: which columns belong to which effect.
         found: the fit.
-        wanted: names of the effects that are told.
+        wanted: names of the effects to report.
     """
     places = {n: at for n, at in layout.places(found.names).items() if n in wanted}
     return {

@@ -1,4 +1,4 @@
-"""What does not matter: a cost in free running and a force, below which an effect or a remainder is only told."""
+"""What does not matter: a cost in free running and a force, below which an effect or a remainder is only reported."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def tell(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.nearest:
         one = len(diagnosis.nearest) == 1
         lines.append(
-            f"{' and '.join(diagnosis.nearest)} {'comes' if one else 'come'} nearest, and "
+            f"{_series(diagnosis.nearest)} {'comes' if one else 'come'} nearest, and "
             f"{'leaves' if one else 'leave'} too much of it to be the cause."
         )
     return [
@@ -118,7 +118,7 @@ def _where(diagnosis: Diagnosis) -> list[str]:
     if not diagnosis.acts_in or diagnosis.small_remainder:
         return []
     first, *others = (f"{MOTIONS[axis]} ({axis})" for axis in diagnosis.acts_in)
-    also = f", and shows in {' and '.join(others)} too" if others else ""
+    also = f", and shows in {_series(others)} too" if others else ""
     what = "What is left" if diagnosis.missing or diagnosis.joint else "It"
     return [f"{what} acts in {first}{also}."]
 
@@ -136,3 +136,7 @@ def _dependence(diagnosis: Diagnosis) -> list[str]:
         top = max(diagnosis.depends_on[axis], key=lambda n: diagnosis.depends_on[axis][n])
         strong = [f"{axis} on {top} (surely, though for a small part of it)"]
     return ["The remaining residual depends on: " + ", ".join(strong) + "."] if strong else []
+
+
+def _series(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -107,7 +107,7 @@ def left_out(
         most: folds at most.
         refit: fit again without each fold; otherwise take one Newton step from the fit to everything, which costs
             next to nothing.
-        progress: told in words what is being done.
+        progress: called with what is being done, in words.
 
     Raises:
         ConfigError: an unknown effect or objective.
@@ -143,8 +143,8 @@ def each_name(
         objective: "rollout" or "one_step".
         derivative: how accelerations are obtained, for "one_step".
         most: most parts into which the log is cut.
-        refit: fit anew without each part; by one Newton step where false.
-        progress: told in words what is being done.
+        refit: fit again without each part; by one Newton step where false.
+        progress: called with what is being done, in words.
     """
     say = progress or (lambda words: None)
     log = completed(model, log)

@@ -80,7 +80,7 @@ class _Test:
 
 
 def _accept(held: Probed, sums: WindowSums, base: Sequence[str], label: str, spread: Array | None) -> _Test:
-    """Test one effect; without the scores' spread, say of which combination it is wanted."""
+    """Test one effect; without the scores' spread, say for which combination it is wanted."""
     found = projection(sums.hessian, sums.slope, held.layout, base, label)
     wanted: list[Combination] = []
 

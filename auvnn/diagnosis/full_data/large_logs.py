@@ -93,7 +93,7 @@ def diagnose_files(
         force: go on with a log that contradicts itself, or in which nothing moves or is driven.
         tolerance: what does not matter, as in `diagnose`.
         costs: also work out what each name costs.
-        progress: told in words what is being done.
+        progress: called with what is being done, in words.
 
     Returns:
         the diagnosis; `whole_log` holds what all of the log says.
@@ -167,7 +167,7 @@ def _planned(pool: Executor, paths: Sequence[Path], cut: WindowCut, say: Callabl
     for k, (path, found) in enumerate(answers, 1):
         say(Progress(f"looking through {path}", k, len(paths)))
         (bad if isinstance(found, InputError) else good).append(found)
-    # One file alone that cannot be read is the user's; one of many is left out and told.
+    # One file alone that cannot be read is the user's; one of many is left out and reported.
     if not good:
         raise bad[0]
     plan = concatenate_windows(good)

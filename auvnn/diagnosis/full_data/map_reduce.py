@@ -107,7 +107,7 @@ class MapReduce:
     Args:
         executor: who computes; started.
         parts: in order.
-        say: told in words what is being done.
+        say: called with what is being done, in words.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What of a log a diagnosis looks at: effects that it can speak of, and windows of free running."""
+"""What a diagnosis takes from a log: effects that it can judge, and windows of free running."""
 
 from __future__ import annotations
 

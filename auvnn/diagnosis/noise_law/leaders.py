@@ -1,7 +1,7 @@
-"""What the first search has found, each effect by itself: candidates of the search together with a stochastic force.
+"""What the first search has found, each effect alone: candidates of the search together with a stochastic force.
 
 An effect of another shape (a wave's period, the moment of a payload) is seldom where its slope at the null points. The
-first search may have found it beside others only; its values there are where a fit by itself begins.
+first search may have found it together with others only; its values there are where a fit of it alone begins.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ STEPS = 6
 
 
 def fitted_alone(asked: Setting, state: State) -> list[FittedHypothesis]:
-    """Return every effect that the first search fitted alone, and those that it named beside others, by themselves.
+    """Return every effect that the first search fitted alone, and those that it named together with others, each alone.
 
     Args:
         asked: what is asked.
@@ -29,7 +29,7 @@ def fitted_alone(asked: Setting, state: State) -> list[FittedHypothesis]:
         source = next((e for e in reversed(state.tried) if name in e.effects), None)
         if source is None or any(e.effects == (name,) for e in alone):
             continue
-        asked.say(f"fitting {name} by itself")
+        asked.say(f"fitting {name} alone")
         model = asked.layout.model.rebuilt(asked.layout.model.copied_effects())
         set_parameters(model, state.first.names, state.first.fitted.theta)
         set_parameters(model, [name], parameters_of(source.fitted.model, [name]))

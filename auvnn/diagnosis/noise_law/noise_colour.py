@@ -29,7 +29,7 @@ from auvnn.metrics.windows import ATTITUDE, POSITION, Windows
 Array = NDArray[np.float64]
 # Correlation times that are tried, s. What lasts longer is no noise of a sensor: it could be anything that a model lacks.
 TIMES = (0.1, 0.25, 0.6)
-# Of the best one, for each sensor by itself.
+# Of the best one, for each sensor separately.
 FACTORS = (0.0, 0.55)
 SENSORS = {"position": POSITION, "attitude": ATTITUDE, "velocity": slice(6, 9), "rates": slice(9, 12)}
 # Correlation time, s, of the innovations in which outliers are looked for; how many standard deviations are too many.
@@ -38,7 +38,7 @@ INNOVATION, OUTLIER, NORMAL = 0.3, 6.0, 1.4826
 
 @dataclass(frozen=True)
 class Colour:
-    """What a log says of the colour of its sensors' noise.
+    """What a log says about the colour of its sensors' noise.
 
     Attributes:
         noise: correlation times; None where white noise does as well.

@@ -280,7 +280,7 @@ class ForceSearch:
         return best
 
     def _at(self, found: FittedHypothesis, model: GreyBox, theta: Array, initial: Tensor) -> FittedHypothesis:
-        """Return an explanation at other values, its sums without a force made anew there."""
+        """Return an explanation at other values, its sums without a force computed again there."""
         fitted, judged_by = found.fitted, found.judged or found.fitted.priors
         sums, _, _ = normal_equations(
             self.windows, linearise(model, self.windows, initial, found.names), fitted.sigma

@@ -1,4 +1,4 @@
-"""What windows say of a stochastic force in cells, beside the parameters of a fit: small sums, window by window."""
+"""What windows say about a stochastic force in cells, with the parameters of a fit: small sums, window by window."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CELL = 0.5
 
 @dataclass(frozen=True)
 class ForceSums:
-    """What the windows say of parameters and of a force in cells, about a fit.
+    """What the windows say about parameters and of a force in cells, about a fit.
 
     Attributes:
         statistics: columns are those of the fit's parameters, then the cells of X, Y, ... N.

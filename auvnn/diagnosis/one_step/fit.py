@@ -39,7 +39,7 @@ def fit_hypothesis_one_step(
         effects: effects asked for; a stated uncertainty among them is set free.
         how: how accelerations are obtained.
         start: a fit from which to go out and whose weights to keep, so that errors can be compared.
-        progress: told in words after each step.
+        progress: called with the state of the work, in words, after each step.
     """
     names = tuple(dict.fromkeys([*base, *effects]))
     held = priors(layout, names, free=effects)

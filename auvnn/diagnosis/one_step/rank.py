@@ -111,7 +111,7 @@ def rank_one_step(
         log: measurements.
         effects: names to consider; the whole catalogue by default.
         derivative: how accelerations are obtained, as `compare` takes it.
-        progress: told in words what is being done.
+        progress: called with what is being done, in words.
 
     Raises:
         ConfigError: an unknown effect.

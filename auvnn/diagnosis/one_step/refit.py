@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 LINEARISED, SETTLED = 6, 1e-4
 # A step that makes things worse is halved so often before it is given up.
 HALVED = 5
-# Share of the samples that an effect must have a say of, at least.
+# Share of the samples that an effect must influence, at least.
 SAID = 0.5
 
 
@@ -204,7 +204,7 @@ class OneStepRefit:
         held: Priors,
         rows: NDArray[np.bool_],
     ) -> _Fit:
-        """Fit by Gauss and Newton's method from a start, slopes taken anew at every step."""
+        """Fit by Gauss and Newton's method from a start, slopes computed again at every step."""
         low, high = limits(world.model, names, held)
         free = ~_shapes(world.model, names)
 

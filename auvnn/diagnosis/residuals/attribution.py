@@ -13,7 +13,7 @@ from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
 # Share of what is unexplained, below which a dependence is not worth a word; standard errors of its gain, below which
-# it may be chance; and inputs that are told at most.
+# it may be chance; and the most inputs that are reported.
 LEAST, SURE, MOST = 0.02, 2.0, 8
 
 

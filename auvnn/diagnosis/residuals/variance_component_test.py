@@ -28,7 +28,7 @@ from auvnn.models import GreyBox
 Array = NDArray[np.float64]
 HARMONICS = 3
 # Variances of the coefficients that are tried, in plausible sizes squared, and log odds from which a further degree of
-# freedom is told.
+# freedom is reported.
 VARIANCES = np.logspace(-10.0, 2.0, 49)
 LEAST_ODDS = float(np.log(100.0))
 

@@ -49,7 +49,7 @@ class NullTests:
     Args:
         layout: stated values.
         windows: of the log.
-        say: told in words what is being done.
+        say: called with what is being done, in words.
     """
 
     def __init__(self, layout: Layout, windows: Windows, say: Callable[[str], None]) -> None:

@@ -276,6 +276,9 @@ def probed(
             continue
         kind = effect_class(name)
         shapes = (shapes_of or {}).get(name) or kind.starts(described, extent)
+        # A clock that jitters begins a little before zero, where no time of an effect may be.
+        bounds = {p.name: (p.low, p.high) for p in described}
+        shapes = [{n: min(max(v, bounds[n][0]), bounds[n][1]) for n, v in shape.items()} for shape in shapes]
         effects.append(StandIns(kind, model, shapes, name))
         size = sum(not p.shape for p in described)
         starts[name] = {f"{name}@{k}": shape for k, shape in enumerate(shapes)}

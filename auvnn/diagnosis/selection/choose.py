@@ -58,7 +58,7 @@ class Chooser(Pruning):
     Attributes:
         layout: stated values.
         windows: of the log.
-        say: told in words what is being done.
+        say: called with what is being done, in words.
     """
 
     @property

@@ -31,7 +31,7 @@ class ModelComparison:
     Attributes:
         layout: stated values.
         windows: of the log.
-        say: told in words what is being done.
+        say: called with what is being done, in words.
     """
 
     layout: Layout

@@ -29,7 +29,7 @@ class Pruning:
     Attributes:
         layout: stated values.
         windows: of the log.
-        say: told in words what is being done.
+        say: called with what is being done, in words.
     """
 
     layout: Layout

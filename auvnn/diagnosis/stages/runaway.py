@@ -20,7 +20,7 @@ MOST, LEAST = 0.5, 4
 
 
 def windows_that_hold(model: GreyBox, log: Log, window: float | None) -> tuple[Windows, list[str]]:
-    """Return the windows of a log over which a model runs free without leaving what is physical, and what to say of that.
+    """Return the windows of a log over which a model runs free without leaving what is physical, and remarks on that.
 
     Where it leaves that in more than half of them, shorter ones are taken, unless a length was asked for.
 

@@ -43,8 +43,8 @@ class Setting:
         advice: whether to work out what to drive next, for an ambiguous answer.
         whiteness: whether to test what is left for correlations.
         absorbed: what the learned damping may have taken in that is no damping; None without any.
-        notes: what to say of the model and the log besides.
-        say: told in words what is being done.
+        notes: what to say about the model and the log besides.
+        say: called with what is being done, in words.
     """
 
     model: GreyBox

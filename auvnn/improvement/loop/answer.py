@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from auvnn.answer_types import WaterfallStep
 from auvnn.answers import PLOTTED, Answer, plain
 from auvnn.cards import Card, figure
+from auvnn.comparison.predictions import BeforeAfterTraces
 from auvnn.models import GreyBox
 
 REFITTED, CAUSE, PREDICTS, LEARNED, LEFT = (
@@ -92,7 +94,7 @@ class Improved(Answer):
     held_out: str
     steps: list[Step]
     tried: list[Step]
-    waterfall: list[dict[str, Any]]
+    waterfall: list[WaterfallStep]
     baseline: dict[str, Any]
     before: dict[str, Any]
     after: dict[str, Any]
@@ -107,7 +109,7 @@ class Improved(Answer):
     stopped: str
     model: GreyBox
     given: GreyBox
-    series: list[dict[str, Any]] = field(default_factory=list)
+    series: list[BeforeAfterTraces] = field(default_factory=list)
     left_out: dict[str, Any] = field(default_factory=dict)
 
     def card(self) -> Card:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from auvnn.comparison.compare import floor_of
-from auvnn.comparison.predictions import stitch
+from auvnn.comparison.predictions import BeforeAfterTraces, stitch
 from auvnn.logs import Log
 from auvnn.metrics.derivative import Derivative
 from auvnn.metrics.noise_floor import noise_floor
@@ -59,7 +59,7 @@ def budget(steps: Sequence[tuple[str, str, GreyBox]], log: Log, test: Log, how: 
     }
 
 
-def _series(test: Log, before: Rolled, after: Rolled) -> list[dict[str, Any]]:
+def _series(test: Log, before: Rolled, after: Rolled) -> list[BeforeAfterTraces]:
     return [
         {
             "run": run.number,

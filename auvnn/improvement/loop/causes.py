@@ -40,7 +40,7 @@ class Causes(Trials):
         self.told(f"Check: {words}{more}." if bad else "Check: nothing to complain of.")
 
     def compare(self) -> None:
-        """Say where the model as given stands beside the plain regression and persistence."""
+        """Say how the model as given compares with the plain regression and persistence."""
         self.say("running the model as given, and a plain regression for comparison")
         self.regression = self.judge.regression(self.how)
         given = self.state.left

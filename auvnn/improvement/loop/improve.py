@@ -1,4 +1,4 @@
-"""The whole loop: check, compare, diagnose, add what pays, again until nothing pays, learn the rest, and the budget.
+"""The whole loop: check, compare, diagnose, add what improves the model until nothing does, learn the rest, the budget.
 
 Names of causes come from the diagnosis. What it cannot name is looked for by prediction: the catalogue, linearised, then
 drag of every coupling, then a force of what was measured. Every step, whoever proposed it, is fitted and accepted by one
@@ -46,7 +46,7 @@ def improve(
     progress: Callable[[str], None] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> Improved:
-    """Walk the loop until nothing pays, and return the model, its history and the error budget.
+    """Run the loop until nothing improves the model, and return the model, its history and the error budget.
 
     Args:
         model: as known; it is not changed.
@@ -61,8 +61,8 @@ def improve(
         diagnosing: ask the diagnosis for causes; without it names are looked for by prediction alone.
         derivative: how accelerations are obtained where they were not measured.
         force: go on with a log that contradicts itself: signs, units, axes.
-        progress: told in words what is being done.
-        tell: told the story, sentence by sentence, as it happens.
+        progress: called with what is being done, in words.
+        tell: called with each sentence of the story as it happens.
 
     Raises:
         ConfigError: an unknown effect, or unknown kind of what may be learned.
@@ -198,7 +198,7 @@ class Walk(Causes):
         self._take(best, name, LEARNED, f"of {choice.words}, held within {held:g} of its scale")
 
     def _networks(self) -> None:
-        """Train damping subnetworks, with the coefficients as they are and fitted anew beside them, if that pays."""
+        """Train damping subnetworks, with the coefficients as they are and fitted again with them, if that pays."""
         if self.model.damping is not None or len(self.judge.folds.numbers) < 3:
             return
         begin = self._before() or self.state
@@ -256,7 +256,7 @@ class Walk(Causes):
         ):
             if found["loses"][other]:
                 self.warnings.append(
-                    f"the model loses to {words} in {', '.join(found['loses'][other])} on {test.name}"
+                    f"in {', '.join(found['loses'][other])} the model is worse than {words} on {test.name}"
                 )
         if fall[-1] > fall[0]:
             self.warnings.append(

@@ -65,7 +65,7 @@ def choose(base: GreyBox, judge: Judge, state: State, kind: str) -> list[Choice]
     Args:
         base: the model as given.
         judge: of the log.
-        state: what it is to stand beside.
+        state: to which it is added.
         kind: "polynomial", a drag of every coupling, or "residual_force".
     """
     name = EFFECT[kind]

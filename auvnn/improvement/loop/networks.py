@@ -1,7 +1,7 @@
 """Damping subnetworks as a step of the loop: trained one step ahead, accepted by free running on what was left out.
 
 Polynomials of drag are linear in their parameters, so that a fold can be left out by one Newton step. Networks are not:
-they are trained anew without each fold, on what the model fitted without that fold leaves. Whatever is fitted beside
+they are trained again without each fold, on what the model fitted without that fold leaves. Whatever is fitted beside
 them later keeps to that: each fold is judged with the networks that have not seen it.
 """
 
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 FORM = "mlp"
 # One starting point and few iterations: they are trained once for each fold, and stop when a part left out says so.
 SCHEME = {"scheme": "levenberg_marquardt", "restarts": 1, "max_iterations": 60}
-TRAINED = "networks trained anew without each fold"
+TRAINED = "networks trained again without each fold"
 # Samples that networks are trained on, at most: more cost time and say little more.
 SAMPLES = 20_000
 
@@ -39,7 +39,7 @@ def trained(base: GreyBox, judge: Judge, state: State, how: Derivative) -> State
     Args:
         base: the model as given; it has no subnetworks.
         judge: of the log.
-        state: what they are to stand beside.
+        state: to which they are added.
         how: how accelerations are obtained.
 
     Raises:

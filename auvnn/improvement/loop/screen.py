@@ -41,7 +41,7 @@ class Promise:
 
 
 def wanted(base: GreyBox, judge: Judge, recipe: Recipe) -> list[str]:
-    """Return the effects that may be asked for: those of the catalogue that the log and the vehicle can speak of.
+    """Return the effects that may be asked for: those of the catalogue that can be judged with the log and the vehicle.
 
     What goes by the time since the start of a run tells a course of events. Where the diagnosis does not name it,
     there is no reason why another run should follow the same course: it is not taken for its prediction alone.
@@ -62,16 +62,16 @@ def promises(
     names: Sequence[str],
     say: Callable[[str], None],
 ) -> list[Promise]:
-    """Return what each of several effects promises beside a state, best first.
+    """Return what each of several effects promises in addition to a state, best first.
 
-    Each is linearised where its fit would begin, everything else free beside it; a fold is predicted by the others.
+    Each is linearised where its fit would begin, everything else free with it; a fold is predicted by the others.
 
     Args:
         base: the model as given.
         judge: folds and windows of the log.
-        state: beside which the effects are asked for.
+        state: to which the effects would be added.
         names: of the effects.
-        say: told in words what is being done.
+        say: called with what is being done, in words.
     """
     plain, shaped = [], []
     whole = lay_out(base, [*(n for n in state.recipe.effects if n not in state.recipe.built), *names])

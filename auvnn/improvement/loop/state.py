@@ -115,7 +115,7 @@ def held_by(layout: Layout, names: Sequence[str], recipe: Recipe) -> Priors:
     for name, own in layout.places(names).items():
         if name in recipe.ridge:
             precision[own] = (recipe.ridge[name] * scales(layout, name)) ** -2.0
-    # What was fitted before counts by itself here: the loop takes some of the columns at a time.
+    # What was fitted before counts alone here: the loop takes some of the columns at a time.
     return replace(found, precision=precision, joint=None)
 
 

@@ -28,9 +28,9 @@ from auvnn.metrics.derivative import choose_derivative
 from auvnn.models import GreyBox
 from auvnn.progress import Counted
 
-# Numerical failures of one step: the step is told and left out, the loop goes on.
+# Numerical failures of one step: the step is reported and left out, the loop goes on.
 FAILURES = (FloatingPointError, np.linalg.LinAlgError, RuntimeError, ValueError, ArithmeticError, AuvnnError)
-# Steps that are told of: a comparison, three refits, a diagnosis, four rounds of a look at the catalogue and three fits,
+# Steps that are reported: a comparison, three refits, a diagnosis, four rounds of a look at the catalogue and three fits,
 # twice a learned term with two fits, other windows, and the judgement.
 EXPECTED = 30
 
@@ -71,8 +71,8 @@ class Trials:
         self.warnings: list[str] = [*model.vehicle.warnings, *log.quality().reservations]
         self.diagnoses: list[dict[str, Any]] = []
         self.adequate = False
-        self.stopped = "nothing more pays on what was left out"
-        # The fit that others begin from: the refitted coefficients, whether they paid by themselves or not.
+        self.stopped = "nothing more improves the prediction of what was left out"
+        # The fit that others begin from: the refitted coefficients, whether they improved the model alone or not.
         self.ground: State | None = None
 
     def told(self, words: str) -> None:
@@ -137,7 +137,7 @@ class Trials:
         return self.state if self.state.fit is not None else self.ground
 
     def _try(self, make: Callable[[], State], words: str) -> State | None:
-        """Make a state; a fit that fails is told and left out."""
+        """Make a state; a fit that fails is reported and left out."""
         self.say(words)
         try:
             state = make()

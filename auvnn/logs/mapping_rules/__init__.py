@@ -1,6 +1,6 @@
 """What is known of message types: which of their fields is what a log needs, in which unit and frame.
 
-A new message type is a `Rule` in the file of its family, or a family of its own: one file and one line here.
+A new message type is a `Rule` in the file of its family, or a separate family: one file and one line here.
 """
 
 from __future__ import annotations

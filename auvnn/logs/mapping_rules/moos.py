@@ -12,7 +12,7 @@ from auvnn.logs.recording import Recording, Topic
 
 
 def present(*names: tuple[str, str, dict[str, object]]) -> Callable[[Recording, Topic], dict[str, object]]:
-    """Return a rule's columns where each variable is a topic of its own: those there are, if the first is."""
+    """Return a rule's columns where each variable is a separate topic: those there are, if the first is."""
 
     def columns(recording: Recording, topic: Topic) -> dict[str, object]:
         found: dict[str, object] = {

@@ -23,7 +23,7 @@ _NEEDS = {
 
 @dataclass
 class Proposal:
-    """A mapping as plain data, and what to say of it.
+    """A mapping as plain data, and what to say about it.
 
     Args:
         mapping: what a mapping file holds; its columns may be {}.
@@ -48,7 +48,7 @@ def propose(
     Args:
         recording: topics with their columns.
         rules: which topics and fields are known, in order of preference.
-        lies: says of a topic why it must not be believed; empty where it may.
+        lies: says about a topic why it must not be believed; empty where it may.
         guesses: go by names that only sound right where no rule fits.
     """
     columns: dict[str, Any] = {}

@@ -33,12 +33,12 @@ class Rule:
     Args:
         block: what it gives, one of `BLOCKS`.
         kind: pattern of the message type.
-        columns: canonical name to field, or to what a mapping says of it with `from` relative to the topic; or a
+        columns: canonical name to field, or to what a mapping says about it with `from` relative to the topic; or a
             function of recording and topic that returns this.
         rank: smaller goes first where several topics give the same.
         name: pattern that the topic's name must contain.
         when: fields of the message that must have a value throughout.
-        frame: what `topics:` of a mapping says of it.
+        frame: what `topics:` of a mapping says about it.
         note: what a user should know.
     """
 
@@ -70,7 +70,7 @@ class Rule:
         return out
 
     def framed(self, topic: Topic) -> dict[str, Any]:
-        """Return what the mapping says of the topic's frame."""
+        """Return what the mapping says about the topic's frame."""
         return dict(self.frame(topic) if callable(self.frame) else self.frame)
 
 
@@ -101,7 +101,7 @@ def _has(topic: Topic, name: str) -> bool:
 
 
 def absolute(spec: Any, topic: str) -> Any:
-    """Return what a mapping says of a column with its sources below a topic."""
+    """Return what a mapping says about a column with its sources below a topic."""
     if isinstance(spec, str):
         return f"{topic}.{spec}" if topic else spec
     out = dict(spec)

@@ -1,4 +1,4 @@
-"""Slocum gliders' sensors: radians and metres; pitch is positive nose up; each sensor has times of its own."""
+"""Slocum gliders' sensors: radians and metres; pitch is positive nose up; each sensor has separate times."""
 
 from __future__ import annotations
 

@@ -121,7 +121,7 @@ def attitude_order(log: Log) -> str | None:
 
     Returns:
         "xyzw" or "wxyz" where the four parts stand in another order, "inverse" where the quaternion turns
-        world into body, None where the given reading is the best or nothing can be told.
+        world into body, None where the given reading is the best or nothing can be said.
     """
     readings = {"given": [0, 1, 2, 3], "xyzw": [3, 0, 1, 2], "wxyz": [1, 2, 3, 0], "inverse": [0, 1, 2, 3]}
     explained = {}

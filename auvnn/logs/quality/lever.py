@@ -1,7 +1,7 @@
 """Where a sensor sits, from its own signals: a velocity sensor or an accelerometer away from the body origin.
 
 A velocity sensor at r from the origin reads v + omega x r. Against the derivative of the position, which belongs to
-the origin, r follows by least squares, the sensor's latency beside it, since turning late looks much the same. An
+the origin, r follows by least squares, with the sensor's latency, since turning late looks much the same. An
 accelerometer that was not carried over to the origin reads omega_dot x r + omega x (omega x r) too much, against the
 derivative of the velocity. Reference: Fossen (2011), section 7.5; Kinsey and Whitcomb (2007) for Doppler sensors.
 """

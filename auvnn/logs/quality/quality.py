@@ -33,7 +33,7 @@ class Quality(Answer):
         excitation: by velocity component.
         condition: of [nu, |nu| nu] over the excited components.
         runs: samples, duration, rate, jitter and gaps of every run.
-        actuators: what the log says of a model's actuators, where it was asked; plain data.
+        actuators: what the log says about a model's actuators, where it was asked; plain data.
         files: what the log's files hold, where it was asked: topics, fields, rates, the mapping proposed; plain data.
     """
 
@@ -98,7 +98,7 @@ class Quality(Answer):
             InputError: there is a finding of level "error"; the message names the first and its cure.
         """
         if not force:
-            self._refuse(self.errors, "; force=true fits it all the same")
+            self._refuse(self.errors, "; force=true fits it anyway")
 
     @property
     def contradictions(self) -> list[Finding]:
@@ -121,7 +121,7 @@ class Quality(Answer):
             InputError: with the first contradiction and its cure.
         """
         if not force:
-            self._refuse(self.contradictions, "; force=true fits it all the same")
+            self._refuse(self.contradictions, "; force=true fits it anyway")
 
     def _refuse(self, found: list[Finding], way_out: str = "") -> None:
         if found:

@@ -62,7 +62,7 @@ def _disagreeing(agreement: dict[str, Agreement]) -> list[Finding]:
             elif abs(correlation) < LOOSE:
                 words = f"{name} correlates with it by {correlation:.2f} (other runs: {pooled:.2f})"
                 bad.setdefault(number, []).append(words)
-    cure = "look at this run by itself; leave it out, or correct its clock, headings or signs"
+    cure = "look at this run alone; leave it out, or correct its clock, headings or signs"
     return [
         Finding(
             "warning",
@@ -112,7 +112,7 @@ def _headings(log: Log) -> list[Finding]:
             found[run.number] = offset
     if not found:
         return []
-    # What all runs share is a sensor that is turned in its mounting; a run of its own is judged against the others.
+    # What all runs share is a sensor that is turned in its mounting; a separate run is judged against the others.
     shared = np.angle(np.mean([np.exp(1j * a) for a, _, _ in found.values()])) if len(found) > 2 else 0.0
     if len(found) > 2:
         angles = np.array([a for a, _, _ in found.values()])

@@ -1,4 +1,4 @@
-"""What the sensors say of one another and of the vehicle's situation, in plain words."""
+"""What the sensors say about one another and of the vehicle's situation, in plain words."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def _interval(lag: Lag) -> str:
 
 
 def restarts(log: Log) -> list[Finding]:
-    """Return where the pose starts afresh."""
+    """Return where the pose starts again."""
     found = []
     for run in log.runs:
         if not len(run.restarts):
@@ -115,8 +115,9 @@ def restarts(log: Log) -> list[Finding]:
         jumps = len(run.restarts) - len(np.intersect1d(run.restarts, resets.counted(run)))
         causes = [f"{of_column} by the column reset"] if of_column else []
         causes += [f"{jumps} by a jump against the velocities that stays"] if jumps else []
+        often = "once" if len(run.restarts) == 1 else f"{len(run.restarts)} times"
         what = (
-            f"the pose starts afresh {len(run.restarts)} times ({', '.join(causes)}; first at "
+            f"the pose starts again {often} ({', '.join(causes)}; first at "
             f"{run.t[run.restarts[0]]:.6g} s): cut into segments there, nothing reaches across"
         )
         found.append(Finding("repair", f"run {run.number}", what))

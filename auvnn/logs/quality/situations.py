@@ -1,7 +1,7 @@
 """Stretches in which something other than water and thrusters moves or holds the vehicle.
 
 At the surface, in the air, on the bottom, in somebody's hand or at the end of its tether the equations of motion are
-others, and a fit would take them for the vehicle's. Each is told by what it does to the log; where the evidence
+others, and a fit would take them for the vehicle's. Each is recognised by what it does to the log; where the evidence
 allows several, the words name them.
 """
 

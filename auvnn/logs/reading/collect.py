@@ -35,7 +35,7 @@ from auvnn.logs.run import MIN_SAMPLES, Run
 
 Array = NDArray[np.float64]
 
-# Rows by which it is told whether a file's stamps are dates.
+# Rows by which it is decided whether a file's stamps are dates.
 FIRST_ROWS = 5000
 
 

@@ -147,7 +147,7 @@ def is_large(paths: Sequence[Path]) -> bool:
     return False
 
 
-# Rows by which a file's kind is told.
+# Rows by which a file's kind is recognised.
 _FIRST = 5000
 
 

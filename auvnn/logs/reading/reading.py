@@ -116,7 +116,7 @@ def _stamp(path: Path) -> tuple[int, int] | None:
 
 
 def _number_apart(collector: Collector, first: int, file: Path, several: bool) -> None:
-    """Give the runs of a further file numbers of their own where they clash with earlier ones."""
+    """Give the runs of a further file their own numbers where they clash with earlier ones."""
     taken = {run.number for run in collector.runs[:first]}
     new = collector.runs[first:]
     if several and taken & {run.number for run in new}:

@@ -62,7 +62,7 @@ def stale(
     """
     found = np.zeros((len(nu), 12), dtype=bool)
     if position is not None:
-        # Positions and depth come from sensors of their own.
+        # Positions and depth come from separate sensors.
         found[:, :2] = repeats(position[:, :2])[:, None]
         found[:, 2] = repeats(position[:, 2:])
     found[:, 3:6] = repeats(quaternion)[:, None]

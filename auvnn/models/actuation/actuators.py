@@ -244,7 +244,7 @@ def _side_by_side(thrust: Drive, angles: Drive) -> Drive:
 
 def _states(demand: Tensor, times: Tensor, lag: Answer, substeps: int) -> tuple[Tensor, Response]:
     """Return the thrust as each row begins, (..., T, n), and the answer to a unit gap over each step."""
-    # The last row has no interval of its own; its thrust is needed only at its very start.
+    # No interval follows the last row; its thrust is needed only at its very start.
     steps = torch.cat([times[..., 1:] - times[..., :-1], torch.zeros_like(times[..., :1])], dim=-1)
     h = steps.to(demand).unsqueeze(-1) / substeps
     # The answer is linear in the gap between state and demand: one call for all steps tells how the gap closes,

@@ -155,7 +155,7 @@ def rollout(
     ):
         finer = followed(step, rate)
         if step / finer <= MOST_CUT:
-            # Too long a step makes a stiff model explode that is sound by itself: only a finer one can tell.
+            # Too long a step makes a stiff model explode that is otherwise sound: only a finer one can tell.
             alike = {"solver": solver, "warmup": warmup, "engine": engine}
             again = rollout(model, eta0, nu0, whole[0], whole[1], max_step=finer, **alike)
             if not again.diverged:

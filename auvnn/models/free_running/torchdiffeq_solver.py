@@ -81,7 +81,7 @@ def solve(
         model.before_thrust,
     )
     late = next((e.delay() for e in model.using("delay")), torch.zeros(())).to(times)
-    # Delayed pieces of thrust change inside the intervals; where they do, the integration starts afresh.
+    # Delayed pieces of thrust change inside the intervals; where they do, the integration starts again.
     jumps = (times + late).tolist() if model.using("delay") else []
     rows = inputs.each()
     y = torch.cat(state, dim=-1)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
+
+from auvnn.cards import Card, Shown
 
 
 @dataclass(frozen=True)
@@ -25,8 +28,8 @@ class Divergence:
     words: str
 
 
-@dataclass(frozen=True)
-class Trajectory:
+@dataclass(frozen=True, repr=False)
+class Trajectory(Shown):
     """A free run.
 
     Attributes:
@@ -48,6 +51,15 @@ class Trajectory:
     divergences: tuple[Divergence, ...] = ()
     notes: tuple[str, ...] = ()
     fins: Tensor | None = None
+
+    def card(self) -> Card:
+        """Return how long the run is, how many there are, and whether they stayed sound."""
+        shape, rows = tuple(self.nu.shape[:-2]), self.nu.shape[-2]
+        span = float(self.times[..., -1].max() - self.times[..., 0].min()) if rows else 0.0
+        many = f"{int(np.prod(shape))} runs of " if shape else ""
+        sound = "no divergence" if not self.divergences else f"{len(self.divergences)} diverged"
+        line = f"{many}{rows} rows over {span:.4g} s; {sound}"
+        return Card("Trajectory", line, list(self.notes), foot=".times, .eta, .nu")
 
     @property
     def acting(self) -> Tensor:

@@ -1,4 +1,4 @@
-"""What the structures have in common: the vehicle without its damping, and a grey box with learned parts of its own."""
+"""What the structures have in common: the vehicle without its damping, and a grey box with further learned parts."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Structure(GreyBox):
 
     Args:
         vehicle: what is known.
-        effects: named effects beside it, in order of action.
+        effects: named effects in addition to it, in order of action.
         actuation: "thrusters" or "wrench".
     """
 

@@ -23,7 +23,7 @@ def classical(
 
     Args:
         vehicle: what is known.
-        effects: named effects beside it.
+        effects: named effects in addition to it.
         actuation: "thrusters" or "wrench".
         seed: taken for the sake of one interface; the coefficients start at zero.
         coupled: also the off-diagonal coefficients, a_ij nu_j + b_ij |nu_j| nu_j; the paper's eq. 7 has none.

@@ -36,7 +36,7 @@ def damping(
 
     Args:
         vehicle: what is known.
-        effects: named effects beside it.
+        effects: named effects in addition to it.
         actuation: "thrusters" or "wrench".
         seed: of the initial weights.
         networks: "six", one network of 71 weights for each degree of freedom as in the paper, or "one" with six
@@ -64,7 +64,7 @@ class OneNetwork(Structure):
 
     Args:
         vehicle: what is known; its damping is left out.
-        effects: named effects beside it.
+        effects: named effects in addition to it.
         actuation: "thrusters" or "wrench".
         seed: of the initial weights.
         hidden: tanh units.

@@ -17,7 +17,7 @@ def known(
 
     Args:
         vehicle: what is known.
-        effects: named effects beside it.
+        effects: named effects in addition to it.
         actuation: "thrusters" or "wrench".
         seed: taken for the sake of one interface; there is nothing to draw.
     """

@@ -26,7 +26,7 @@ class Parallel(Structure):
 
     Args:
         vehicle: what is known; its damping is left out.
-        effects: named effects beside it.
+        effects: named effects in addition to it.
         actuation: "thrusters" or "wrench".
         seed: of the initial weights.
         hidden: tanh units.

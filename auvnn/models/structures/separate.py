@@ -59,7 +59,7 @@ class Separate(Structure):
 
     Args:
         vehicle: what is known.
-        effects: named effects beside it.
+        effects: named effects in addition to it.
         actuation: "thrusters" or "wrench".
         seed: of the initial weights.
         inertia: "known" or "learned" (NN_1; 21 numbers).

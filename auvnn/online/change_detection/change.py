@@ -20,6 +20,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from auvnn.answer_types import ChangeKind, Parameters
 from auvnn.models import GreyBox
 from auvnn.online.change_detection.blocks import ITEMS, _blocks, _joined, _Open
 from auvnn.online.change_detection.change_statistics import Block, Fit, fit, gains
@@ -190,12 +191,14 @@ class Monitor:
         effect, parameters = self._told(kind, fitted, heat)
         start = after[0].start
         words = _words(named, kind, rivals, effect, parameters, start, share[kind])
-        listing = [{"kind": k, "evidence": fits[k].evidence, "explained": max(0.0, share[k])} for k in order]
+        listing: list[ChangeKind] = [
+            {"kind": k, "evidence": fits[k].evidence, "explained": max(0.0, share[k])} for k in order
+        ]
         detected = after[-1].start + BLOCK
         told = (effect, parameters) if named != "unclear" else (None, {})
         return Change(start, detected, named, *told, best.evidence, max(0.0, share[kind]), listing, words)
 
-    def _told(self, kind: str, fitted: Any, heat: float) -> tuple[str, dict[str, dict[str, Any]]]:
+    def _told(self, kind: str, fitted: Any, heat: float) -> tuple[str, Parameters]:
         """Return the effect of a kind that says it best alone, and its parameters."""
         alone = {c.effect: (fitted([c], heat), c) for c in self._kinds[kind]}
         effect = max(alone, key=lambda name: alone[name][0].evidence)
@@ -205,7 +208,7 @@ class Monitor:
             p.name: abs(columns.now[i] + found.theta[i] - p.null) / std[i]
             for i, p in enumerate(columns.parameters)
         }
-        parameters = {
+        parameters: Parameters = {
             p.name: {"value": float(columns.now[i] + found.theta[i]), "std": float(std[i]), "unit": p.unit}
             for i, p in enumerate(columns.parameters)
             if std[i] < UNDETERMINED * p.scale

@@ -1,4 +1,4 @@
-"""Bounded statistics of the missing wrench against the effects' sensitivities, and what they say of each kind."""
+"""Bounded statistics of the missing wrench against the effects' sensitivities, and what they say about each kind."""
 
 from __future__ import annotations
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
+
+from auvnn.answer_types import ChangeEntry, ChangeKind, Parameters, ParameterValue
 
 
 @dataclass
@@ -26,19 +28,23 @@ class Change:
     detected: float
     kind: str
     effect: str | None
-    parameters: dict[str, dict[str, Any]]
+    parameters: Parameters
     evidence: float
     explained: float
-    kinds: list[dict[str, Any]]
+    kinds: list[ChangeKind]
     words: str
 
     def to_dict(self) -> dict[str, Any]:
         """Return the change as plain data."""
         return dict(vars(self))
 
+    def entry(self, run: int) -> ChangeEntry:
+        """Return the change as it stands in the answer, with the run in which it was seen."""
+        return cast(ChangeEntry, {"run": run, **self.to_dict()})
+
 
 def _words(
-    named: str, kind: str, rivals: list[str], effect: str, parameters: dict[str, dict[str, Any]],
+    named: str, kind: str, rivals: list[str], effect: str, parameters: Parameters,
     time: float, share: float,
 ) -> str:  # fmt: skip
     when = f"at {time:.1f} s"
@@ -53,6 +59,6 @@ def _words(
     )
 
 
-def _value(name: str, told: dict[str, Any]) -> str:
+def _value(name: str, told: ParameterValue) -> str:
     unit = "" if told["unit"] == "1" else f" {told['unit']}"
     return f"{name} {told['value']:.3g} +- {told['std']:.2g}{unit}"

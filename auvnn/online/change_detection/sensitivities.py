@@ -146,6 +146,6 @@ class Sensitivities:
 
 
 def _excluded(model: GreyBox, name: str) -> bool:
-    """Say whether an effect cannot stand beside those of the model."""
+    """Say whether an effect cannot be added to those of the model."""
     own = EFFECTS.get(name).excludes
     return any(e in own for e in model.effect_names) or any(name in e.excludes for e in model.members)

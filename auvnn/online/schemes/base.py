@@ -59,10 +59,10 @@ class OnlineScheme:
         raise TypeError(f"{type(self).__name__} does not say how it learns: write its propose()")
 
     def accept(self, weights: Tensor) -> None:
-        """Be told what weights were set in the end."""
+        """Take note of the weights that were set in the end."""
 
     def changed(self) -> None:
-        """Be told that the vehicle is not what it was: what was learned before may be wrong."""
+        """Take note that the vehicle has changed: what was learned before may be wrong."""
 
     def state(self) -> dict[str, Tensor]:
         """Return all that the scheme remembers."""

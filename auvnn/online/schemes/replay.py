@@ -1,4 +1,4 @@
-"""Learning from the present sample beside remembered ones, kept for the variety of their velocities."""
+"""Learning from the present sample together with remembered ones, kept for the variety of their velocities."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ class ExperienceReplay(OnlineScheme):
     w <- w + rate J' (J J' + diag(R / n + c |J|^2))^-1 e   over the batch, each degree of freedom for itself
 
     The memory holds cells of velocity: a sample that falls near one joins its running mean (n samples of it, so
-    noise averages out), a new one takes a cell of its own, and where the memory is full the two nearest cells
+    noise averages out), a new one takes a separate cell, and where the memory is full the two nearest cells
     make room by merging. What the vehicle did once is therefore not forgotten while it does something else.
     A change of the vehicle empties the memory, because old targets are wrong then.
 
     Args:
         learning_rate: share of the projection that is taken, 0 to 1.
         memory: cells.
-        batch: cells used beside the present sample, in turn.
+        batch: cells used with the present sample, in turn.
         near: samples within this distance, in the velocity scale, share a cell.
         most: samples that a cell's mean counts as at most; later ones then push the older out.
         ridge: c, which keeps the step small where the batch hardly tells the weights apart.

@@ -72,7 +72,7 @@ class Trial:
         return int(proven.sum())
 
     def begin(self, weights: Weights) -> None:
-        """Use the weights as they are now, and begin to judge afresh."""
+        """Use the weights as they are now, and begin to judge again."""
         self.used, self.evidence = weights.read(), torch.zeros_like(self.evidence)
         self._bank.write(self.used)
 

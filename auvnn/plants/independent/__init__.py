@@ -1,4 +1,4 @@
-"""A plant with equations of its own: vectors instead of matrices, scipy's integrator, nothing of the model's code."""
+"""A plant with separate equations: vectors instead of matrices, scipy's integrator, nothing of the model's code."""
 
 from auvnn.plants.independent.plant import NumpyPlant
 

@@ -25,7 +25,7 @@ class Lump:
         mass: kg, once it is all there (or per second, for a leak).
         place: centre of mass, m, (3,).
         inertia: about it, kg m2, (3, 3).
-        lift: buoyancy of its own, N, once it is all there.
+        lift: its own buoyancy, N, once it is all there.
         share: time, s, to what share of the mass is there and its rate, 1/s; None for all of it, always.
     """
 

@@ -1,4 +1,4 @@
-"""The plant `numpy`: equations of its own in vectors, integrated by scipy between commands."""
+"""The plant `numpy`: separate equations in vectors, integrated by scipy between commands."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ class NumpyPlant(Plant):
     name = "numpy"
 
     def refuses(self, effect: str) -> str:
-        """Return why it cannot hold an effect: it has no equations of its own for it."""
+        """Return why it cannot hold an effect: it has no equations for it."""
         if effect in SUPPORTED or effect.startswith("stranger_"):
             return ""
-        return "it has no equations of its own for it; use plant=own"
+        return "it has no equations for it; use plant=own"
 
     def move(self, task: PlantTask, look: Look) -> Motion:
         """Run the equations."""

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 # take longer steps than FINE, s, wants no more than what noise of millimetres per second cannot show.
 FINE = 0.01
 # In a world with a wandering force, or of commands that change that fast, one step of the classical method of order
-# four passes intervals up to this, s: an adaptive method would begin anew at each.
+# four passes intervals up to this, s: an adaptive method would begin again at each.
 SHORT = 0.026
 EXACT, FAST = ("DOP853", 1e-9, 1e-10), ("RK45", 1e-6, 1e-7)
 # State of one vehicle: position, rotation by rows, velocity, angular rate.

@@ -12,7 +12,7 @@ from auvnn.report import style
 from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
 from auvnn.report.pages import common
-from auvnn.report.pages.sections.adaptation_words import off_words, ratio_words, worse_words
+from auvnn.report.pages.sections.adaptation_words import early_words, off_words, ratio_words, worse_words
 from auvnn.report.plots.adaptation import movement, skipped, with_and_without
 from auvnn.report.view import View
 from auvnn.report.words import count, finite, number, percent, plural
@@ -44,7 +44,7 @@ class AdaptationPage(Page):
         if ratio is not None:
             out.append(f"Running free for 5 s with the weights frozen at each moment, {ratio_words(ratio)}.")
         changes = _changes(view)
-        out += worse_words(ratio)
+        out += worse_words(ratio) or early_words(changes, view.items("history"))
         out += [f"Run {change.get('run')}: {_change_words(change)}." for change in changes[:2]]
         if len(changes) > 2:
             out.append(f"{plural(len(changes) - 2, 'further change')} was seen, listed below." if len(changes) == 3
@@ -68,7 +68,7 @@ class AdaptationPage(Page):
                 "prediction_error",
                 "Prediction error of the acceleration, with and without adaptation",
                 lambda: _one_step(view),
-                "Before each sample is learned from. Following every residual makes this small by itself: the next "
+                "Before each sample is learned from. Following every residual alone makes this small: the next "
                 f"figure shows what was learned of the vehicle. {MARKS}",
             ),
             Plot(
@@ -98,7 +98,7 @@ class AdaptationPage(Page):
         rows, kinds = [], []
         for k, change in enumerate(_changes(view), 1):
             fitted = {str(change.get("effect")): change.get("parameters") or {}}
-            first = [str(k), number(change.get("time"), 4), str(change.get("kind"))]
+            first = [str(k), _time(change), str(change.get("kind"))]
             rows += [[*first, *row] for row in common.parameter_rows(fitted)]
             if not fitted[str(change.get("effect"))]:
                 rows.append([*first, "–", "–", "–", "–"])
@@ -110,7 +110,7 @@ class AdaptationPage(Page):
             [name.replace("_", " "), str(told.get("words", "")), count(told.get("count", 0))]
             for name, told in view.mapping("skipped").items()
         ]
-        metrics = [[str(k), number(v, 4)] for k, v in view.mapping("metrics").items()]
+        metrics = [[str(k), common.metric(v)] for k, v in view.mapping("metrics").items()]
         return [
             HtmlTable("Changes seen", ["number", "time, s", "kind", *common.PARAMETER_HEAD], rows, words=5),
             HtmlTable(
@@ -207,6 +207,12 @@ def _movement(view: View) -> Figure:
     moved = np.concatenate([np.asarray(h["moved"], dtype=float) for h in runs] or [[]])
     learned = np.concatenate([np.array([c == "adapted" for c in h["cause"]]) for h in runs] or [[]])
     return movement(t, moved, learned, changes=changes)
+
+
+def _time(change: Mapping[str, Any]) -> str:
+    # Known to about half a second.
+    time = finite(change.get("time"))
+    return "–" if time is None else f"{time:.1f}"
 
 
 PAGE = AdaptationPage()

@@ -24,9 +24,10 @@ from auvnn.report.pages.sections.benchmark_words import (
 from auvnn.report.pages.sections.outcomes import rows_of, text, values
 from auvnn.report.plots.coverage import coverage
 from auvnn.report.plots.falls import falls
+from auvnn.report.plots.recovery import in_order
 from auvnn.report.plots.uniformity import uniformity
 from auvnn.report.view import View
-from auvnn.report.words import finite, listing, plural
+from auvnn.report.words import finite, listing, plural, prose
 
 
 class BenchmarkPage(Page):
@@ -90,7 +91,7 @@ class BenchmarkPage(Page):
                 "How often the hidden effect is named first",
                 lambda: _recovery(rows),
                 "Share of the logs in which the hidden effect, and it alone, is named first, with Wilson's "
-                "95 % interval. Sizes are in standard errors of a fit that knows everything else.",
+                f"95 % interval. {outcomes.size_words(rows)}".strip(),
             ),
             Plot(
                 "coverage",
@@ -130,7 +131,8 @@ class BenchmarkPage(Page):
             )
         parts = outcomes.by_condition(rows)
         if 1 < len(parts) <= MOST_CONDITIONS:
-            found += [_one_condition(i, *part) for i, part in enumerate(parts.items(), 1)]
+            sizes = values(outcomes.with_effect(rows), "size")
+            found += [_one_condition(i, *part, sizes) for i, part in enumerate(parts.items(), 1)]
         return found
 
     def tables(self, view: View) -> list[HtmlTable]:
@@ -163,11 +165,13 @@ class BenchmarkPage(Page):
         runs, duration, rate = (
             listing(f"{n:g}" for n in outcomes.numbers(rows, key)) for key in ("runs", "duration", "rate")
         )
-        repeats = finite(view.mapping("options").get("repeats"))
+        options = view.mapping("options")
+        # A plan's parts each say by themselves how many logs they make.
+        repeats = None if options.get("plan") or options.get("balanced") else finite(options.get("repeats"))
         return [
             ("Vehicles", listing(values(rows, "vehicle"))),
             ("Hidden", listing(values(rows, "hidden"))),
-            ("Sizes", listing(s for s in values(rows, "size") if s != "none")),
+            ("Sizes", listing(prose(s) for s in in_order(values(rows, "size")) if s != "none")),
             ("Noise", listing(values(rows, "noise"))),
             ("Manoeuvres", listing(values(rows, "excitation"))),
             ("Coefficients", listing(values(rows, "coefficients"))),

@@ -28,6 +28,16 @@ _MOTION = {
 }
 
 
+def metric(value: Any) -> str:
+    """Return one of an answer's metrics: a whole number in full, any other with four digits."""
+    known = finite(value)
+    return (
+        count(known)
+        if known is not None and known == round(known) and abs(known) < 1e15
+        else number(value, 4)
+    )
+
+
 def channel_words(channel: Any) -> str:
     """Return `sway (v)` for a channel whose motion has a name."""
     return f"{_MOTION[channel]} ({channel})" if channel in _MOTION else str(channel)
@@ -88,7 +98,7 @@ def rollout_table(rollout: Mapping[str, Any]) -> HtmlTable:
 
 
 def baseline_words(view: View) -> list[str]:
-    """Return where the model stands beside a plain regression and persistence, in one or two sentences."""
+    """Return how the model compares with a plain regression and persistence, in one or two sentences."""
     line = view.mapping("baseline")
     loses = line.get("loses") or {}
     if finite(line.get("total")) is None:

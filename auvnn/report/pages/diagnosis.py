@@ -26,7 +26,7 @@ from auvnn.report.pages.sections.diagnosis_words import (
     _with_commands,
 )
 from auvnn.report.pages.training import learned_plots
-from auvnn.report.plots.ranking import ranking
+from auvnn.report.plots.ranking import in_order, ranking
 from auvnn.report.view import View
 from auvnn.report.words import finite, listing, number, p_value, percent, plural
 
@@ -105,8 +105,8 @@ class DiagnosisPage(Page):
             Plot(
                 "ranking",
                 "The candidates",
-                lambda: ranking(candidates, missing),
-                lambda: _ranking_caption(candidates, missing),
+                lambda: ranking(candidates, missing, nearest=view.texts("nearest")),
+                lambda: _ranking_caption(candidates, missing, view.texts("nearest")),
             ),
             *(
                 [Plot("parameters", "What it would be", lambda: _parameters(chosen), common.INTERVALS)]
@@ -128,7 +128,10 @@ class DiagnosisPage(Page):
     def tables(self, view: View) -> list[HtmlTable]:
         """Return the tables."""
         rows = []
-        for rank, c in enumerate(_candidates(view), 1):
+        found = _candidates(view)
+        places = {id(c): k for k, c in enumerate(found, 1)}
+        for c in in_order(found, [*view.texts("missing"), *view.texts("nearest")]):
+            rank = places[id(c)]
             alike = [
                 f"{o.get('effect')} ({number(o.get('similarity'), 2)})"
                 for o in c.get("confusable_with") or []
@@ -157,8 +160,8 @@ class DiagnosisPage(Page):
             "cv error after",
         ]
         caption = (
-            "p: how likely so large a gain would be if the effect were absent. cv error: on runs that were "
-            "not fitted."
+            "In the order of the figure. Rank: by evidence, which weighs the fit against the number of parameters. p: "
+            "how likely so large a gain would be if the effect were absent. cv error: on runs that were not fitted."
         )
         tested = view.mapping("residual_tests").get("after")
         return [

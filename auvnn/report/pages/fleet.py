@@ -23,7 +23,8 @@ class FleetPage(Page):
         if not changing:
             return f"{listing(view.texts('effects'))}: the same on all dives"
         names = [f"{t.get('effect')}.{t.get('parameter')}" for t in changing[:4]]
-        return f"Not the same on all dives: {listing(names)}"
+        more = len(changing) - len(names)
+        return f"Not the same on all dives: {listing([*names, *([f'{more} more'] if more else [])])}"
 
     def about(self, view: View) -> str:
         """Return model and dives."""
@@ -59,7 +60,7 @@ class FleetPage(Page):
                 "over_dives",
                 "Parameters over the dives",
                 lambda: over_dives(dives, rows, view.text("along"), since),
-                "Each dive fitted by itself. Hollow: something is left that these effects do not explain, and the value "
+                "Each dive fitted separately. Hollow: something is left that these effects do not explain, and the value "
                 f"may stand in for it.{more}",
             )
         ]
@@ -81,23 +82,25 @@ class FleetPage(Page):
         head = ["effect", "parameter", "changes", "mean", "chi² of constancy", "p", "slope", "p of slope"]
         values, names = [], []
         for dive in view.items("dives"):
-            for effect, members in (dive.get("parameters") or {}).items():
-                for name, entry in members.items():
+            fitted = dive.get("parameters") or {}
+            # In the order in which they were asked for.
+            order = [*(e for e in view.texts("effects") if e in fitted), *fitted]
+            for effect in dict.fromkeys(order):
+                for name, entry in fitted[effect].items():
                     value = interval(entry.get("value"), entry.get("std"), str(entry.get("unit") or ""))
-                    values.append([str(dive.get("dive")), str(dive.get("file")), _start(dive), effect, name, value,
-                                   str(dive.get("verdict"))])  # fmt: skip
+                    values.append(
+                        [str(dive.get("dive")), _start(dive), effect, name, value, str(dive.get("verdict"))]
+                    )
             names.append([
-                str(dive.get("dive")), str(dive.get("file")), _start(dive), str(dive.get("verdict")),
+                str(dive.get("dive")), _file(dive), _start(dive), str(dive.get("verdict")),
                 count(dive.get("samples")), count(dive.get("windows")), number(finite(dive.get("cv"))),
             ])  # fmt: skip
-        failed = [
-            [str(f.get("file")), str(f.get("words"))] for f in view.items("failed") if isinstance(f, Mapping)
-        ]
+        failed = [[_file(f), str(f.get("words"))] for f in view.items("failed") if isinstance(f, Mapping)]
         return [
-            HtmlTable("Does it change?", head, rows, "Mean and slope ± one standard deviation; p of each test by itself, "
+            HtmlTable("Does it change?", head, rows, "Mean and slope ± one standard deviation; p of each test alone, "
                   "and “changes” where one of them holds among all parameters (5 %, Bonferroni).", words=3),
-            HtmlTable("Values of each dive", ["dive", "file", "start", "effect", "parameter", "value", "verdict"], values,
-                  words=5),
+            HtmlTable("Values of each dive", ["dive", "start", "effect", "parameter", "value", "verdict"], values,
+                  words=4),
             HtmlTable("Dives", ["dive", "file", "start", "verdict", "samples", "windows", "cv error"], names,
                   "Adequate: what is left is white. cv error: on stretches left out, in standard deviations of the "
                   "error; 1 is noise alone.", words=4),
@@ -127,8 +130,14 @@ def _mean(trend: Mapping[str, Any]) -> str:
     return interval(mean.get("value"), mean.get("std"), str(trend.get("unit") or ""))
 
 
+def _file(dive: Mapping[str, Any]) -> str:
+    """Return the name of a dive's file; where it lies stands in the JSON answer."""
+    return str(dive.get("file") or "–").replace("\\", "/").rstrip("/").rpartition("/")[2]
+
+
 def _start(dive: Mapping[str, Any]) -> str:
-    return str(dive.get("start") or "–").replace("T", " ").removesuffix("+00:00")
+    # A date without a time stands as midnight.
+    return str(dive.get("start") or "–").replace("T", " ").removesuffix("+00:00").removesuffix(" 00:00:00")
 
 
 PAGE = FleetPage()

@@ -153,7 +153,7 @@ def _finding_rows(view: View) -> list[list[str]]:
     rows = []
     for f in reading.findings(view):
         level, where, what, cure = (str(f.get(k) or "") for k in ("level", "where", "what", "cure"))
-        # The cure has a column of its own.
+        # The cure has a separate column.
         rows.append([level, where, what.removesuffix(cure).rstrip("; ") if cure else what, cure])
     return rows
 
@@ -163,7 +163,7 @@ def _actuators(view: View) -> Mapping[str, Any]:
 
 
 def _actuator_words(view: View) -> list[str]:
-    """Return what the motion says of order and signs of the actuators; nothing where no model was named."""
+    """Return what the motion says about order and signs of the actuators; nothing where no model was named."""
     told = _actuators(view)
     wrong = [str(w) for w in told.get("findings") or []]
     sure = percent(told.get("confidence"))

@@ -28,6 +28,7 @@ HELD_OUT = {
 }
 
 
+RANGE = "rmse_over_range_worst"
 # Columns that a page has room for.
 WIDE = 8
 
@@ -71,20 +72,32 @@ class StudyPage(Page):
         words = next(
             (k for k, key in enumerate(head) if any(not isinstance(r.get(key), str) for r in rows)), 1
         )
-        cells = [[_cell(row.get(key)) for key in head] for row in rows]
+        cells = [
+            [_share(row.get(key)) if key.endswith(RANGE) else _cell(row.get(key)) for key in head]
+            for row in rows
+        ]
         metrics = [[str(k), _cell(v)] for k, v in view.mapping("metrics").items()]
         return [
             *_upright([_column(h) for h in head], cells, max(words, 1)),
-            HtmlTable("Metrics", ["name", "value"], metrics, folded=True),
+            HtmlTable("Metrics, named as in study.json", ["name", "value"], metrics, folded=True),
         ]
 
     def assumed(self, view: View) -> list[tuple[str, str]]:
         """Return what the paper leaves open and was decided here, said once and then counted."""
         told = [words.partition(": ")[::2] for words in view.texts("assumed")]
-        own = [rest for head, rest in told if head == "ours"]
-        out = [(head, rest or head) for head, rest in told if head != "ours"]
-        first = "Not in the paper, decided here" if own else ""
-        return [*out, *((first if k == 0 else "", f"{k + 1}. {words}") for k, words in enumerate(own))]
+        groups = {"As in the paper": [], "Not in the paper, decided here": [], "Integration": []}
+        heads = {"as the paper": "As in the paper", "ours": "Not in the paper, decided here"}
+        for head, rest in told:
+            groups[heads.get(head, "Integration")].append(rest if head in heads else head)
+        return [
+            (name if k == 0 else "", f"{k + 1}. {_sentence(words)}" if len(members) > 1 else _sentence(words))
+            for name, members in groups.items()
+            for k, words in enumerate(members)
+        ]
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:]
 
 
 def _plot(found: Mapping[str, Any]) -> Plot:
@@ -106,7 +119,7 @@ def _plot(found: Mapping[str, Any]) -> Plot:
 
 def _column(key: str) -> str:
     """Return the name of a column in words: `tracking_rmse_over_range_worst` is said in full."""
-    name = key.replace("rmse_over_range_worst", "error, of the range, worst velocity").replace("_", " ")
+    name = key.replace(RANGE, "error, worst velocity, % of its range").replace("_", " ")
     return name.removesuffix(" s") + (", s" if name.endswith(" s") else "")
 
 
@@ -136,6 +149,11 @@ def _cell(value: Any) -> str:
     if isinstance(value, int) and not isinstance(value, bool):
         return count(value)
     return value if isinstance(value, str) else number(value, 4)
+
+
+def _share(value: Any) -> str:
+    known = finite(value)
+    return "–" if known is None else number(100.0 * known, 3)
 
 
 def _noise_free(m: Mapping[str, float | None]) -> list[str]:
@@ -189,9 +207,9 @@ def _way(name: str) -> str:
 
 
 def _beside(ratio: float | None) -> str:
-    """Return how an error stands beside another one."""
+    """Return how an error compares with another one."""
     if ratio is None:
-        return "not known beside"
+        return "not known against"
     if abs(ratio - 1.0) <= 0.02:
         return "the same as"
     if ratio < 1.0:

@@ -19,7 +19,7 @@ MOST = 12
 
 @style.styled
 def commands_over_time(t: ArrayLike, commands: Mapping[str, ArrayLike], *, limit: int = LIMIT) -> Figure:
-    """Draw every command as a line of steps in a panel of its own.
+    """Draw every command as a line of steps in a separate panel.
 
     Args:
         t: s, (N,).

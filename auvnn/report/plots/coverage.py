@@ -27,7 +27,7 @@ def coverage(z: ArrayLike) -> Figure:
 
     Left: density, with the share of 95 % intervals that hold the true value. Right: each error against the
     value expected at its rank, with the band in which 95 % of the points of true standard errors lie, each
-    point by itself (the k-th of n uniform variables has a beta distribution with k and n + 1 - k).
+    point alone (the k-th of n uniform variables has a beta distribution with k and n + 1 - k).
 
     Args:
         z: (estimate - true value) / standard error, any shape, NaN where unknown.
@@ -60,10 +60,9 @@ def _histogram(ax: Axes, z: NDArray[np.float64], edge: float) -> None:
     inside = int((np.abs(z) < Z95).sum())
     share, low, high = (100 * x for x in (inside / z.size, *wilson(inside, z.size)))
     remark = f"{inside} of {z.size} within ±{Z95}: {share:.0f} % ({low:.0f} to {high:.0f} %)"
-    ax.set_title(remark, fontsize=8, loc="left", pad=3)
     beyond = int((np.abs(z) > edge).sum())
-    if beyond:
-        style.note(ax, f"{beyond} beyond {edge:g}", x=0.98, y=0.12, ha="right")
+    remark += f"; {beyond} beyond ±{edge:g}" if beyond else ""
+    ax.set_title(remark, fontsize=8, loc="left", pad=3)
     ax.set_ylim(0, max(ax.get_ylim()[1], 0.5) * 1.22)
     ax.set_xlim(-edge, edge)
     ax.legend(loc="upper right", **LEGEND)

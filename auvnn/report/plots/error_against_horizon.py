@@ -1,4 +1,4 @@
-"""Free-running error against the horizon, with persistence beside it."""
+"""Free-running error against the horizon, compared with persistence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much of the fall of the held-out error that the truth gives is had with what was found."""
+"""How much of the fall of the held-out error that the truth gives is reached with what was found."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from auvnn.report import style
 from auvnn.report.panels import NoData
-from auvnn.report.plots.recovery import ALL, LOOKS, sizes_of
-from auvnn.report.words import label
+from auvnn.report.plots.recovery import ALL, look_of, sizes_of
+from auvnn.report.words import label, prose
 
 LOW, HIGH = -25.0, 125.0  # %: what lies beyond is drawn at the edge
 STEP, TALLEST = 0.2, 9.5  # inches
@@ -46,7 +46,7 @@ def falls(shares: Mapping[str, Mapping[str, Sequence[float]]], *, target: float 
             ax.axhspan(i - 0.5, i + 0.5, fc="#f4f4f4", ec="none", zorder=0)
         for k, size in enumerate(sizes):
             if size in by:
-                look = LOOKS.get(size, style.PERSISTENCE)
+                look = look_of(size, k)
                 y = i + (k - (len(sizes) - 1) / 2) * 0.2
                 shown = np.clip(100 * by[size], LOW, HIGH)
                 handles[size] = ax.plot(shown, np.full(shown.size, y), ls="none", marker=look.marker, ms=3.4,
@@ -69,6 +69,6 @@ def falls(shares: Mapping[str, Mapping[str, Sequence[float]]], *, target: float 
     ax.set_xlabel("fall of the held-out 5 s error (% of what the truth gives; beyond the ends at the edge)")
     style.show_grid(ax, "x")
     ordered = [s for s in sizes if s in handles] + [h for h in handles if h not in sizes]
-    figure.legend([handles[n] for n in ordered], [label(n, 40) for n in ordered], loc="outside upper center",
+    figure.legend([handles[n] for n in ordered], [prose(label(n, 40)) for n in ordered], loc="outside upper center",
                   ncols=len(ordered))  # fmt: skip
     return figure

@@ -51,7 +51,7 @@ def frozen_ahead(
             label(mark_words), (mark, 0.99), xycoords=("data", "axes fraction"), xytext=(2, -1), va="top",
             textcoords="offset points", fontsize=7, color="#505050",
         )  # fmt: skip
-    ax.set_yscale("log")
+    style.log_scale(ax, "y")
     ax.set_xlabel(f"time $t$ at which the weights are frozen (s); then {ahead:g} s of free running")
     ax.set_ylabel("rms error (% of the range)")
     style.show_grid(ax, "both")

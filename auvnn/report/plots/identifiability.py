@@ -1,4 +1,4 @@
-"""How well parameters are known alone, together, and beside networks of the velocity."""
+"""How well parameters are known alone, together, and with networks of the velocity."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The fitted parameters with their 95 % intervals, each kind of unit on an axis of its own."""
+"""The fitted parameters with their 95 % intervals, each kind of unit on a separate axis."""
 
 from __future__ import annotations
 

@@ -21,25 +21,30 @@ def ranking(
     chosen: Sequence[str] = (),
     *,
     most: int = MOST,
+    nearest: Sequence[str] = (),
 ) -> Figure:
     """Draw the candidates: explained share, which orders them after what was chosen, and the fall of the error left out.
 
-    What was chosen is hatched and bold; what cannot be told apart is bracketed on the right.
+    What was chosen is hatched and bold, what comes nearest in italics; what cannot be told apart is in brackets.
 
     Args:
         candidates: best first, {effect, p_value, explained (share of one), cv_before, cv_after, cv_std
             (optional: one sigma of the fall), confusable_with: [{effect, similarity}], needs: [channels]}.
         chosen: names of the effects that the verdict names.
         most: how many candidates to draw; those that lack channels are left out first.
+        nearest: names that come nearest to a cause without being it; they stand before the others.
 
     Raises:
         NoData: there is no candidate that could be judged.
     """
+    first = [*chosen, *(n for n in nearest if n not in chosen)]
     tried = [c for c in candidates if not c.get("needs")]
+    # What the verdict names is drawn, however the others rank.
+    tried.sort(key=lambda c: str(c.get("effect", "?")) not in first)
     shown = tried[:most] + [c for c in candidates if c.get("needs")][: max(0, min(4, most - len(tried)))]
     if not tried:
         raise NoData("no candidate could be judged")
-    shown = in_order(shown, chosen)
+    shown = in_order(shown, first)
     figure = style.new_figure(style.PAGE, 0.75 + 0.235 * len(shown))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=[1, 1])
     names = [str(c.get("effect", "?")) for c in shown]
@@ -48,6 +53,7 @@ def ranking(
     left.set_yticks(range(len(shown)), [label(name, 30) for name in names])
     for tick, name in zip(left.get_yticklabels(), names, strict=True):
         tick.set_fontweight("bold" if name in chosen else "normal")
+        tick.set_fontstyle("italic" if name in nearest and name not in chosen else "normal")
     left.set_ylim(len(shown) - 0.4, -0.6)
     left.set_xlim(0, max(100.0, left.get_xlim()[1]))
     left.set_xlabel("explained share of the residual (%)")

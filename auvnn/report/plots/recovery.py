@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 from statistics import NormalDist
 
@@ -11,11 +12,12 @@ from matplotlib.figure import Figure
 
 from auvnn.report import style
 from auvnn.report.panels import NoData
-from auvnn.report.words import label
+from auvnn.report.words import label, prose
 
 ORDER = ("small", "medium", "large")
 LOOKS = {"small": style.REFITTED, "medium": style.AFTER, "large": style.MEASURED}
 ALL = "all effects"
+_NUMBER = re.compile(r"\d+(\.\d+)?")
 STEP = 0.165  # inches from one marker to the next, less where there are many effects
 TALLEST = 10.0  # inches
 
@@ -26,6 +28,7 @@ def recovery(
     *,
     target: float | None = None,
     share: str = "hidden effect named first",
+    among: Iterable[str] = (),
 ) -> Figure:
     """Draw the share of logs in which each effect was named first, a marker with its 95 % interval per size.
 
@@ -35,6 +38,7 @@ def recovery(
         found: {effect: {size: (logs in which it was named first, logs)}}.
         target: a share that is aimed at, drawn as an upright line.
         share: what is counted, for the axis.
+        among: all sizes of which these are some, so that one size looks the same in every figure.
 
     Raises:
         NoData: no log hides an effect.
@@ -44,6 +48,7 @@ def recovery(
     if not rows:
         raise NoData("no log hides an effect")
     sizes = sizes_of(rows)
+    looks = {size: look_of(size, k) for k, size in enumerate(in_order([*among, *sizes]))}
     if len(rows) > 1:
         total = {s: _sum(by[s] for by in rows.values() if s in by) for s in sizes}
         rows = {ALL: total, **rows}
@@ -58,7 +63,7 @@ def recovery(
         for k, size in enumerate(sizes):
             if size in by_size:
                 y = i + (k - (len(sizes) - 1) / 2) * step
-                handles[size] = _marker(ax, y, *by_size[size], _look(size, k))
+                handles[size] = _marker(ax, y, *by_size[size], looks[size])
     if target is not None:
         line = ax.axvline(100 * target, color=style.BEFORE.color, ls=(0, (4, 2)), lw=1.1, zorder=1.5)
         handles[f"target: {100 * target:.0f} % of all"] = line
@@ -73,14 +78,28 @@ def recovery(
     style.show_grid(ax, "x")
     ordered = [s for s in sizes if s in handles] + [h for h in handles if h not in sizes]
     drawn = [handles[name] for name in ordered]
-    figure.legend(drawn, [label(name) for name in ordered], loc="outside upper center", ncols=len(drawn))
+    figure.legend(
+        drawn, [prose(label(name)) for name in ordered], loc="outside upper center", ncols=len(drawn)
+    )
     return figure
 
 
 def sizes_of(found: Mapping[str, Mapping[str, object]]) -> list[str]:
     """Return the sizes that occur, the known ones from small to large, then the others."""
-    known = list(dict.fromkeys(size for by_size in found.values() for size in by_size))
-    return [s for s in ORDER if s in known] + [s for s in known if s not in ORDER]
+    return in_order(size for by_size in found.values() for size in by_size)
+
+
+def in_order(sizes: Iterable[str]) -> list[str]:
+    """Return the names of sizes, each once: the known ones from small to large, numbers rising, then the others."""
+    known = list(dict.fromkeys(sizes))
+    numbers = sorted((s for s in known if _NUMBER.match(s)), key=lambda s: float(_NUMBER.match(s)[0]))  # type: ignore[index]
+    named = [s for s in ORDER if s in known]
+    return [*named, *numbers, *(s for s in known if s not in (*named, *numbers))]
+
+
+def look_of(size: str, k: int) -> style.Look:
+    """Return how the marker of a size is drawn, the k-th of a figure."""
+    return LOOKS.get(size) or (style.REFITTED, style.AFTER, style.MEASURED, style.BEFORE)[k % 4]
 
 
 def wilson(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
@@ -118,10 +137,6 @@ def _marker(ax: Axes, y: float, named: int, logs: int, look: style.Look) -> obje
     ax.text(1.03, y, f"{named} of {logs}", transform=ax.get_yaxis_transform(), va="center", fontsize=7,
             color="#303030")  # fmt: skip
     return drawn
-
-
-def _look(size: str, k: int) -> style.Look:
-    return LOOKS.get(size) or (style.AFTER, style.MEASURED, style.BEFORE, style.PERSISTENCE)[k % 4]
 
 
 def _sum(pairs: Iterable[tuple[int, int]]) -> tuple[int, int]:

@@ -46,7 +46,7 @@ def structures(rows: Sequence[Mapping[str, Any]], errors: Mapping[str, str]) -> 
                 color=look.color,
                 mfc="white" if k else look.color,
             )[0]
-        ax.set_xscale("log")
+        style.log_scale(ax, "x")
         ax.margins(x=0.08)
         ax.set_xlabel("rms error (% of the range)")
         ax.set_title(label(title, 60), fontsize=8)

@@ -25,8 +25,8 @@ def uniformity(p_values: Mapping[str, Sequence[float]]) -> Figure:
     """Draw the p-values of each test against those expected at their ranks, and how many are below 0.05.
 
     Left: one thin line for each effect's test, with the band in which 95 % of the points of uniform p-values lie,
-    each point by itself. A line below the band is a test that cries wolf; one above it is too shy. Right: the share
-    of each effect's p-values that is below 0.05, with Wilson's 95 % interval.
+    each point alone. A line below the band is a test that rejects too often; above it, one that rejects too
+    rarely. Right: the share of each effect's p-values that is below 0.05, with Wilson's 95 % interval.
 
     Args:
         p_values: effect to the p-values of its test on logs that hide nothing.
@@ -66,8 +66,9 @@ def _ranks(ax: Axes, found: Mapping[str, np.ndarray]) -> None:
     ax.set_box_aspect(1)
     ax.set_anchor("N")
     style.show_grid(ax, "both")
+    # Above the panel: inside it any place may hold a line.
     ax.legend(
-        loc="lower right", fontsize=7.5, frameon=True, facecolor="white", edgecolor="none", framealpha=1.0
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=7.5, borderaxespad=0.1, frameon=False
     )
     ax.set_xlabel("expected at its rank, uniform $p$")
     ax.set_ylabel("found, $p$")

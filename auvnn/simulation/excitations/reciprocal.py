@@ -40,7 +40,7 @@ class Reciprocal(Excitation):
         require(0 < self.speed <= 1, f"excitation.speed = {self.speed}: must lie in (0, 1]")
 
     def plan(self, model: GreyBox, t: Array, generators: Sequence[np.random.Generator]) -> Plan:
-        """Return the legs, each run with a first heading of its own; see the base class."""
+        """Return the legs, each run with a separate first heading; see the base class."""
         limits = limits_of(model)
         depth, speed, leg = self.depth, self.speed * top_speed(model, limits), self.leg
         if limits.steady is not None:

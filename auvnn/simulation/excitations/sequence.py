@@ -21,7 +21,7 @@ DRIVEN = (0, 1, 2, 5)
 
 @dataclass(frozen=True)
 class Manoeuvre(Excitation):
-    """A manoeuvre of a hovering vehicle whose signals are a function of time, drawn anew for each run.
+    """A manoeuvre of a hovering vehicle whose signals are a function of time, drawn again for each run.
 
     Attributes:
         effort: largest share of a thruster's limit (of a wrench's range).

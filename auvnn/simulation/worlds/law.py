@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from auvnn.plants import Motion, Plant, PlantTask
 from auvnn.plants.independent.fins import Fins
@@ -81,6 +80,8 @@ def ornstein_uhlenbeck(
         count: of knots.
         generators: one per run.
     """
+    from scipy.signal import lfilter
+
     a = np.exp(-spacing / correlation)
     out = []
     for generator in generators:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from auvnn.logs.channels import ACCELERATION, EULER, POSITION, VELOCITY
 from auvnn.logs.signals.rotation import multiply
@@ -141,6 +140,9 @@ class Sensing:
 
 def _remembered(unit: Array, step: float, correlation: float) -> Array:
     """Return white noise (R, T, c) of unit size with a correlation time, s, of the same size."""
+    # A world's alone: whoever simulates none does not wait for it to be imported.
+    from scipy.signal import lfilter
+
     a = float(np.exp(-step / correlation))
     scaled = unit * np.concatenate([[1.0], np.full(unit.shape[1] - 1, np.sqrt(1.0 - a * a))])[:, None]
     return np.asarray(lfilter([1.0], [1.0, -a], scaled, axis=1))

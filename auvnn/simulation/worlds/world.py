@@ -43,7 +43,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Sensors:
-    """What sensors do beside white noise.
+    """What sensors do besides white noise.
 
     Attributes:
         correlation: correlation time of the noise, s; its size is that of the noise condition.
@@ -88,7 +88,7 @@ class World:
         shape: other laws of drag, thrust and lift.
         sensors: other errors than white noise.
         conventions: other equations.
-        true_names: names of the catalogue that are true in it by itself, with nothing hidden.
+        true_names: names of the catalogue that are true in it even with nothing hidden.
     """
 
     name: str = "custom"

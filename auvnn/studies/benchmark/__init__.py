@@ -49,7 +49,7 @@ def benchmark(
 
     Args:
         options: see `cases`; `workers` is how many processes, by default one for each core.
-        progress: told after each log.
+        progress: called after each log.
         journal: a file to which each row is added as it is done, and from which an interrupted run goes on.
         any_code: also go on from rows that another version of the code made.
         further: journals of other runs, on other machines perhaps, whose rows count as done here too.

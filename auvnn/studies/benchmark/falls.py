@@ -1,4 +1,4 @@
-"""How far the held-out error falls with what was found, beside what the truth gives."""
+"""How far the held-out error falls with what was found, compared with what the truth gives."""
 
 from __future__ import annotations
 

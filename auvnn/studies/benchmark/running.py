@@ -22,7 +22,7 @@ Runner = Callable[[Case], dict[str, Any]]
 def run_all(todo: Sequence[Case], workers: int, run: Runner) -> Iterator[dict[str, Any]]:
     """Yield a row for each case as it is done, in whatever order.
 
-    A process that dies, for want of memory perhaps, takes the logs that were under way with it. They are tried
+    A process that dies, for lack of memory perhaps, takes the logs that were under way with it. They are tried
     again; whoever has died twice runs alone, and a log that dies alone is a row with that fault.
 
     Args:

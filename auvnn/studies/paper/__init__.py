@@ -26,7 +26,7 @@ def run_study(options: Mapping[str, Any], progress: Callable[[str], None] | None
 
     Args:
         options: those of `configs/study.yaml`, with a `case` composed into them.
-        progress: told in words.
+        progress: called with the state of the work, in words.
 
     Raises:
         ConfigError: an option is unknown or out of range.

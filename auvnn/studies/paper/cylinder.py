@@ -140,7 +140,7 @@ def with_cylinder(vehicle: Vehicle, cylinder: Cylinder) -> Vehicle:
 def factored(
     vehicle: Vehicle, low: float, high: float, generator: np.random.Generator
 ) -> tuple[Vehicle, list[float]]:
-    """Return the vehicle with every damping coefficient multiplied by a factor of its own, and the factors.
+    """Return the vehicle with every damping coefficient multiplied by a separate factor, and the factors.
 
     The factors are drawn evenly on a log scale; the smallest and the largest are then stretched to the range's ends,
     so that it is the stated range. Rows and columns of a full matrix are scaled by the roots of their factors, which

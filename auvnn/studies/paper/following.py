@@ -162,7 +162,7 @@ def frozen_ahead(
     Args:
         model: the physics.
         run: commands.
-        truth: the plant's motion without noise: where windows begin, and what they are held against.
+        truth: the plant's motion without noise: where windows begin, and what they are compared with.
         snapshots: weights after each sample of the run, or one set for all.
         rows: at which windows begin.
         horizon: s.

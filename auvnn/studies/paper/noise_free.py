@@ -17,14 +17,22 @@ from auvnn.models.structures.base import parameter_count
 from auvnn.studies.paper.answer import Study
 from auvnn.studies.paper.curves import damping_curves_of
 from auvnn.studies.paper.options import Options
-from auvnn.studies.paper.plant import by_axis, free_runs, load_plant, manoeuvre_log, over_range, rich_log
+from auvnn.studies.paper.plant import (
+    by_axis,
+    free_runs,
+    load_plant,
+    manoeuvre_log,
+    over_range,
+    rich_log,
+    runs_of,
+)
 from auvnn.training.fit_structure import StructureFit, fit_structure
 
 Array = np.ndarray
 # Seeds of what is held out, far from those of what is fitted.
 HELD_OUT_SEED = 100_000
 HELD_OUT = ("multisine", "manoeuvre")
-# Structures under a name of their own: with options that make them something else.
+# Structures under another name: with options that make them something else.
 VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
     "one_network": ("damping", {"networks": "one"}),
     "separate_all": ("separate", {"inertia": "learned", "damping": "learned", "restoring": "learned"}),
@@ -262,7 +270,7 @@ def _ratios(table: list[dict[str, Any]]) -> dict[str, float]:
 def _assumed(case: Mapping[str, Any]) -> list[str]:
     rich = case["rich"]
     return [
-        f"ours: the rich manoeuvre is {rich['runs']} runs of {rich['duration']:g} s of random-phase multisines at "
+        f"ours: the rich manoeuvre is {runs_of(rich)} of {rich['duration']:g} s of random-phase multisines at "
         f"{rich['rate']:g} samples a second; the paper has no second manoeuvre",
         "ours: every structure of the comparison is trained on the same samples by Levenberg-Marquardt; joint problems "
         f"with {case['joint']['restarts']} starting points and {case['joint']['iterations']} iterations",

@@ -1,4 +1,4 @@
-"""Options of a case study: read, checked, cut down for a smoke run, and told as assumptions of ours."""
+"""Options of a case study: read, checked, cut down for a smoke run, and reported as our assumptions."""
 
 from __future__ import annotations
 
@@ -92,10 +92,11 @@ class Options:
 
     def assumed(self) -> list[str]:
         """Return in words what the paper leaves open and these options decide, for all cases alike."""
+        scheme = str(self.scheme.get("scheme")).replace("_", " ")
         return [
             f"ours: the vehicle is {self.model}; the paper publishes none of its matrices",
             f"ours: {self.rate:g} samples a second over {self.duration:g} s; the paper states neither",
-            f"ours: networks trained by {self.scheme.get('scheme')}, seed {self.seed}; the paper says back propagation",
+            f"ours: networks trained by {scheme}, seed {self.seed}; the paper says back propagation",
             "ours: inputs and targets divided by their root mean square; the paper states no scaling",
             "the plant and the model are integrated by the same fourth-order Runge-Kutta steps of at most "
             f"{self.step:g} s",

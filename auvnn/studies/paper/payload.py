@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -169,12 +169,17 @@ def _figures(
     return out
 
 
+def _vector(values: Sequence[float]) -> str:
+    return f"({', '.join(f'{v:g}' for v in values)})"
+
+
 def _assumed(case: Mapping[str, Any], mission: Mission) -> list[str]:
     cylinder = case["cylinder"]
     added = mission.loaded.vehicle.mass
     out = [
         f"ours: the cylinder has a diameter of {cylinder['diameter']:g} m and is held with its centre at "
-        f"{list(cylinder['position'])} m, its axis along {list(cylinder['axis'])}; the loaded vehicle has {added:g} kg",
+        f"{_vector(cylinder['position'])} m, its axis along {_vector(cylinder['axis'])}; the loaded vehicle has "
+        f"{added:g} kg",
         "ours: M and C gain the cylinder's rigid-body inertia and its added mass by strip theory; g gains its weight "
         f"and buoyancy, which differ by {cylinder['net_weight']:g} N; all three are known to the model",
         "ours: the mission is the manoeuvre of case I with the pick-up on the way",

@@ -50,7 +50,7 @@ def pick_up(plant: GreyBox, options: Options, variant: str) -> Mission:
     Args:
         plant: the vehicle without load.
         options: of the study.
-        variant: what the vehicle's model is told of the load.
+        variant: what the vehicle's model knows of the load.
 
     Raises:
         ConfigError: the pick-up does not lie within the manoeuvre.

@@ -98,6 +98,11 @@ def training_log(plant: GreyBox, options: Options, noise: str | Mapping[str, Any
     return Log.from_runs([replace(run, number=i) for i, run in enumerate(runs)], name="training")
 
 
+def runs_of(rich: Mapping[str, Any]) -> str:
+    """Return how many runs the rich manoeuvre has, in words."""
+    return "1 run" if rich["runs"] == 1 else f"{rich['runs']} runs"
+
+
 def training_words(options: Options) -> str:
     """Return in words what the networks are trained on offline."""
     how, rich = options.case["offline"], options.case["offline"]["rich"]
@@ -105,7 +110,7 @@ def training_words(options: Options) -> str:
     words = f"ours: trained offline on the manoeuvre, {times}"
     if how["data"] == "rich":
         words += (
-            f", and on {rich['runs']} runs of {rich['duration']:g} s of multisines at {rich['rate']:g} samples a second; "
+            f", and on {runs_of(rich)} of {rich['duration']:g} s of multisines at {rich['rate']:g} samples a second; "
             "on the manoeuvre alone the damping is not identified (see case noise_free)"
         )
     return f"{words}; the paper does not say"

@@ -6,7 +6,7 @@ heading, a Munk moment. Three looks at what was learned tell:
 - at rest: damping vanishes with the velocity, d(0) = 0;
 - power: damping takes energy, nu . d(nu) >= 0, wherever the log has been;
 - regression: along the log, d is laid out into what a drag can give (linear and quadratic laws with every
-  coupling, and fore and aft unlike), and beside that into what the subnetworks could take up of the wrench that
+  coupling, and fore and aft unlike), and beyond that into what the subnetworks could take up of the wrench that
   an effect would have had. An effect that accounts for most of what no drag gives was learned in its place.
 
 All three count only beyond what the log leaves open (`training.learned`).

@@ -82,7 +82,7 @@ def plan_files(pool: Executor, paths: Sequence[Path], reading: Reading, say: Say
         pool: does it file by file.
         paths: of the files.
         reading: how they are read.
-        say: told in words what is being done.
+        say: called with what is being done, in words.
 
     Raises:
         InputError: none of them can be read, or they do not have the same columns.
@@ -93,7 +93,7 @@ def plan_files(pool: Executor, paths: Sequence[Path], reading: Reading, say: Say
     for k, (path, found) in enumerate(answers, 1):
         say(Progress(f"looking through {path}", k, len(paths)))
         (bad if isinstance(found, InputError) else good).append(found)  # type: ignore[arg-type]
-    # One file alone that cannot be read is the user's; one of many is left out and told.
+    # One file alone that cannot be read is the user's; one of many is left out and reported.
     if not good:
         raise bad[0]
     whole = concatenate_pieces(good)

@@ -43,7 +43,7 @@ class Source:
 
     Attributes:
         packed: model, derivative and mapping, as bytes: they are sent with every question.
-        scratch: folder for what was worked out; a process that does not see it takes one of its own.
+        scratch: folder for what was worked out; a process that does not see it takes another one.
         token: another one for each training.
     """
 

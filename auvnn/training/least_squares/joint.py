@@ -51,7 +51,7 @@ def fit_jointly(
         tolerance: converged when the cost fell by less than this share
         window: within this many steps.
         damping: first value of mu.
-        progress: told iteration and cost.
+        progress: called with iteration and cost.
     """
     names = list(parameters)
     shapes = [parameters[n].shape for n in names]

@@ -55,7 +55,7 @@ class Objective:
             model: holds the subnetworks; it is not changed.
             fitted: what to fit on.
             stopping: what decides when to stop and which weights to keep.
-            tell: told in words how it goes.
+            tell: called with the state of the work, in words.
 
         Raises:
             InputError: the log has no window of the length that the objective needs.

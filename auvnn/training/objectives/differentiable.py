@@ -38,7 +38,7 @@ PRIOR = 0.1
 class Differentiable(FreeRunning):
     """The same error as `rollout`, made small by Adam along gradients through torchdiffeq's solver.
 
-    The runs of all windows are one batch; their initial states are parameters beside the weights. The weights
+    The runs of all windows are one batch; their initial states are parameters in addition to the weights. The weights
     are moved along the axes of their information, w = w_0 + L^-T z with L L^T = J^T J + 1 / prior^2, worked out
     once: weights of such small networks are so unequal that no common step size would serve them. An epoch
     whose loss or gradient is not finite or explodes is taken back: the best parameters are restored and the

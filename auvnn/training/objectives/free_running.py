@@ -63,6 +63,6 @@ class FreeRunning(Objective):
             shots: windows that are fitted.
             judge: windows that are left out.
             warnings: what went wrong so far.
-            tell: told in words how it goes.
+            tell: called with the state of the work, in words.
         """
         raise TypeError(f"training objective '{type(self).__name__}' does not say how it descends")

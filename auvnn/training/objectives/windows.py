@@ -82,7 +82,7 @@ class ShootingSums:
 
 
 class Shots:
-    """Windows with initial states of their own, which are fitted along (multiple shooting).
+    """Windows with separate initial states, which are fitted along (multiple shooting).
 
     Args:
         model: for the states that the first measurements stand for.

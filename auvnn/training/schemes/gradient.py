@@ -203,7 +203,7 @@ class GradientScheme(Scheme):
                 moments.setdefault(int(number), {})[key] = tensor.clone()
         if moments and self._optimiser is None:
             raise ModelError(
-                "the checkpoint trains parameters, but there is nothing to learn here: start afresh"
+                "the checkpoint trains parameters, but there is nothing to learn here: start again"
             )
         if self._optimiser is not None:
             whole_state = self._optimiser.state_dict()

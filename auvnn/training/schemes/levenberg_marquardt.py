@@ -1,4 +1,4 @@
-"""The default scheme: every degree of freedom as a small least-squares problem of its own, all at once."""
+"""The default scheme: every degree of freedom as a separate small least-squares problem, all at once."""
 
 from __future__ import annotations
 

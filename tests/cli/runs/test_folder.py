@@ -1,4 +1,4 @@
-"""The folder of a run: new or empty, taken by one at a time, complete or as it was."""
+"""The folder of a run: new or empty, taken by one at a time, complete or unchanged."""
 
 from __future__ import annotations
 

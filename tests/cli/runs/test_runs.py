@@ -201,7 +201,7 @@ def test_many_jobs_need_a_place_of_their_own_too(auvnn, refused):
 
 
 def test_jobs_cannot_be_told_to_share_a_folder(refused):
-    assert "of its own" in refused("check", "log=dive.csv", "out=a,b", "--multirun")
+    assert "separate folder" in refused("check", "log=dive.csv", "out=a,b", "--multirun")
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ SIMULATE = ("simulate", "model=rov95", "runs=1", "duration=2", "noise=none")
 
 @pytest.fixture
 def precious(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder of somebody's, with what a run would delete in a working folder of its own."""
+    """A folder of somebody's, with what a run would delete in a separate working folder."""
     monkeypatch.chdir(tmp_path)
     folder = tmp_path / "precious"
     for name in ("new", "old", "ended", "checkpoint", "samples"):

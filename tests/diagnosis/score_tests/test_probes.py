@@ -207,3 +207,12 @@ def test_an_onset_is_looked_for_until_a_fit_would_find_it(model):
             assert all(s["x"] == 0.3 and 0.0 <= s["time"] <= 600.0 for s in around)
             near, level = min(around, key=lambda s: abs(s["time"] - true)), level + 1
         assert abs(near["time"] - true) < 0.6 and level == 3
+
+
+def test_a_time_before_zero_is_asked_for_at_zero(model, windows):
+    """The clock of a log that jitters begins a few milliseconds early."""
+    name = "payload"
+    asked = probed(
+        lay_out(model, [name]), [name], extent_of(windows), {name: [{"time": -0.003}, {"time": 2.0}]}
+    )
+    assert [s["time"] for s in asked.starts[name].values()] == [0.0, 2.0]

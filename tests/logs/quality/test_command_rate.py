@@ -19,7 +19,7 @@ def of_commands(y, dt=0.05):
 
 
 def band_limited(t, highest, rng, count=40):
-    """Sines below a frequency, Hz, each with a phase of its own."""
+    """Sines below a frequency, Hz, each with a separate phase."""
     f, phase = rng.uniform(0.0, highest, count), rng.uniform(0.0, 2 * np.pi, count)
     return np.sin(2 * np.pi * np.outer(t, f) + phase).sum(1) / np.sqrt(count) * 0.3
 

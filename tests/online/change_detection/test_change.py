@@ -88,6 +88,6 @@ def test_taking_a_known_part_out_of_a_block_is_exact():
         np.arange(4.0),
     )
     taken = Block.of(0.0, slopes, missing).without(theta)
-    afresh = Block.of(0.0, slopes, missing - slopes @ theta)
+    again = Block.of(0.0, slopes, missing - slopes @ theta)
     for name in ("slope", "square", "total"):
-        np.testing.assert_allclose(getattr(taken, name), getattr(afresh, name), rtol=1e-10, atol=1e-10)
+        np.testing.assert_allclose(getattr(taken, name), getattr(again, name), rtol=1e-10, atol=1e-10)

@@ -1,4 +1,4 @@
-"""Plans, pairs, loops and strangers as cases; the shipped plans are what they say of themselves."""
+"""Plans, pairs, loops and strangers as cases; the shipped plans are what they say about themselves."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_a_plan_can_be_asked_again_on_logs_that_nobody_has_seen():
     before, after = cases(options), cases({**options, "shift": 77})
     assert [c.seed for c in after] == [c.seed + 77 for c in before]
     assert [(c.part, c.kind, c.duration) for c in after] == [(c.part, c.kind, c.duration) for c in before]
-    # What is hidden together is drawn anew as well.
+    # What is hidden together is drawn again as well.
     drawn = [[c.hidden for c in found if c.kind == "several"] for found in (before, after)]
     assert len(drawn[0]) == len(drawn[1]) == 12 and drawn[0] != drawn[1]
     with pytest.raises(ConfigError, match="shift=-1"):

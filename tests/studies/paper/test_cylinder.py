@@ -46,7 +46,7 @@ def test_mass_centre_and_inertia_are_those_of_its_parts():
     loaded, points = with_cylinder(vehicle, c), points_of(c)
     assert loaded.mass == 155.0
     np.testing.assert_allclose(loaded.center_of_gravity, 60.0 * c.position / 155.0)
-    # Monte Carlo over the cylinder, the vehicle as a body of its own.
+    # Monte Carlo over the cylinder, the vehicle as a separate body.
     arms = points - loaded.center_of_gravity
     own = 60.0 * (np.mean(np.sum(arms**2, -1)) * np.eye(3) - np.einsum("ni,nj->ij", arms, arms) / len(arms))
     arm = vehicle.center_of_gravity - loaded.center_of_gravity

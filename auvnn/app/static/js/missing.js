@@ -44,9 +44,9 @@ export class MissingScreen {
   draw(state, done) {
     const answer = this.answer, missing = answer.missing || [];
     const [tone, words] = VERDICTS[answer.verdict] || ["warn", answer.verdict];
-    // Of a partial verdict nothing is named as the cause; what predicts a part stands first all the same.
+    // Of a partial verdict nothing is named as the cause; what predicts a part stands first anyway.
     const named = missing.length ? missing : answer.verdict === "partial" ? answer.nearest || [] : [];
-    const candidates = [...answer.candidates].sort((a, b) => rank(a, named) - rank(b, named));
+    const candidates = bestFirst(answer.candidates, [...named, ...(answer.nearest || [])]);
     const judged = candidates.filter((c) => !c.needs.length), others = candidates.filter((c) => c.needs.length);
     const first = judged.slice(0, Math.max(6, named.length)), rest = judged.slice(first.length);
     show(this.element,
@@ -60,7 +60,7 @@ export class MissingScreen {
       h("h2", {}, "Candidates, best first"),
       h("div", { class: "cards" }, first.map((c) => this.candidate(c, named))),
       rest.length > 0 && h("details", { class: "card" }, h("summary", {}, h("h2", {}, `${rest.length} further candidates`)), h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Further candidates" }, this.table(rest))),
-      others.length > 0 && h("details", { class: "card" }, h("summary", {}, h("h2", {}, `${others.length} that this log or model cannot speak of`)),
+      others.length > 0 && h("details", { class: "card" }, h("summary", {}, h("h2", {}, `${others.length} that cannot be judged on this log or with this model`)),
         h("ul", {}, others.map((c) => h("li", {}, h("b", {}, c.effect), ` needs ${c.needs.join(", ")}`)))));
   }
 
@@ -92,13 +92,13 @@ export class MissingScreen {
           h("td", { class: "num" }, Number.isFinite(l.correlation_time) ? `${number(l.correlation_time, 2)} s` : "–"), h("td", { class: "num" }, percent(l.share)));
       });
       return card("Left without a name",
-        h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Force without a name" }, h("table", {}, h("thead", {}, h("tr", {}, ["", "rms", "at most", "would have shown", "lasts", "share"].map((w) => h("th", { scope: "col" }, w)))), h("tbody", {}, rows))),
-        h("p", { class: "soft" }, `Share: of the actuators' force.${Number.isFinite(left.cost) ? ` The error on runs left out is ${percent(left.cost)} above the noise floor.` : ""}`));
+        h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Force without a name" }, h("table", {}, h("thead", {}, h("tr", {}, ["", "rms", "at most", "smallest visible", "correlation time", "share"].map((w, k) => h("th", { scope: "col", class: k ? "num" : "" }, w)))), h("tbody", {}, rows))),
+        h("p", { class: "soft" }, `Smallest visible: a force of this size would be found in 19 of 20 such logs. Share: of the actuators' force.${Number.isFinite(left.cost) ? ` The error on runs left out is ${percent(left.cost)} above the noise floor.` : ""}`));
     }
     return card("Left without a name",
       h("p", {}, this.answer.verdict === "adequate" ? "What is left looks like noise." : `${percent(this.answer.unexplained).replace("<", "Less than ")} of the residual's energy above the noise is explained by nothing in the catalogue.`),
       this.answer.acts_in && Object.keys(this.answer.acts_in).length > 0 && h("p", { class: "soft" }, `It acts in ${Object.keys(this.answer.acts_in).join(", ")}.`),
-      (this.answer.nearest || []).length > 0 && h("p", { class: "soft" }, `Nearest: ${this.answer.nearest.join(", ")}.`),
+      (this.answer.nearest || []).length > 0 && h("p", { class: "soft" }, `Nearest, but not the cause: ${this.answer.nearest.join(", ")}.`),
       depends.length > 0 && h("p", { class: "soft" }, "It depends on: ", depends.map(([axis, shares]) => { const top = Object.entries(shares).sort((a, b) => b[1] - a[1])[0]; return top ? `${axis} on ${top[0]} (${percent(top[1])})` : null; }).filter(Boolean).join(", ")));
   }
 
@@ -110,7 +110,7 @@ export class MissingScreen {
     const names = (list) => (list || []).map((c) => (typeof c === "string" ? c : c.effect)).join(", ");
     return card(joint.length ? "What predicts a part" : "Does it matter?",
       matters.length > 0 && h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "What each name costs" }, h("table", {},
-        h("thead", {}, h("tr", {}, ["effect", "matters", "costs", "force, of the actuators"].map((w) => h("th", { scope: "col" }, w)))),
+        h("thead", {}, h("tr", {}, ["effect", "matters", "costs", "force, of the actuators"].map((w, k) => h("th", { scope: "col", class: k > 1 ? "num" : "" }, w)))),
         h("tbody", {}, matters.map(([name, m]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, m.matters === false ? "no" : "yes"), h("td", { class: "num" }, percent(m.cost)), h("td", { class: "num" }, percent(m.share))))))),
       matters.length > 0 && h("p", { class: "soft" }, "Costs: by how much the error on runs left out is larger without the name, everything else refitted."),
       joint.map(([name, j]) => h("div", {}, h("h3", {}, name), parameters(j.parameters),
@@ -137,14 +137,14 @@ export class MissingScreen {
       h("dl", { class: "evidence" },
         h("dt", {}, "explains"), h("dd", {}, meter(c.explained, `${percent(c.explained)} of the residual above the noise`), percent(c.explained)),
         h("dt", {}, "error on runs left out"), h("dd", {}, fall === null ? "unknown" : fall > 0.0005 ? `${percent(fall)} lower` : fall < -0.0005 ? `${percent(-fall)} higher` : "the same"),
-        h("dt", {}, "were it absent"), h("dd", {}, chance(c.p_value))),
+        h("dt", {}, "if it were absent"), h("dd", {}, chance(c.p_value))),
       parameters(c.parameters, effect),
       (c.confusable_with || []).length > 0 && h("p", { class: "alike" }, "Looks alike on this log: ", c.confusable_with.slice(0, 4).map((o) => `${o.effect} (${number(o.similarity, 3)})`).join(", ")),
       h("p", {}, h("button", { type: "button", class: chosen ? "primary small" : "small", onclick: () => this.attempt([c.effect]) }, `Try ${c.effect}`)));
   }
 
   table(rows) {
-    return h("table", {}, h("thead", {}, h("tr", {}, ["effect", "explains", "p", "error before", "after", "looks like", ""].map((w) => h("th", { scope: "col" }, w || h("span", { class: "unseen" }, "action"))))),
+    return h("table", {}, h("thead", {}, h("tr", {}, ["effect", "explains", "p", "error before", "after", "looks like", ""].map((w, k) => h("th", { scope: "col", class: k > 0 && k < 5 ? "num" : "" }, w || h("span", { class: "unseen" }, "action"))))),
       h("tbody", {}, rows.map((c) => h("tr", {}, h("th", { scope: "row" }, c.effect), h("td", { class: "num" }, percent(c.explained)), h("td", { class: "num" }, number(c.p_value, 2)), h("td", { class: "num" }, number(c.cv_before)), h("td", { class: "num" }, number(c.cv_after)),
         h("td", {}, c.confusable_with.slice(0, 2).map((o) => o.effect).join(", ")), h("td", {}, h("button", { type: "button", class: "small", "aria-label": `Try ${c.effect}`, onclick: () => this.attempt([c.effect]) }, "Try"))))));
   }
@@ -152,7 +152,11 @@ export class MissingScreen {
   close() {}
 }
 
-function rank(candidate, named) { const at = named.indexOf(candidate.effect); return at >= 0 ? at - 1000 : 0; }
+// As the report ranks them: what the verdict names, then what comes nearest, then by what each explains alone.
+export function bestFirst(candidates, named) {
+  const place = (c) => { const at = named.indexOf(c.effect); return at >= 0 ? at - 1000 : -(Number.isFinite(c.explained) ? c.explained : -1); };
+  return [...candidates].sort((a, b) => place(a) - place(b));
+}
 
 function capital(text) { return text.slice(0, 1).toUpperCase() + text.slice(1); }
 

@@ -133,7 +133,8 @@ export class Group {
         points: { size: 5 },
       },
       axes: [
-        { ...axis, size: 26, space: 70, values: (u, ticks) => ticks.map((v) => number(v, 6)) },
+        // Time in seconds: the unit stands at the first tick, where there is room for it.
+        { ...axis, size: 26, space: 70, values: (u, ticks) => ticks.map((v, k) => (k ? number(v, 6) : `${number(v, 6)} s`)) },
         { ...axis, size: 50, space: 20, label: plot.unit, labelSize: 15, labelGap: 0, values: (u, ticks) => ticks.map((v) => number(v, 4)) },
       ],
       series: [

@@ -60,7 +60,7 @@ export class ResultScreen {
   loop(state) {
     const a = this.improved;
     const start = h("button", { type: "button", class: a ? "small" : "primary", id: "improve", onclick: (e) => this.app.start("improve", [], e.target) }, a ? "Walk it again" : "Improve");
-    const about = h("p", { class: "soft" }, "Walks the whole loop by itself until nothing pays: refits, diagnoses, adds, learns what has no name. It takes minutes and can be stopped.");
+    const about = h("p", { class: "soft" }, "Runs the whole loop without further clicks until nothing improves the model any more: refits, diagnoses, adds, learns what has no name. It takes minutes and can be stopped.");
     if (!a) return card("The whole loop", about, h("p", { class: "row" }, start));
     const improved = state.answers.improve;
     return card("The whole loop", h("p", { class: "word", id: "improved" }, a.verdict), waterfall(a.waterfall),
@@ -104,7 +104,7 @@ export class ResultScreen {
     if (!five) return null;
     const cell = (part, name) => h("td", { class: "num" }, number(part.rollout[five][name].rmse));
     return card(`Error of ${five === "full" ? "the whole run" : `${five} s`} free running, by velocity`, h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Errors by velocity" }, h("table", {},
-      h("thead", {}, h("tr", {}, ["", ...DOF.map((d) => `${d.velocity}, ${d.unit}`)].map((w) => h("th", { scope: "col" }, w)))),
+      h("thead", {}, h("tr", {}, ["", ...DOF.map((d) => `${d.velocity}, ${d.unit}`)].map((w, k) => h("th", { scope: "col", class: k ? "num" : "" }, w)))),
       h("tbody", {}, [["as given", a.before], ["coefficients refitted", a.refitted], ["after", a.after]].map(([words, part]) => h("tr", {}, h("th", { scope: "row" }, words), DOF.map((d) => cell(part, d.velocity))))))),
     h("h3", {}, "Fitted values"), Object.entries(a.parameters).map(([name, values]) => h("div", {}, h("h4", {}, name), parameters(values))));
   }
@@ -121,7 +121,7 @@ export class ResultScreen {
     const folder = h("input", { type: "text", id: "folder", value: this.script.folder, spellcheck: "false", autocomplete: "off" });
     const told = h("div", { id: "told" }, state.saved.map((path) => h("p", { class: "good" }, `Saved: ${path}`)), state.saved_without.map((words) => h("p", { class: "bad" }, `But ${words}.`)));
     const kept = state.history.length > 1;
-    return card("Take it home",
+    return card("Save",
       h("form", { onsubmit: (event) => { event.preventDefault(); event.submitter.textContent = "Saving …"; attempt(async () => { await post("save", { folder: folder.value }); await this.app.changed(); }, event.submitter).finally(() => { event.submitter.textContent = "Save"; }); } },
         h("label", { for: "folder" }, "Folder on this machine, new or empty"), folder,
         h("p", { class: "soft" }, `Holds ${kept ? "the model, " : ""}the logs, the answers with their reports, and the commands and the script below.`, kept ? "" : " No effect was kept yet: without a model."),

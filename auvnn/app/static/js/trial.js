@@ -3,7 +3,7 @@
 import { attempt, complain, get, post } from "./api.js";
 import { waterfall } from "./charts.js";
 import { card, choice, DOF, duration, h, measured, number, percent, show } from "./dom.js";
-import { parameters } from "./missing.js";
+import { bestFirst, parameters } from "./missing.js";
 import { Group, key } from "./plot.js";
 
 export class TryScreen {
@@ -67,7 +67,7 @@ export class TryScreen {
         h("div", { class: "stack" }, this.meter,
           card("Free run", h("div", { class: "row spread" },
             h("div", { class: "row" }, runs.length > 1 ? choice("Run", runs.map((r) => [r.number, `${r.number} (${duration(r.end - r.begin)})`]), this.run, (v) => { this.run = Number(v); group.zoom(null); }) : null,
-              choice("Starts anew", [["full", "never"], ["30", "every 30 s"], ["5", "every 5 s"]], this.horizon, (v) => { this.horizon = v; attempt(() => group.refresh()); })),
+              choice("Starts again", [["full", "never"], ["30", "every 30 s"], ["5", "every 5 s"]], this.horizon, (v) => { this.horizon = v; attempt(() => group.refresh()); })),
             group.controls()),
             key(["measured", "measured"], ["given", "model as it stands"], ["after", "with these effects"]),
             h("div", { class: "plots" }, plots)))));
@@ -80,7 +80,7 @@ export class TryScreen {
 
   toggles() {
     const first = this.entries.filter((e) => e.on || e.effect.present || (this.diagnosis && (this.diagnosis.missing || []).includes(e.effect.name)));
-    const likely = this.diagnosis ? this.diagnosis.candidates.filter((c) => !c.needs.length && !first.some((e) => e.effect.name === c.effect)).slice(0, 4).map((c) => this.entries.find((e) => e.effect.name === c.effect)).filter(Boolean) : [];
+    const likely = this.diagnosis ? bestFirst(this.diagnosis.candidates, this.diagnosis.nearest || []).filter((c) => !c.needs.length && !first.some((e) => e.effect.name === c.effect)).slice(0, 4).map((c) => this.entries.find((e) => e.effect.name === c.effect)).filter(Boolean) : [];
     const top = [...first, ...likely], others = this.entries.filter((e) => !top.includes(e));
     const opened = this.list.querySelector("details[open]") !== null;
     show(this.list, top.map((e) => this.entry(e)),
@@ -102,7 +102,7 @@ export class TryScreen {
     const guess = entry.seen && entry.seen.parameters && entry.seen.parameters[p.name];
     const fitted = this.fitted && this.fitted.parameters[entry.effect.name] && this.fitted.parameters[entry.effect.name][p.name];
     const known = fitted || guess, value = entry.values[p.name];
-    // What is plausible around the null, and what the log says of it where it says anything.
+    // What is plausible around the null, and what the log says about it where it says anything.
     const reach = Math.max(3 * p.scale, Math.abs((known && known.value) - p.null) * 1.5 || 0, Math.abs(value - p.null) * 1.2);
     const low = Math.max(p.low, p.null - reach), high = Math.min(p.high, p.null + reach);
     const step = (high - low) / 1000;
@@ -154,7 +154,7 @@ export class TryScreen {
     }
   }
 
-  // The same view at the same times: only what was tried is asked for anew.
+  // The same view at the same times: only what was tried is asked for again.
   async redraw() {
     const view = this.view;
     if (!view) return;

@@ -80,7 +80,7 @@ export class WhereScreen {
     return card("Measured and model",
       tabs,
       h("div", { class: "row spread" }, runs.length > 1 ? choice("Run", runs.map((r) => [r.number, `${r.number} (${duration(r.end - r.begin)})`]), this.run, (v) => { this.run = Number(v); this.shade(); this.group.zoom(null); }) : h("span", {}), this.group.controls()),
-      this.plots, h("p", { class: "soft" }, "The model starts anew from measured states every 5 s. Drag over a plot to zoom in; double-click shows all."));
+      this.plots, h("p", { class: "soft" }, "The model starts again from measured states every 5 s. Drag over a plot to zoom in; double-click shows all."));
   }
 
   pick(dof) {

@@ -6,7 +6,7 @@ to `NED`). A `scale: -1` therefore turns a sign in the frame in which the file w
 
 `valid: {from: bottom_lock, is: 1}` takes a value only where another column of the file says that it is good (`is` one
 value or a list, numbers or words; `above`, `below`); elsewhere it counts as missing. An estimator of several cores is
-followed by `from: [u_0, u_1], by: primary`, or, where each core has rows of its own, by `core: {column: C, primary: PI}`.
+followed by `from: [u_0, u_1], by: primary`, or, where each core has separate rows, by `core: {column: C, primary: PI}`.
 
 A `delay` says by how many seconds a column lags behind the time it is stamped with (`auvnn check` measures it for
 the velocities): once the runs are told apart, each of them takes its values from that much later in the record.
@@ -56,7 +56,7 @@ class Mapping:
         quaternion: "wxyz", or "xyzw" where the columns qw qx qy qz, in this order, hold x, y, z, w.
         time_unit: unit of `t`: "s", "ms", "us" or "ns".
         run: column that numbers or names the runs, None for `run`, "file" for one run per file.
-        core: columns that hold a row's core and the core in use, where each core has rows of its own.
+        core: columns that hold a row's core and the core in use, where each core has separate rows.
         where: the mapping's file, for messages.
         topics: how each topic of a recording is stamped and framed, by its name.
         rows: topic whose times the rows have; None to choose.

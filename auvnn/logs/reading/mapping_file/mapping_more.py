@@ -1,4 +1,4 @@
-"""What a mapping says of recordings with topics of their own times, frames and clocks.
+"""What a mapping says about recordings with topics of their own times, frames and clocks.
 
 Of a column, beside `from`, `scale`, `offset`, `curve`, `delay`, `valid` and `by`:
 

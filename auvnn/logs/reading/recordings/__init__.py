@@ -1,4 +1,4 @@
-"""Recordings of many topics, each with times of its own, made into one table.
+"""Recordings of many topics, each with separate times, made into one table.
 
 `assemble` asks `recorded_values` for the fields of each topic, `recorded_series` makes time series of them in our
 frames, `stretches` finds where the recording holds together, and `rates` brings all to one set of rows.

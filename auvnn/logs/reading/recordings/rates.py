@@ -35,7 +35,7 @@ _BLOCK = 65_536  # rows at a time: what is needed on the way stays small
 
 @dataclass(frozen=True)
 class Series:
-    """What one topic says of some canonical columns.
+    """What one topic says about some canonical columns.
 
     Args:
         names: canonical columns.
@@ -85,7 +85,7 @@ class Series:
 
 
 def is_command(name: str) -> bool:
-    """Say whether a canonical column is what the vehicle was told."""
+    """Say whether a canonical column is a command."""
     return name.startswith(("thruster_", "fin_")) or name in WRENCH
 
 

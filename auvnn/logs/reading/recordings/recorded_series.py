@@ -62,7 +62,7 @@ def _series(
     times: _Times,
     where: str,
 ) -> list[Series]:
-    """Return what a topic says of one group of columns, in FRD and NED."""
+    """Return what a topic says about one group of columns, in FRD and NED."""
     rule = plan.topics.get(topic.name) or plan.topics.get(base_name(topic.name))
     body = (rule.body if rule else None) or plan.body
     world = (rule.world if rule else None) or plan.world

@@ -1,4 +1,4 @@
-"""Estimators that run as several cores of which one is in use: its values are taken, and a switch starts afresh."""
+"""Estimators that run as several cores of which one is in use: its values are taken, and a switch starts again."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from auvnn.logs.reading.repairs.repair import Repair
 
 
 def rows_of_primary(table: Table, core: str, primary: str, where: str, mapping: str) -> Table:
-    """Return the rows of the core that is in use, of a table in which each core has rows of its own.
+    """Return the rows of the core that is in use, of a table in which each core has separate rows.
 
     Args:
         table: columns under the file's names.

@@ -1,4 +1,4 @@
-"""Where an estimated pose starts afresh: a filter that resets, an origin that moves, another core in use.
+"""Where an estimated pose starts again: a filter that resets, an origin that moves, another core in use.
 
 Between two samples the pose can go no further than the measured velocities take it. A jump that is taken back is a
 glitch; one that stays, with motion before and after it that agrees with the velocities, is a restart, and nothing
@@ -30,7 +30,7 @@ _OFTEN = 10.0  # s: a pose that jumps more often than this is a poor sensor, not
 
 
 def restarts(run: Run) -> Rows:
-    """Return the first samples of the stretches between which the pose starts afresh, in order.
+    """Return the first samples of the stretches between which the pose starts again, in order.
 
     They come from the column `reset`, where there is one, and from jumps of position and attitude.
     """

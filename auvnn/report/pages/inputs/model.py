@@ -41,7 +41,9 @@ class ModelPage(Page):
             out.append(
                 Plot("parameters", "Values of the effects", lambda: parameters(model.values()), INTERVALS)
             )
-        words = "Force and moment that resist each motion by itself, in still water; the other velocities are zero."
+        words = (
+            "Force and moment that resist each motion alone, in still water; the other velocities are zero."
+        )
         out.append(Plot("damping", "Damping", lambda: _damping(model), words))
         return out
 

@@ -1,4 +1,4 @@
-"""What the page of `benchmark` says of rates and targets: part by part, and effect by effect."""
+"""What the page of `benchmark` says about rates and targets: part by part, and effect by effect."""
 
 from __future__ import annotations
 
@@ -9,30 +9,40 @@ from auvnn.report.html import HtmlTable
 from auvnn.report.pages.sections import outcomes
 from auvnn.report.pages.sections.outcomes import Row, text
 from auvnn.report.view import View
-from auvnn.report.words import count, finite, listing, number, percent, plural
+from auvnn.report.words import count, finite, number, percent, plural
 
 # What the rates are called where a reader sees them.
 WORDS = {
     "named_first": "named first",
-    "named_alone": "named, and nothing else",
+    "named_alone": "named, and no other",
     "named_or_in_group": "named first or in a declared group",
-    "named_or_tied": "named first or in a group that nobody can tell apart",
-    "named_or_tied_at_2": "the same, where even the best guess errs one time in six",
-    "all_named": "several effects, all named",
-    "all_shown_named": "several effects, all named that the log can show",
-    "several_named_alone": "several effects, all named and nothing else",
-    "adequate_with_nothing": "nothing hidden, adequate",
-    "unknown_with_stranger": "not in the catalogue, unknown",
-    "axis_of_stranger": "not in the catalogue, right degree of freedom",
-    "false_names": "wrong names of all given",
+    "named_or_tied": "named first or in a group that the log cannot separate",
+    "named_or_tied_at_2": "the same, groups within 2 standard errors only",
+    "all_named": "several hidden, all named",
+    "all_shown_named": "several hidden, all named that the log can show",
+    "several_named_alone": "several hidden, all named and no other",
+    "adequate_with_nothing": "nothing hidden, answered adequate",
+    "unknown_with_stranger": "outside the catalogue, answered unknown",
+    "axis_of_stranger": "outside the catalogue, right degree of freedom",
+    "false_names": "wrong names among those given",
     "false_discovery_rate": "false discovery rate, mean over logs",
     "coverage_95": "95 % intervals that hold the true value",
-    "exact_ties": "logs with an effect that no one can tell from the hidden one",
-    "unseen": "logs whose effect what is uncertain of the coefficients can make up for",
-    "median_fall": "fall of the held-out error, of the true one, median",
+    "exact_ties": "another effect fits the log equally well",
+    "unseen": "hidden effect within the coefficients' stated uncertainty",
+    "median_fall": "median fall of the held-out error, relative to the true model's",
     "not_made": "logs that could not be made",
-    "faults": "faults, those included",
+    "faults": "faults, including logs that could not be made",
+    "visible": "hidden effect visible to an oracle",
+    "visible_named_or_tied": "visible effect named first or in a group that no oracle can separate",
+    "visible_named_alone": "visible effect named first, alone in its step",
+    "wrong_first": "first name wrong",
+    "adequate_in_world": "nothing hidden, answered adequate (effects of the world itself aside)",
+    "no_name_in_world": "nothing hidden, no wrong name",
+    "left_force": "nothing hidden, unexplained force of the right size and correlation time",
+    "false_discovery_in_world": "false discovery rate, mean over logs (effects of the world itself aside)",
 }
+# So many missed targets are named in the summary; all of them stand in the table.
+MOST_MISSED = 3
 
 
 def p_values_of(view: View) -> dict[str, list[float]]:
@@ -53,11 +63,12 @@ def target_words(view: View) -> list[str]:
     missed = [a for a in aims if not a["met"]]
     words = f"{count(len(aims) - len(missed))} of {plural(len(aims), 'target')} are met"
     if missed:
-        which = listing(
-            f"{_name(a)} in {text(a, 'part')} ({percent(a.get('share'))}, wanted {_wanted(a)})"
-            for a in missed
-        )
-        words += f"; missed: {which}"
+        which = [
+            f"“{text(a, 'part')}”, {_name(a)}: {percent(a.get('share'))} (wanted {_wanted(a)})"
+            for a in missed[:MOST_MISSED]
+        ]
+        more = len(missed) - len(which)
+        words += f". Missed in {'; '.join(which)}" + (f"; and {plural(more, 'other')}" if more else "")
     return [f"{words}."]
 
 
@@ -87,15 +98,15 @@ def rate_tables(view: View) -> list[HtmlTable]:
         HtmlTable(
             "Rates by part",
             *_rate_rows(view),
-            "Intervals: Wilson's for shares of counts; of a median by its order statistics. What is counted: logs, "
-            "names or parameters.",
+            "Intervals: Wilson's for shares and for means of shares; of a median by its order statistics. What is "
+            "counted: logs, names or parameters.",
             words=2,
         ),
         HtmlTable(
             "By effect",
             *_effect_rows(view),
-            "Single effects. Or tied: in a declared group whose other members nobody could tell from it on that "
-            "log. Found in 90 %: the size of which nine in ten are named or tied, in standard errors of a fit that "
+            "Single effects. Or tied: in a declared group whose other members cannot be told from it on that log. "
+            "Found in 90 %: the size at which nine in ten are named or tied, in standard errors of a fit that "
             "knows everything else (of coefficients: in stated uncertainties), by a logistic curve; where it is not "
             "determined, why.",
             folded=False,

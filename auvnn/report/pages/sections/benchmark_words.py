@@ -18,7 +18,7 @@ from auvnn.report.plots.confusion import RIGHT, confusion
 from auvnn.report.plots.coverage import Z95
 from auvnn.report.plots.recovery import recovery, wilson
 from auvnn.report.view import View
-from auvnn.report.words import count, finite, listing, number, p_value, percent, plural
+from auvnn.report.words import count, finite, listing, number, p_value, percent, plural, prose
 
 TARGET = 0.9
 
@@ -31,16 +31,16 @@ def _confusion(rows: Sequence[Row]) -> Figure:
     return confusion(*outcomes.confusion_counts(rows), right=right)
 
 
-def _recovery(rows: Sequence[Row]) -> Figure:
-    return recovery(outcomes.found_by_size(rows), target=TARGET)
+def _recovery(rows: Sequence[Row], among: Sequence[str] = ()) -> Figure:
+    return recovery(outcomes.found_by_size(rows), target=TARGET, among=among)
 
 
-def _one_condition(i: int, condition: Sequence[str], rows: Sequence[Row]) -> Plot:
+def _one_condition(i: int, condition: Sequence[str], rows: Sequence[Row], among: Sequence[str]) -> Plot:
     vehicle, noise, excitation = condition
     return Plot(
         f"recovery_{i}",
         f"Named first: {vehicle}, noise {noise}, manoeuvre {excitation}",
-        functools.partial(_recovery, rows),
+        functools.partial(_recovery, rows, among),
         f"As the figure of this kind above, from the {plural(len(rows), 'log')} of one condition alone.",
         folded=True,
     )
@@ -60,13 +60,13 @@ def _naming_words(hidden: Sequence[Row]) -> list[str]:
         f"In {count(named)} of {plural(len(hidden), 'log')} the hidden effect is named first "
         f"({_share_words(named, len(hidden))}){also}."
     ]
-    lost = [r for r in hidden if not right(r)]
+    lost = [r for r in hidden if not right(r) and not in_group(r)]
     if lost:
         name, most = Counter(text(r, "hidden") for r in lost).most_common(1)[0]
         of = sum(text(r, "hidden") == name for r in hidden)
         instead = Counter(outcomes.answer(r) for r in lost if text(r, "hidden") == name).most_common(2)
         words = listing(f"{answer} ({count(n)})" for answer, n in instead)
-        out.append(f"Most often missed is {name}, {count(most)} of {count(of)}: the answer was {words}.")
+        out.append(f"Most often missed is {name}, {count(most)} of {count(of)} logs; answered: {words}.")
     return out
 
 
@@ -128,19 +128,30 @@ def _case_table(view: View) -> HtmlTable:
     shown = {k: words for k, words in shown.items() if len({text(e, k) for e in entries}) > 1}
     head = ["hidden", "size", *shown.values(), "answers"]
     counted = ["logs", "named first", "or in a group", "largest error"]
-    out = []
+    # What differs in nothing that is shown is one row.
+    alike: dict[tuple[str, ...], list[Row]] = {}
     for e in entries:
-        answers = e.get("answers")
-        pairs = list(answers.items()) if isinstance(answers, Mapping) else []
-        pairs.sort(key=lambda pair: -(finite(pair[1]) or 0))
-        named = [count(e.get(k)) for k in ("named_first", "in_group")]
+        key = (text(e, "hidden"), *(text(e, k, "–") for k in ("size", *shown)))
+        alike.setdefault(key, []).append(e)
+    out = []
+    for key, members in alike.items():
+        answers: Counter[str] = Counter()
+        for e in members:
+            given = e.get("answers")
+            for name, n in given.items() if isinstance(given, Mapping) else ():
+                answers[str(name)] += round(finite(n) or 0)
+        logs, named, group = (_total(members, k) for k in ("logs", "named_first", "in_group"))
+        off = [v for e in members if (v := finite(e.get("worst_relative_error"))) is not None]
         out.append([
-            text(e, "hidden"), *(text(e, k, "–") for k in ("size", *shown)),
-            ", ".join(f"{name} {count(n)}" for name, n in pairs), count(e.get("logs")),
-            *(named if e.get("hidden") != NOTHING else ["–", "–"]),
-            percent(e.get("worst_relative_error")),
+            key[0], prose(key[1]), *key[2:], ", ".join(f"{name} {count(n)}" for name, n in answers.most_common()),
+            logs, *((named, group) if key[0] != NOTHING else ("–", "–")), percent(max(off)) if off else "–",
         ])  # fmt: skip
     return HtmlTable("By what was hidden", [*head, *counted], out, words=len(head))
+
+
+def _total(entries: Sequence[Row], key: str) -> str:
+    found = [n for e in entries if (n := finite(e.get(key))) is not None]
+    return count(sum(found)) if found else "–"
 
 
 def _wrong_table(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
@@ -157,7 +168,7 @@ def _wrong_table(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
         out.append([
             text(r, "hidden"), ": ".join(filter(None, words)),
             ", ".join(map(str, ranking)) if isinstance(ranking, (list, tuple)) and ranking else "–",
-            *(text(r, k, "–") for k in ("size", "noise", "excitation", "vehicle")),
+            *(prose(text(r, k, "–")) for k in ("size", "noise", "excitation", "vehicle")),
             "–" if seed is None else str(round(seed)), p_value(r.get("p_value")),
         ])  # fmt: skip
     return head, out

@@ -33,7 +33,7 @@ def _channels(view: View) -> list[str]:
 
 
 def _whole_log(view: View) -> list[HtmlTable]:
-    """Return what all of a long log says, beside the sample on which the search ran."""
+    """Return what all of a long log says, compared with the sample on which the search ran."""
     whole = view.mapping("whole_log")
     if not whole:
         return []
@@ -80,7 +80,7 @@ def _first_sentence(verdict: str, missing: list[str]) -> str:
 
 
 def _further(view: View, missing: list[str]) -> list[str]:
-    """Return what was named beside an ambiguous group, and not withdrawn again."""
+    """Return what was named in addition to an ambiguous group, and not withdrawn again."""
     if view.text("verdict") != "ambiguous":
         return []
     steps = view.items("steps")
@@ -145,6 +145,18 @@ def _force_words(view: View) -> list[str]:
     return out
 
 
+def _alone_words(candidates: list[Mapping[str, Any]], nearest: list[str]) -> str:
+    """Say why what comes nearest is not what explains most alone, where these differ."""
+    tried = [c for c in candidates if not c.get("needs") and finite(c.get("explained")) is not None]
+    best = max(tried, key=lambda c: finite(c.get("explained")) or 0.0, default=None)
+    if best is None or str(best.get("effect")) in nearest:
+        return ""
+    return (
+        f" Alone, {best.get('effect')} explains more ({percent(best.get('explained'))}); but shares of single effects "
+        "overlap, and the search, which weighs fit against the number of parameters, chose those in italics."
+    )
+
+
 def _dependence_words(depends: Mapping[str, Any]) -> list[str]:
     shares = [
         (share, axis, channel)
@@ -161,15 +173,22 @@ def _dependence_words(depends: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _ranking_caption(candidates: list[Mapping[str, Any]], missing: list[str]) -> str:
+def _ranking_caption(
+    candidates: list[Mapping[str, Any]], missing: list[str], nearest: list[str] | None = None
+) -> str:
     words = (
         "Left: share of the residual's energy above the noise that each effect explains. Right: how far the "
         "error falls on runs that were not fitted; left of zero the effect harms."
     )
     if missing:
-        words += " Hatched and bold, and first: what the verdict names; the others by what each explains by itself."
+        words += (
+            " Hatched and bold, and first: what the verdict names; the others by what each explains alone."
+        )
+    elif nearest:
+        words += " In italics, and first: what comes nearest; the others by what each explains alone."
+        words += _alone_words(candidates, nearest)
     else:
-        words += " Ordered by what each explains by itself."
+        words += " Ordered by what each explains alone."
     if any(
         (finite(c.get("explained")) or 0.0) > 0.3 and (improvement(c)[0] or 0.0) < 0.05 for c in candidates
     ):

@@ -134,6 +134,17 @@ def confusion_counts(rows: Sequence[Row]) -> tuple[list[str], list[str], NDArray
     return lines, columns, table.reshape(len(lines), len(columns))
 
 
+def size_words(rows: Sequence[Row]) -> str:
+    """Return what the sizes of hidden effects are measured in, as a sentence; empty where that is not known."""
+    sizes = [part for size in values(with_effect(rows), "size") for part in size.split(JOIN)]
+    shares = [size.endswith("%") for size in sizes]
+    if shares and all(shares):
+        return "Sizes: how much of the 5 s error of free running the hidden effect causes."
+    if shares and not any(shares):
+        return "Sizes are in standard errors of a fit that knows everything else."
+    return ""
+
+
 def strangers(rows: Sequence[Row]) -> list[str]:
     """Return the names of what is hidden that the catalogue has no name for."""
     return values(of_kind(rows, "stranger"), "hidden")

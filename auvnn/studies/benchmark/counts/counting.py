@@ -10,7 +10,7 @@ from auvnn.studies.benchmark.cases import JOIN, NOTHING
 Row = Mapping[str, Any]
 # Of two explanations whose data lie d standard errors apart, the best decision there is takes the wrong one with
 # probability Phi(-d/2) (Neyman and Pearson, equal prior odds). Below 3.29 that is more than 5 %: nobody can tell them
-# apart with 95 % confidence. See `information`. STRICT is told beside it: there even the best errs one time in six.
+# apart with 95 % confidence. See `information`. STRICT is reported too: there even the best errs one time in six.
 TIED, STRICT = 3.29, 2.0
 # What the rival is called that is no effect at all.
 UNSEEN = "nothing"

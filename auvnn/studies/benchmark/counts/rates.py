@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
+from scipy.special import ndtri
 
 from auvnn.catalogue import unknown_name
 from auvnn.errors import ConfigError
@@ -88,16 +88,30 @@ NUMBERS: dict[str, Callable[[Sequence[Row]], list[float]]] = {
 }
 
 
-def interval(hits: int, count: int) -> tuple[float, float]:
-    """Return Wilson's 95 % interval of a share."""
-    found = binomtest(hits, count).proportion_ci(0.95, method="wilson")
-    return float(found.low), float(found.high)
+def interval(hits: float, count: int) -> tuple[float, float]:
+    """Return Wilson's 95 % interval of a share, or of the mean of numbers between 0 and 1.
+
+    Such numbers with mean m have a variance of at most m (1 - m), that of a share: for them the interval is, if
+    anything, too wide. It never leaves 0 to 1, and has a width at both ends.
+
+    Args:
+        hits: how many count, or the sum of the numbers.
+        count: of how many, at least 1.
+
+    References:
+        Wilson, E. B. (1927), J. Am. Stat. Assoc. 22(158), 209-212.
+    """
+    z = float(ndtri(0.975))
+    p, scale = hits / count, 1.0 + z**2 / count
+    middle = (p + z**2 / (2 * count)) / scale
+    half = z * float(np.sqrt(p * (1 - p) / count + z**2 / (4 * count**2))) / scale
+    return 0.0 if hits == 0 else middle - half, 1.0 if hits == count else middle + half
 
 
 def rate(name: str, rows: Sequence[Row]) -> RateEntry:
     """Return a rate: hits, count, share and its interval; the share is None where there is nothing to count.
 
-    A median has the interval of its order statistics, a mean that of Student; no hits are counted for them.
+    A median has the interval of its order statistics, a mean of shares Wilson's; no hits are counted for them.
 
     Raises:
         ConfigError: there is no such rate.
@@ -117,9 +131,7 @@ def rate(name: str, rows: Sequence[Row]) -> RateEntry:
         share, (low, high) = float(np.median(values)), _around_median(values)
     elif count:
         share = float(np.mean(values))
-        if count > 1:
-            half = Z95 * float(np.std(values, ddof=1)) / np.sqrt(count)
-            low, high = share - half, share + half
+        low, high = interval(min(max(float(np.sum(values)), 0.0), count), count)
     return {"rate": name, "hits": None, "count": count, "share": share, "low": low, "high": high}
 
 
@@ -150,7 +162,7 @@ def by_part(rows: Sequence[Row]) -> list[PartRate]:
 
 
 def judged(rows: Sequence[Row], aims: Iterable[Mapping[str, Any]]) -> list[TargetEntry]:
-    """Return what was aimed at beside what came out, and whether it was met; None where nothing was counted.
+    """Return what was aimed at and what came out, and whether it was met; None where nothing was counted.
 
     Args:
         rows: all rows.

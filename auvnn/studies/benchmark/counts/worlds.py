@@ -1,7 +1,7 @@
-"""Counting in worlds that break the model's assumptions: what was visible, what is true by itself, what counts as wrong.
+"""Counting in worlds that break the model's assumptions: what was visible, what is true anyway, what counts as wrong.
 
 A hidden effect is *visible* where an oracle that knows the world's law sees it at five standard errors or more and it
-costs a tenth of the 5 s error or more. Names that are true in a world by itself count neither as hits nor as errors.
+costs a tenth of the 5 s error or more. Names that are true in a world itself count neither as hits nor as errors.
 `partial` never counts as named, and a wrong first name in it counts as wrong, as does a group that holds nothing true.
 """
 
@@ -29,7 +29,7 @@ def neutral(row: Row) -> set[str]:
 
 
 def stripped(row: Row) -> dict[str, Any]:
-    """Return the row without the names that are true in its world by itself.
+    """Return the row without the names that are true in its world itself.
 
     A step or an answer of which nothing is left says nothing that could be right or wrong: `adequate`.
     """
@@ -100,7 +100,7 @@ def wrong_first(row: Row) -> bool:
 
 
 def false_names(row: Row) -> list[str]:
-    """Return the names that were given and are neither hidden nor true in the world by itself."""
+    """Return the names that were given and are neither hidden nor true in the world itself."""
     return counting.false_names(stripped(row))
 
 
@@ -110,14 +110,14 @@ def false_share(row: Row) -> float:
 
 
 def silent(row: Row) -> bool:
-    """Whether no name is given but such as are true in the world by itself; the first of a partial answer is one."""
+    """Whether no name is given but such as are true in the world itself; the first of a partial answer is one."""
     told = stripped(row)
     groups = [s for s in counting.steps_of(told) if s["verdict"] == "ambiguous" and s["effects"]]
     return not counting.given_names(told) and not groups and not wrong_first(row)
 
 
 def adequate(row: Row) -> bool:
-    """Whether nothing is missed where nothing is hidden, or nothing but what is true in the world by itself."""
+    """Whether nothing is missed where nothing is hidden, or nothing but what is true in the world itself."""
     return stripped(row)["verdict"] == "adequate"
 
 

@@ -58,7 +58,7 @@ class Column:
 
 
 class Oracle:
-    """What can be told of a simulated log by whoever knows the world.
+    """What can be said about a simulated log by an oracle that knows the world.
 
     Args:
         model: what the user knows.

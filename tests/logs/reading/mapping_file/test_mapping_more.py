@@ -1,4 +1,4 @@
-"""What a mapping says of topics: units, mixers, displacements, differences, frames, clocks, headings."""
+"""What a mapping says about topics: units, mixers, displacements, differences, frames, clocks, headings."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from auvnn.studies.benchmark.counts.counting import (
     right_axis,
 )
 from auvnn.studies.benchmark.counts.power import smallest_found
-from auvnn.studies.benchmark.counts.rates import by_part, judged, rate, z_of
+from auvnn.studies.benchmark.counts.rates import by_part, interval, judged, rate, z_of
 from auvnn.studies.benchmark.falls import names_to_add
 
 
@@ -122,6 +122,18 @@ def test_rates_have_wilsons_intervals():
     assert [found["low"], found["high"]] == pytest.approx(
         [(middle - half) / (1 + z**2 / n), (middle + half) / (1 + z**2 / n)]
     )
+
+
+def test_the_interval_of_a_mean_of_shares_stays_within_zero_and_one():
+    """As scipy's Wilson interval where all are 0 or 1, and one that holds the mean in between."""
+    for hits in (0, 1, 3, 20):
+        known = stats.binomtest(hits, 20).proportion_ci(0.95, method="wilson")
+        assert interval(hits, 20) == pytest.approx((known.low, known.high), abs=1e-12)
+    low, high = interval(0.5, 20)
+    assert 0.0 < low < 0.025 < high < 1.0
+    found = rate("false_discovery_rate", [row("a", *named("a"))] * 3)
+    # Three right answers do not show that none can be wrong.
+    assert found["share"] == 0.0 and found["low"] == 0.0 and found["high"] > 0.5
 
 
 def test_nothing_to_count_is_no_rate():

@@ -1,0 +1,68 @@
+"""Shorter windows, where free running over the usual ones leaves most of the error and fits end in local minima.
+
+Over several seconds the motion of a vehicle that is barely stable depends on the parameters so strongly that the squared
+error has many local minima, and every fit from the stated model ends in one of them: nothing seems to explain the log.
+Over a shorter time the same error is nearly quadratic. Errors of slow effects are smaller there, too, so that the usual
+windows are the better ones wherever they can be fitted; the shorter ones are taken only where what they name leaves no
+more than the sensors' noise. Reference: Bock and Plitt (1984), multiple shooting; Ribeiro et al. (2020), Automatica 121.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.stages.runaway import windows_that_hold
+from auvnn.diagnosis.stages.state import Setting, State
+from auvnn.errors import InputError
+from auvnn.estimation.prediction_error import SINGULAR, FitError
+from auvnn.estimation.window_normal_equations import TRUST, motion
+from auvnn.metrics.windows import Windows
+
+# Length of the shorter windows, s, and samples that they must have.
+SHORTER, SAMPLES = 2.0, 8
+# Shorter windows are asked where the noise is less than this share of the squared error that is left, and taken where it
+# is more than the other.
+GROSS, EXPLAINED = 0.5, 0.8
+
+
+def search_over_shorter(
+    asked: Setting, state: State, search: Callable[[Setting, Windows], State]
+) -> tuple[Setting, State]:
+    """Return what is asked and where the search stands, over shorter windows where these explain what the others do not.
+
+    Args:
+        asked: what is asked, the windows' length not having been stated.
+        state: where the search over the usual windows has ended.
+        search: from what is asked and windows to the end of a search.
+    """
+    step = float(np.median([run.dt for run in asked.log.runs]))
+    length = step * state.windows.mask.shape[1]
+    if not state.leaves_something or length < 1.5 * SHORTER or SHORTER / step < SAMPLES:
+        return asked, state
+    if noise_share(state.current) >= GROSS:
+        return asked, state
+    asked.say(f"most of the error is left: searching over windows of {SHORTER:g} s")
+    try:
+        windows, notes = windows_that_hold(asked.layout.model, asked.log, SHORTER)
+        shorter = replace(asked, floor=TRUST * motion(windows) + 1e-9)
+        other = search(shorter, windows)
+    except (InputError, FitError, np.linalg.LinAlgError, SINGULAR):
+        return asked, state
+    if not other.chosen or noise_share(other.current) < EXPLAINED:
+        return asked, state
+    said = f"windows of {SHORTER:g} s were taken: over {length:.3g} s no fit came near the measurements"
+    return replace(shorter, notes=(*asked.notes, said, *notes)), other
+
+
+def noise_share(explanation: FittedHypothesis) -> float:
+    """Return the share of the sensors' white noise in the squared error that is left, mean of the channels."""
+    found = explanation.fitted
+    seen = np.isfinite(found.sigma)
+    sums = found.statistics
+    left = sums.channel.sum(0)[seen]
+    noise = sums.count.sum(0)[seen] * sums.noise()[seen] ** 2
+    return float(np.mean(np.minimum(noise / np.maximum(left, 1e-300), 1.0)))

@@ -1,0 +1,110 @@
+"""When a search goes over to shorter windows: where most of the error is left, and what they name leaves the noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from auvnn.diagnosis.stages import shorter_windows
+from auvnn.diagnosis.stages.shorter_windows import noise_share, search_over_shorter
+from auvnn.errors import InputError
+from auvnn.models import load
+from auvnn.simulation import simulate
+
+STEP = 0.1
+
+
+def explanation(ratio):
+    """Return a fit that leaves `ratio` times the variance of the noise, in three channels that were measured."""
+    count = np.zeros((1, 18))
+    count[:, :3] = 100.0
+    noise = np.full(18, np.nan)
+    noise[:3] = [0.1, 2.0, 0.03]
+    channel = np.zeros((1, 18))
+    channel[:, :3] = 100.0 * ratio * noise[:3] ** 2
+    sums = SimpleNamespace(count=count, channel=channel, noise=lambda: noise)
+    return SimpleNamespace(fitted=SimpleNamespace(sigma=np.where(count[0] > 0, 1.0, np.inf), statistics=sums))
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked, as far as it is looked at."""
+
+    log: object
+    layout: object
+    floor: object = 0.0
+    notes: tuple = ("stated",)
+
+    def say(self, words):
+        """Say nothing."""
+
+
+def state(ratio, chosen=(), length=5.0, leaves=True):
+    mask = np.zeros((4, round(length / STEP), 18))
+    return SimpleNamespace(
+        windows=SimpleNamespace(mask=mask), current=explanation(ratio), chosen=chosen, leaves_something=leaves
+    )
+
+
+@pytest.fixture(scope="module")
+def asked():
+    model = load("rov95")
+    made = simulate(model, "multisine", "realistic", runs=1, duration=20.0, rate=1.0 / STEP, max_step=0.05)
+    return Asked(made.log, SimpleNamespace(model=model))
+
+
+def test_the_share_of_the_noise_is_the_ratio_of_the_squares():
+    assert noise_share(explanation(1.0)) == pytest.approx(1.0)
+    assert noise_share(explanation(4.0)) == pytest.approx(0.25)
+    # Less than the noise is as good as the noise.
+    assert noise_share(explanation(0.8)) == 1.0
+
+
+def test_names_that_leave_the_noise_alone_are_taken_and_said(asked):
+    seen = []
+
+    def search(what, windows):
+        seen.append(windows.mask.shape[1] * STEP)
+        return state(1.1, ("body_lift",))
+
+    given, found = search_over_shorter(asked, state(5.0), search)
+    assert found.chosen == ("body_lift",)
+    assert seen == [pytest.approx(2.0, abs=0.11)]
+    assert given.notes[0] == "stated" and "windows of 2 s were taken" in given.notes[1]
+    assert np.shape(given.floor) == (18,)
+
+
+@pytest.mark.parametrize(
+    "found",
+    [state(1.1), state(2.0, ("body_lift",))],
+    ids=["nothing is named", "the names leave more than the noise"],
+)
+def test_else_the_answer_stays(asked, found):
+    before = state(5.0)
+    assert search_over_shorter(asked, before, lambda *_: found) == (asked, before)
+
+
+@pytest.mark.parametrize(
+    "before",
+    [state(1.5), state(5.0, leaves=False), state(5.0, length=2.0)],
+    ids=["the noise is most of it", "nothing is left", "the windows are short"],
+)
+def test_nothing_is_searched_where_the_usual_windows_do(asked, before):
+    def search(*_):
+        raise AssertionError("searched")
+
+    assert search_over_shorter(asked, before, search) == (asked, before)
+
+
+def test_too_few_samples_or_a_model_that_runs_away_keep_the_answer(asked, monkeypatch):
+    def refuse(*_):
+        raise InputError("runs away")
+
+    monkeypatch.setattr(shorter_windows, "windows_that_hold", refuse)
+    before = state(5.0)
+    assert search_over_shorter(asked, before, refuse) == (asked, before)
+    slow = replace(asked, log=SimpleNamespace(runs=[SimpleNamespace(dt=0.5)]))
+    assert search_over_shorter(slow, before, refuse) == (slow, before)
