@@ -21,6 +21,32 @@ INLINE = ("sqrt", "floor", "ceil")
 MANY = 4
 """Calls of one function that are made together: between two of them compilers can keep nothing in registers."""
 
+TANH = (
+    """\
+/* tanh(x) = e / (e + 2), e = exp(2 |x|) - 1 = 2^k (1 + p) - 1, p the series of exp(r) - 1: to a few last digits. */
+static double PREFIX_tanh(double x)
+{
+    static const double two[65] = {POWERS};
+    const double z = 2.0 * fabs(x);
+    if (!(z <= 44.0)) return x != x ? x : copysign(1.0, x);
+    const int k = (int)(z * 1.4426950408889634 + 0.5);
+    const double r = (z - k * 0x1.62e42fefa0000p-1) - k * 0x1.cf79abc9e3b3ap-40;
+    const double r2 = r * r, r4 = r2 * r2, r8 = r4 * r4;
+    const double a0 = 1.0 + r * (1.0 / 2), a1 = 1.0 / 6 + r * (1.0 / 24), a2 = 1.0 / 120 + r * (1.0 / 720);
+    const double a3 = 1.0 / 5040 + r * (1.0 / 40320), a4 = 1.0 / 362880 + r * (1.0 / 3628800);
+    const double a5 = 1.0 / 39916800 + r * (1.0 / 479001600), a6 = 1.0 / 6227020800.0 + r * (1.0 / 87178291200.0);
+    const double p = r * ((a0 + r2 * a1) + r4 * (a2 + r2 * a3) + r8 * ((a4 + r2 * a5) + r4 * a6));
+    const double e = two[k] * p + (two[k] - 1.0);
+    return copysign(e / (e + 2.0), x);
+}
+"""
+).replace(
+    "POWERS",
+    "\n        "
+    + ",\n        ".join(", ".join(repr(2.0**k) for k in range(n, min(n + 6, 65))) for n in range(0, 65, 6)),
+)
+"""As the compiled engine computes it, which calls no library: networks are little else than this function."""
+
 
 @dataclass(frozen=True)
 class Dialect:
@@ -117,14 +143,20 @@ class Dialect:
     def helpers(self, functions: set[str]) -> str:
         """Return what the statements call; `functions` are those that are called on many numbers at once."""
         t = self.type
+        quick = "tanh" in functions and t == "double"
+        own = {"tanh": f"{self.prefix}_tanh"} if quick else {}
         many = [
             f"static void {self.prefix}_many_{name}(const {t} *in, {t} *out, int count)\n"
-            f"{{\n    for (int i = 0; i < count; i++) out[i] = {self.function(name)}(in[i]);\n}}\n"
+            f"{{\n    for (int i = 0; i < count; i++) out[i] = {own.get(name, self.function(name))}(in[i]);\n}}\n"
             for name in sorted(functions)
         ]
-        return "".join(many) + (
-            f"static inline {t} {self.prefix}_largest({t} a, {t} b) {{ return a > b || a != a ? a : b; }}\n"
-            f"static inline {t} {self.prefix}_smallest({t} a, {t} b) {{ return a < b || a != a ? a : b; }}\n"
+        return (
+            (TANH.replace("PREFIX", self.prefix) if quick else "")
+            + "".join(many)
+            + (
+                f"static inline {t} {self.prefix}_largest({t} a, {t} b) {{ return a > b || a != a ? a : b; }}\n"
+                f"static inline {t} {self.prefix}_smallest({t} a, {t} b) {{ return a < b || a != a ? a : b; }}\n"
+            )
         )
 
     def function_of(

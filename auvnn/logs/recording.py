@@ -22,6 +22,33 @@ PRIMARY = "primary"
 _INSTANCE = re.compile(r"(.*)\[([^\[\]]+)\]")
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What a mapping asks of a recording: topics, and of each the fields, so that no others are kept.
+
+    Args:
+        paths: from which the mapping takes values.
+        always: fields that are kept of every topic that has them.
+    """
+
+    paths: frozenset[str]
+    always: frozenset[str] = frozenset()
+
+    def __call__(self, name: str, kind: str) -> bool:
+        """Say whether a topic is asked for."""
+        names = {base_name(topic_of(p)) for p in self.paths}
+        return (
+            base_name(name) in names
+            or name in names
+            or any(p == name or p.startswith(name + ".") for p in self.paths)
+        )
+
+    def fields(self, name: str) -> frozenset[str] | None:
+        """Return the fields of a topic that are asked for; None for all, where a path does not say which."""
+        found = [p[len(name) + 1 :] for p in self.paths if p.startswith(name + ".")]
+        return None if name in self.paths or not found else frozenset(found) | self.always
+
+
 @dataclass
 class Topic:
     """Messages of one kind under one name, as columns of numbers.

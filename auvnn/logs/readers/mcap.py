@@ -1,7 +1,9 @@
 """MCAP, the usual container of ROS 2: records one after the other, in chunks that carry a checksum.
 
 Read from the front without the summary at the end, which a recording that was cut off does not have. Every length is
-compared with the file and every checksum that is there with its chunk. https://mcap.dev/spec
+compared with the file and every checksum that is there with its chunk. The message indices behind a chunk name the
+channels in it: one that holds nothing but topics that nobody asks for, pictures mostly, is passed over and not unpacked.
+https://mcap.dev/spec
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ from auvnn.logs.readers.unpack import LIMIT, unpack
 from auvnn.logs.reading.repairs.repair import Repair
 
 MAGIC = b"\x89MCAP0\r\n"
-_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END, _FOOTER = 3, 4, 5, 6, 15, 2
+_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _INDEX, _DATA_END, _FOOTER = 3, 4, 5, 6, 7, 15, 2
+_INDICES = 10_000  # behind one chunk that are looked at
 
 
 class _Damage(ValueError):
@@ -39,9 +42,9 @@ class McapReader(RosReader):
         self, path: Path, wanted: Callable[[Channel], bool], most: int | None, notes: Notes
     ) -> Iterator[Message]:
         """Yield messages; the rest of a damaged file is left out with a note."""
-        state = _State(wanted, str(path))
         try:
             with path.open("rb") as stream:
+                state = _State(wanted, str(path), stream)
                 size = stream.seek(0, 2)
                 stream.seek(len(MAGIC))
                 yield from _records(stream, size, most, state, notes)
@@ -52,11 +55,13 @@ class McapReader(RosReader):
 
 
 class _State:
-    def __init__(self, wanted: Callable[[Channel], bool], where: str) -> None:
-        self.wanted, self.where = wanted, where
+    def __init__(self, wanted: Callable[[Channel], bool], where: str, stream: BinaryIO) -> None:
+        self.wanted, self.where, self.stream = wanted, where, stream
         self.schemas: dict[int, tuple[str, str, str]] = {}
         self.channels: dict[int, Channel | None] = {}
         self.left_out: dict[str, int] = {}
+        # Place and length of the chunks that were passed over, in which a channel may be announced.
+        self.passed: list[tuple[int, int]] = []
 
 
 def _records(stream: BinaryIO, size: int, most: int | None, state: _State, notes: Notes) -> Iterator[Message]:
@@ -80,6 +85,11 @@ def _records(stream: BinaryIO, size: int, most: int | None, state: _State, notes
         if kind not in (_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK) or length > LIMIT:
             stream.seek(length, 1)
             continue
+        if kind == _CHUNK and _unwanted(stream, place + 9, length, size, state):
+            state.passed.append((place + 9, length))
+            stream.seek(place + 9 + length)
+            continue
+        stream.seek(place + 9)
         data = stream.read(length)
         try:
             if kind == _CHUNK:
@@ -89,6 +99,52 @@ def _records(stream: BinaryIO, size: int, most: int | None, state: _State, notes
         except (_Damage, InputError, struct.error, IndexError):
             bad_chunks += 1
     _say_chunks(bad_chunks, where, notes)
+
+
+def _unwanted(stream: BinaryIO, place: int, length: int, size: int, state: _State) -> bool:
+    """Say whether the indices behind a chunk name channels that are known and not wanted, and no others."""
+    if all(channel is not None for channel in state.channels.values()):
+        return False
+    at, found = place + length, 0
+    while at + 11 <= size and found < _INDICES:
+        stream.seek(at)
+        head = stream.read(11)
+        if len(head) < 11 or head[0] != _INDEX:
+            break
+        number = int.from_bytes(head[9:], "little")
+        if number not in state.channels or state.channels[number] is not None:
+            return False
+        found += 1
+        at += 9 + int.from_bytes(head[1:9], "little")
+    return found > 0
+
+
+def _recall(state: _State) -> None:
+    """Take the channels that chunks announce which were passed over: a message of one of them comes later."""
+    passed, stream = state.passed, state.stream
+    state.passed = []
+    here = stream.tell()
+    for place, length in passed:
+        stream.seek(place)
+        try:
+            data = _chunk(stream.read(length), state.where)
+            for kind, start, stop in _places(data):
+                if kind in (_SCHEMA, _CHANNEL):
+                    list(_one(kind, data[start:stop], state))
+        except (_Damage, InputError, struct.error, IndexError):
+            continue
+    stream.seek(here)
+
+
+def _places(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield kind, begin and end of the records of a chunk, as far as they fit into it."""
+    place = 0
+    while place + 9 <= len(data):
+        stop = place + 9 + int.from_bytes(data[place + 1 : place + 9], "little")
+        if stop > len(data):
+            return
+        yield data[place], place + 9, stop
+        place = stop
 
 
 def _say_chunks(count: int, where: str, notes: Notes) -> None:
@@ -123,6 +179,8 @@ def _inside(data: bytes, state: _State) -> Iterator[Message]:
             stop = place + 9 + length
             if stop > end or length < 22:
                 raise _Damage("record")
+            if number not in channels and state.passed:
+                _recall(state)
             channel = channels.get(number)
             if channel is not None:
                 yield channel, logged, data[place + 31 : stop]
@@ -140,6 +198,8 @@ def _inside(data: bytes, state: _State) -> Iterator[Message]:
 def _one(kind: int, data: bytes, state: _State) -> Iterator[Message]:
     if kind == _MESSAGE:
         number, _, logged, _ = struct.unpack_from("<HIQQ", data)
+        if number not in state.channels and state.passed:
+            _recall(state)
         channel = state.channels.get(number)
         if channel is not None:
             yield channel, logged, data[22:]

@@ -16,14 +16,15 @@ from auvnn.logs.readers import ros_definitions
 from auvnn.logs.readers.recordings import RecordingReader
 from auvnn.logs.readers.ros_layout import Decoder
 from auvnn.logs.reading.repairs.repair import Repair
-from auvnn.logs.recording import Recording, Topic, Wanted
+from auvnn.logs.recording import Asked, Recording, Topic, Wanted
 
 _BATCH = 2_000
 _BATCH_BYTES = 8_000_000
-_MERGED = 32  # batches that are put together as soon as there are so many
+_BLOCK = 65_536  # stamps that are converted at a time
 _SURVEY = 60  # messages of a topic that are decoded to see what it holds
 SURVEY_BYTES = 48_000_000
 _FIELDS = 400  # columns of a topic that are shown
+_STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 _CLOCKS = 5.0  # s between stamp and arrival, beyond which another clock is supposed
 
 
@@ -91,7 +92,8 @@ class RosReader(RecordingReader):
             if until is not None and stamp - begin > (until + 1.0) * 1e9:
                 break
             if channel not in columns:
-                columns[channel] = _Columns(channel, self._decoder(channel, where, notes), first)
+                fields = wanted.fields(channel.topic) if isinstance(wanted, Asked) else None
+                columns[channel] = _Columns(channel, self._decoder(channel, where, notes, fields), first)
             columns[channel].add(stamp, data)
         for found in columns.values():
             found.flush()
@@ -112,7 +114,9 @@ class RosReader(RecordingReader):
         _clocks(topics, where, notes)
         return Recording(topics, notes)
 
-    def _decoder(self, channel: Channel, where: str, notes: Notes) -> Decoder | None:
+    def _decoder(
+        self, channel: Channel, where: str, notes: Notes, fields: frozenset[str] | None
+    ) -> Decoder | None:
         definitions = {**ros_definitions.common(), **self.extra_definitions}
         if channel.definition:
             try:
@@ -124,21 +128,26 @@ class RosReader(RecordingReader):
             cure = "name a folder of .msg files in the mapping: definitions: folder"
             notes.append(Repair(words, f"{where}, {channel.topic}", 1, "info", cure))
             return None
-        return Decoder(channel.kind, definitions, self.packed)
+        return Decoder(
+            channel.kind, definitions, self.packed, None if fields is None else fields | set(_STAMP)
+        )
 
 
 class _Columns:
-    """Messages of one topic on their way to columns."""
+    """Messages of one topic on their way to columns.
+
+    Each column is one array of Python that grows by `realloc`, which moves the pages of a large array and does not copy
+    them: neither a list of parts nor their concatenation is ever held beside the columns.
+    """
 
     def __init__(self, channel: Channel, decoder: Decoder | None, first: int | None) -> None:
         self.channel, self.decoder, self.first = channel, decoder, first
         self.waiting: list[bytes] = []
         self.bytes = 0
         # Eight bytes a message: a list of Python's integers takes five times as much.
-        self.arrivals = array("q")
-        self.parts: list[dict[str, Any]] = []
-        self.sizes: list[int] = []
-        self.decoded = self.count = self.last = self.merged = 0
+        self.arrivals, self.stamps = array("q"), array("q")
+        self.columns: dict[str, array[Any]] = {}
+        self.decoded = self.count = self.last = 0
 
     def add(self, stamp: int, data: bytes) -> None:
         self.count += 1
@@ -157,20 +166,23 @@ class _Columns:
 
     def flush(self) -> None:
         if self.waiting and self.decoder is not None:
-            self.parts.append(self.decoder.decode(self.waiting))
-            self.sizes.append(len(self.waiting))
-            self.decoded += len(self.waiting)
-            if len(self.parts) == self.merged + _MERGED:
-                self._merge()
+            count = len(self.waiting)
+            part = self.decoder.decode(self.waiting)
+            sec, nano = (part.pop(name, None) for name in _STAMP)
+            none = np.zeros(count, np.int64)
+            whole = none if sec is None or nano is None else sec * 1_000_000_000 + nano
+            self.stamps.frombytes(whole.astype(np.int64, copy=False).tobytes())
+            for name, values in part.items():
+                if name not in self.columns:
+                    if len(self.columns) >= _FIELDS and self.decoder.wanted is None:
+                        continue
+                    self.columns[name] = _missing(values.dtype, self.decoded)
+                self.columns[name].frombytes(values.tobytes())
+            for name, column in self.columns.items():
+                if name not in part:
+                    column.extend(_missing(np.dtype("f8" if column.typecode == "d" else "i8"), count))
+            self.decoded += count
         self.waiting, self.bytes = [], 0
-
-    def _merge(self) -> None:
-        """Put the last parts together: memory of large arrays goes back as they are freed, that of small ones stays."""
-        parts, sizes = self.parts[self.merged :], self.sizes[self.merged :]
-        names = dict.fromkeys(name for part in parts for name in part)
-        self.parts[self.merged :] = [{name: _joined(parts, sizes, name) for name in names}]
-        self.sizes[self.merged :] = [sum(sizes)]
-        self.merged += 1
 
     def note(self, where: str, notes: Notes) -> None:
         if self.decoder is not None and self.decoder.bad:
@@ -178,30 +190,35 @@ class _Columns:
             notes.append(Repair(words, f"{where}, {self.channel.topic}", self.decoder.bad, "warning"))
 
     def topic(self, epoch: int) -> Topic:
-        arrival = ((np.array(self.arrivals, dtype=np.int64) - epoch) * 1e-9).astype(np.float64)
-        names = list(dict.fromkeys(name for part in self.parts for name in part))[:_FIELDS]
-        columns = {}
-        for name in names:
-            # Taken out one by one: all of them twice would be the most that reading needs.
-            columns[name] = _joined(self.parts, self.sizes, name)
+        arrival = _seconds(self.arrivals, epoch)
+        self.arrivals = array("q")
         words = {}
         if self.decoder is not None:
             words = {p: w for p, w in self.decoder.words.items() if p not in self.decoder.changing}
-        sec, nano = columns.pop("header.stamp.sec", None), columns.pop("header.stamp.nanosec", None)
         t = arrival
-        if sec is not None and nano is not None and len(sec) == len(arrival):
-            with np.errstate(invalid="ignore"):
-                whole = np.nan_to_num(sec).astype(np.int64) * 1_000_000_000 + np.nan_to_num(nano).astype(
-                    np.int64
-                )
-            if (whole != 0).any():
-                t = np.where(whole == 0, np.nan, (whole - epoch) * 1e-9).astype(np.float64)
+        if len(self.stamps) == len(arrival) and np.frombuffer(self.stamps, np.int64).any():
+            t = _seconds(self.stamps, epoch, zero_is_missing=True)
+        self.stamps = array("q")
+        kinds = {"d": np.float64, "q": np.int64}
+        columns = {n: np.frombuffer(c, kinds[c.typecode]) for n, c in self.columns.items()}
         return Topic(self.channel.topic, self.channel.kind, t, columns, words, arrival, self.count)
 
 
-def _joined(parts: list[dict[str, Any]], sizes: list[int], name: str) -> np.ndarray[Any, Any]:
-    """Take a column out of the parts and return it in one, (N,); NaN where a part has none."""
-    return np.concatenate([p.pop(name, np.full(n, np.nan)) for p, n in zip(parts, sizes, strict=True)])
+def _missing(kind: np.dtype[Any], count: int) -> array[Any]:
+    """Return so many missing values: NaN, or 0 in the parts of stamps."""
+    whole = kind.kind in "iu"
+    return array("q" if whole else "d", bytes(8 * count) if whole else np.full(count, np.nan).tobytes())
+
+
+def _seconds(stamps: array[int], epoch: int, zero_is_missing: bool = False) -> np.ndarray[Any, Any]:
+    """Return stamps in ns as s since an epoch, (N,), without a second array of their length on the way."""
+    whole = np.frombuffer(stamps, np.int64)
+    out = np.empty(len(whole))
+    for at in range(0, len(whole), _BLOCK):
+        part = whole[at : at + _BLOCK]
+        seconds = (part - epoch) * 1e-9
+        out[at : at + _BLOCK] = np.where(part == 0, np.nan, seconds) if zero_is_missing else seconds
+    return out
 
 
 def _clocks(topics: dict[str, Topic], where: str, notes: Notes) -> None:

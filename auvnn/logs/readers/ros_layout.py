@@ -172,7 +172,7 @@ class Decoder:
     """
 
     def __init__(
-        self, kind: str, definitions: Definitions, packed: bool, fields: set[str] | None = None
+        self, kind: str, definitions: Definitions, packed: bool, fields: frozenset[str] | None = None
     ) -> None:
         self.kind, self.definitions, self.packed, self.wanted = kind, definitions, packed, fields
         self.layouts: dict[int, list[Layout]] = {}

@@ -30,6 +30,7 @@ from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.recordings import several_rates
 from auvnn.logs.reading.repairs import attitude, clock, delays, masks, plausible
 from auvnn.logs.reading.repairs.repair import Repair
+from auvnn.logs.reading.stacking import stacked
 from auvnn.logs.run import MIN_SAMPLES, Run
 
 Array = NDArray[np.float64]
@@ -72,7 +73,12 @@ class FileClock:
 
 
 def collect(
-    table: Table, plan: Mapping, file: Path, collector: Collector, clock_from: FileClock | None = None
+    table: Table,
+    plan: Mapping,
+    file: Path,
+    collector: Collector,
+    clock_from: FileClock | None = None,
+    consume: bool = False,
 ) -> None:
     """Turn a table into runs: told apart, in order of time, corrected and checked.
 
@@ -82,6 +88,7 @@ def collect(
         file: from which they are, for messages.
         collector: takes the runs and the repairs.
         clock_from: from when the file's stamps count, where the table is a part of it.
+        consume: whether the table may be emptied, to spare memory.
     """
     where = str(file)
     plan = table.rest or plan
@@ -89,9 +96,10 @@ def collect(
     collector.repairs.extend(required.notes(table, where))
     label_column = plan.run if plan.run not in (None, "file") else "run"
     groups = [(1, np.arange(table.rows))]
+    names = list(table.columns)
     if plan.run != "file" and label_column in table.names:
         groups = _groups(table, str(label_column), where, collector)
-    outside = [n for n in table.columns if not is_canonical(n) and n != plan.run]
+    outside = [n for n in names if not is_canonical(n) and n != plan.run]
     collector.unknown.update(dict.fromkeys(outside))
     begin = FileClock.of(table, plan) if clock_from is None else clock_from
     t = begin.seconds(table, plan)
@@ -100,8 +108,9 @@ def collect(
     highest = max(number for number, _ in groups)
     for number, rows in groups:
         here = where if len(groups) == 1 else f"{where}, run {number}"
-        rows = _without_repeats(table, t[rows], rows, here, collector.repairs)
-        stretches, notes = clock.order_in_time(t[rows], here)
+        mine = t if len(groups) == 1 else t[rows]
+        rows = _without_repeats(table, mine, rows, here, collector.repairs)
+        stretches, notes = clock.order_in_time(mine if len(rows) == len(mine) else t[rows], here)
         collector.repairs.extend(notes)
         for i, stretch in enumerate(stretches):
             if i:
@@ -111,6 +120,9 @@ def collect(
             whole = len(taken) == table.rows and bool((np.diff(taken) == 1).all())
             pick = slice(None) if whole else taken
             columns = {n: c[pick].astype(np.float64, copy=False) for n, c in table.columns.items()}
+            if whole and consume:
+                table.columns.clear()
+            del taken
             columns["t"] = clock_origin.counted_from(t[pick], begin.origin)
             columns, notes = delays.undo_delays(columns, plan, here)
             collector.repairs.extend(notes)
@@ -186,8 +198,8 @@ def _run(
     def block(names: Sequence[str]) -> Array | None:
         if not any(n in columns for n in names):
             return None
-        missing = np.full(len(columns["t"]), np.nan)
-        return np.stack([columns.get(n, missing) for n in names], axis=1)
+        missing = np.broadcast_to(np.nan, len(columns["t"]))
+        return stacked([columns.pop(n, missing) for n in names])
 
     velocity = block(VELOCITY)
     if velocity is None:

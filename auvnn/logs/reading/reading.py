@@ -79,7 +79,7 @@ def read(
         first = len(collector.runs)
         # Damaged numbers may overflow on their way; what comes of it is masked and counted.
         with np.errstate(all="ignore"):
-            collect(table, plan, file, collector)
+            collect(table, plan, file, collector, consume=True)
         _number_apart(collector, first, file, len(paths) > 1)
     same = {h for h in hashes if hashes.count(h) > 1}
     if same:

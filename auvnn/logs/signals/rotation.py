@@ -52,12 +52,18 @@ def to_euler(q: Array) -> Array:
 
 def continuous(q: Array) -> Array:
     """Return the same attitudes without sign flips from one present sample to the next, (N, 4)."""
-    result = q.copy()
+    return q * signs(q)[:, None]
+
+
+def signs(q: Array) -> Array:
+    """Return the sign (N,) of each sample that makes attitudes (N, 4) continuous; 1 where one is missing."""
+    found = np.ones(len(q))
     rows = np.flatnonzero(np.isfinite(q).all(axis=-1))
     if len(rows) > 1:
-        dots = (q[rows[1:]] * q[rows[:-1]]).sum(axis=-1)
-        result[rows[1:]] *= np.cumprod(np.where(dots < 0.0, -1.0, 1.0))[:, None]
-    return result
+        there = q if len(rows) == len(q) else q[rows]
+        dots = np.einsum("ij,ij->i", there[1:], there[:-1])
+        found[rows[1:]] = np.cumprod(np.where(dots < 0.0, -1.0, 1.0))
+    return found
 
 
 def body_rates(q: Array, q_dot: Array) -> Array:

@@ -14,6 +14,7 @@ _BODY_SIGNS = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 _BODY_TURN = np.array([0.0, 1.0, 0.0, 0.0])
 # Half a turn about the line between east and north: ENU to NED.
 _WORLD_TURN = np.array([0.0, np.sqrt(0.5), np.sqrt(0.5), 0.0])
+_BLOCK = 65_536  # rows at a time: a product of quaternions needs several times their memory on the way
 
 
 def six_to_frd(values: Array, body: str) -> Array:
@@ -36,8 +37,12 @@ def quaternion_to_ned_frd(q: Array, body: str, world: str) -> Array:
         body: "FRD" or "FLU".
         world: "NED" or "ENU".
     """
-    if body == "FLU":
-        q = multiply(q, _BODY_TURN)
-    if world == "ENU":
-        q = multiply(_WORLD_TURN, q)
-    return q
+    if body != "FLU" and world != "ENU":
+        return q
+    out = np.empty(q.shape)
+    for at in range(0, len(q), _BLOCK):
+        part = q[at : at + _BLOCK]
+        if body == "FLU":
+            part = multiply(part, _BODY_TURN)
+        out[at : at + _BLOCK] = multiply(_WORLD_TURN, part) if world == "ENU" else part
+    return out

@@ -16,12 +16,13 @@ from auvnn.logs.reading.mapping_file.columns import Column
 from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.mapping_file.mapping_more import More
 from auvnn.logs.reading.recordings import other_clocks
+from auvnn.logs.reading.recordings.asked_for import Spare, alike, asked_of, joined, lacking
 from auvnn.logs.reading.recordings.rates import Series
 from auvnn.logs.reading.recordings.recorded_series import Array, _series, _Times
 from auvnn.logs.reading.recordings.recorded_values import _held, _primary
 from auvnn.logs.reading.recordings.stretches import _merged
 from auvnn.logs.reading.repairs.repair import Repair
-from auvnn.logs.recording import PRIMARY, Recording, Topic, base_name, topic_of
+from auvnn.logs.recording import Recording, Topic
 
 if TYPE_CHECKING:
     from auvnn.logs.readers.recordings import RecordingReader
@@ -66,19 +67,13 @@ def assemble(reader: RecordingReader, path: Path, plan: Mapping, until: float | 
         notes = [Repair(words, where, 1, "info") for words in proposal.notes]
     else:
         notes = []
-    names = {base_name(topic_of(p)) for p in sources(plan)}
-    paths = set(sources(plan))
-
-    def wanted(name: str, kind: str) -> bool:
-        return (
-            base_name(name) in names
-            or name in names
-            or any(p == name or p.startswith(name + ".") for p in paths)
-        )
-
-    recording = reader.record(path, wanted, until)
+    asked = asked_of(plan)
+    recording = reader.record(path, asked, until)
     if set(recording.topics) == {""} and not plan.topics:
         return _flat(recording, plan, where)
+    if lacking(recording, asked):
+        # The message about a field that is not there offers those that are: all of them are read for it.
+        recording = reader.record(path, lambda name, kind: asked(name, kind), until)
     table = from_recording(recording, plan, where, consume=True)
     table.repairs[:0] = [*recording.repairs, *notes]
     return table
@@ -89,21 +84,6 @@ def _flat(recording: Recording, plan: Mapping, where: str) -> Table:
     only = recording.topics[""]
     table = Table(dict(only.columns), len(only.t), repairs=list(recording.repairs))
     return plan.apply(table, where)
-
-
-def sources(plan: Mapping) -> list[str]:
-    """Return the paths of a recording that a mapping takes values from."""
-    found: dict[str, None] = {}
-    if plan.run not in (None, "file"):
-        found[str(plan.run)] = None
-    for column in plan.columns.values():
-        each = [column.source, column.more.over, *column.cores, column.by]
-        each += [c for c, _ in column.more.mix]
-        each += [column.valid.source] if column.valid else []
-        found.update((p, None) for p in each if p)
-        if column.source and f"[{PRIMARY}]" in column.source:
-            found.update((f"{base_name(topic_of(column.source))[:-1]}{n}.PI", None) for n in "4")
-    return list(found)
 
 
 def from_recording(recording: Recording, plan: Mapping, where: str, consume: bool = False) -> Table:
@@ -123,25 +103,16 @@ def from_recording(recording: Recording, plan: Mapping, where: str, consume: boo
     series: list[Series] = []
     constants: dict[str, float] = {}
     times = _Times(recording, plan, where, result)
+    spare = Spare(recording, plan) if consume else None
     done: set[str] = set()
-    for group in (*_GROUPS, *((n,) for n in plan.columns)):
+    for group in (*_GROUPS, *(alike(n, plan) for n in plan.columns)):
         names = [n for n in group if n in plan.columns and n not in done and n != "t"]
         done |= set(names)
         for name in names:
             if plan.columns[name].source is None and not plan.columns[name].more.mix:
                 constants[name] = plan.columns[name].value
         asked = [n for n in names if n not in constants]
-        by_place: _Places = {}
-        for name in asked:
-            column = plan.columns[name]
-            topic, values = _values(name, column, recording, plan, where, result)
-            by_place.setdefault((topic.name, column.delay), []).append((name, topic, values))
-        if group == EULER and len(by_place) > 1:
-            by_place = _together(by_place, times)
-        for (_, delay), found in by_place.items():
-            series += _series(
-                [n for n, _, _ in found], [v for _, _, v in found], found[0][1], delay, plan, times, where
-            )
+        series += _of_group(group, asked, recording, plan, times, where, result, spare)
     if plan.run not in (None, "file"):
         numbers, field = recording.find(str(plan.run), where, plan.where)
         series.append(
@@ -179,6 +150,36 @@ def from_recording(recording: Recording, plan: Mapping, where: str, consume: boo
     )
     result.seconds.add("t")
     return result
+
+
+def _of_group(
+    group: tuple[str, ...],
+    names: list[str],
+    recording: Recording,
+    plan: Mapping,
+    times: _Times,
+    where: str,
+    result: Table,
+    spare: Spare | None,
+) -> list[Series]:
+    """Return what the topics say of some columns that belong together."""
+    by_place: _Places = {}
+    for name in names:
+        column = plan.columns[name]
+        topic, values = _values(name, column, recording, plan, where, result)
+        by_place.setdefault((topic.name, column.delay), []).append((name, topic, values))
+        if spare is not None:
+            spare.drop(column.source)
+    if group == EULER and len(by_place) > 1:
+        by_place = _together(by_place, times)
+    out: list[Series] = []
+    while by_place:
+        place = next(iter(by_place))
+        for some in joined(by_place.pop(place)):
+            names, topic, values = [n for n, _, _ in some], some[0][1], [v for _, _, v in some]
+            some.clear()
+            out += _series(names, values, topic, place[1], plan, times, where)
+    return out
 
 
 def _together(places: _Places, times: _Times) -> _Places:

@@ -30,6 +30,7 @@ _SAME = 1e-6  # s; stamps that agree so well are the same sample
 _SLOWER = 1.5  # times the rows' step from which a sensor counts as slower
 _LONGEST_HOLD = 2.0  # s that a command is held at least, if no other follows
 _HOLD_STEPS = 10.0
+_BLOCK = 65_536  # rows at a time: what is needed on the way stays small
 
 
 @dataclass(frozen=True)
@@ -122,12 +123,12 @@ def _by_name(series: list[Series]) -> list[list[Series]]:
 
 
 def merge(
-    series: Sequence[Series], rows: Series, where: str, between: str = "held", longest: float | None = None
+    series: list[Series], rows: Series, where: str, between: str = "held", longest: float | None = None
 ) -> tuple[dict[str, Array], list[Repair]]:
     """Return columns at the rows' times, `t` first, and what was done.
 
     Args:
-        series: all, that of the rows among them.
+        series: all, that of the rows among them; the list is empty afterwards, so that each is given up as it is done.
         rows: see `rows_of`.
         where: file, for messages.
         between: commands between their messages: "held" or "linear".
@@ -138,7 +139,9 @@ def merge(
     step = rows.step
     out: dict[str, Array] = {"t": t}
     repairs: list[Repair] = []
-    for one in series:
+    series.reverse()
+    while series:
+        one = series.pop()
         if one.topic == rows.topic and one.names == rows.names:
             values = rows.values
         else:
@@ -211,36 +214,57 @@ def _commands(
 ) -> Array:
     """Return the mean of each command from a row to the next."""
     hold = longest if longest is not None else max(_LONGEST_HOLD, _HOLD_STEPS * one.step)
-    end = np.append(t[1:], t[-1] + step)
-    end = np.minimum(end, t + GAP_STEPS * step)
-    before = np.searchsorted(one.t, t + _SAME, side="right") - 1
-    inside = np.searchsorted(one.t, end - _SAME, side="left") - 1
-    start = np.clip(before, 0, None)
-    out = one.values[start]
-    if between == "linear":
-        out = linear(one.t, one.values, t, max(hold, GAP_STEPS * one.step))
-    mixed = inside > start
-    if between == "held" and mixed.any():
-        # The integral of a held command is linear between its messages.
-        grown = np.concatenate(
-            [np.zeros((1, one.values.shape[1])), np.cumsum(np.diff(one.t)[:, None] * one.values[:-1], axis=0)]
-        )
-        a, b = start[mixed], inside[mixed]
-        begin = np.maximum(t[mixed], one.t[0])
-        whole = (grown[b] + (end[mixed] - one.t[b])[:, None] * one.values[b]) - (
-            grown[a] + (begin - one.t[a])[:, None] * one.values[a]
-        )
-        out = out.copy()
-        out[mixed] = whole / (end[mixed] - begin)[:, None]
-    none = before < 0
-    old = t - one.t[start] > hold
-    lost = none | (old & (not one.event or longest is not None))
+    if between == "held" and len(one.t) == len(t) and np.abs(one.t - t).max() <= _SAME:
+        return one.values  # each row has its own command, from its time to the next row's
+    out = np.empty((len(t), one.values.shape[1]))
+    lost, none = np.zeros(len(t), dtype=bool), np.zeros(len(t), dtype=bool)
+    for at in range(0, len(t), _BLOCK):
+        rows = slice(at, at + _BLOCK)
+        here = t[rows]
+        end = np.append(t[at + 1 : at + len(here) + 1], [t[-1] + step] if at + len(here) == len(t) else [])
+        end = np.minimum(end, here + GAP_STEPS * step)
+        before = np.searchsorted(one.t, here + _SAME, side="right") - 1
+        start = np.clip(before, 0, None)
+        if between == "linear":
+            out[rows] = linear(one.t, one.values, here, max(hold, GAP_STEPS * one.step))
+        else:
+            out[rows] = _means(one, here, end, start)
+        none[rows] = before < 0
+        old = here - one.t[start] > hold
+        lost[rows] = none[rows] | (old & (not one.event or longest is not None))
     if lost.any() and not lost.all():
         words = f"rows without a command for {hold:.3g} s read as missing"
         cure = "if commands are sent only when they change: commands: {longest: 60} in the mapping"
         if (lost & ~none).any():
             repairs.append(Repair(words, f"{where}, {one.topic}", int(lost.sum()), "warning", cure))
     out[lost] = np.nan
+    return out
+
+
+def _means(one: Series, t: Array, end: Array, start: NDArray[np.intp]) -> Array:
+    """Return the mean of held commands (M, k) from each time to its end.
+
+    Args:
+        one: the commands' messages.
+        t: begin, s, (M,).
+        end: s, (M,).
+        start: number of the message that holds at each begin, (M,).
+    """
+    inside = np.searchsorted(one.t, end - _SAME, side="left") - 1
+    out = one.values[start]
+    mixed = inside > start
+    if mixed.any():
+        # The integral of a held command is linear between its messages.
+        first, last = int(start[mixed].min()), int(inside[mixed].max()) + 1
+        times, values = one.t[first:last], one.values[first:last]
+        steps = np.cumsum(np.diff(times)[:, None] * values[:-1], axis=0)
+        grown = np.concatenate([np.zeros((1, values.shape[1])), steps])
+        a, b = start[mixed] - first, inside[mixed] - first
+        begin = np.maximum(t[mixed], one.t[0])
+        whole = (grown[b] + (end[mixed] - times[b])[:, None] * values[b]) - (
+            grown[a] + (begin - times[a])[:, None] * values[a]
+        )
+        out[mixed] = whole / (end[mixed] - begin)[:, None]
     return out
 
 

@@ -15,6 +15,7 @@ from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.recordings.rates import Series
 from auvnn.logs.reading.recordings.recorded_values import _held, _primary
 from auvnn.logs.reading.repairs import attitude
+from auvnn.logs.reading.stacking import stacked
 from auvnn.logs.recording import Recording, Topic, base_name
 from auvnn.logs.signals import differences
 
@@ -67,6 +68,7 @@ def _series(
     world = (rule.world if rule else None) or plan.world
     t = times.of(topic) - delay
     data = dict(zip(names, values, strict=True))
+    values.clear()  # what the columns are turned into takes their place
     changed = [plan.columns[n].more for n in names]
     in_world = any(m.world for m in changed)
     if any(n in QUATERNION + EULER for n in names):
@@ -82,9 +84,10 @@ def _series(
         other, field = _primary(times.recording, changed[0].over, plan, where)
         took = other.columns[field] if other is topic else _held(other, field, topic)
         t = t - 0.5 * np.nan_to_num(took.astype(np.float64) * changed[0].over_factor)
-    stacked = np.stack(list(data.values()), axis=1)
-    event = topic.kind == "moos"
-    return [Series(tuple(data), t, stacked, topic.name, topic.arrival, event)]
+    event, held = topic.kind == "moos", tuple(data)
+    columns = list(data.values())
+    data.clear()
+    return [Series(held, t, stacked(columns), topic.name, topic.arrival, event)]
 
 
 def _difference(names: list[str], data: dict[str, Array], t: Array, topic: Topic, plan: Mapping) -> Series:
@@ -114,10 +117,8 @@ def _attitude(
             raise InputError(
                 f"{where}: {plan.where} gives {', '.join(names)} from one topic, not a whole quaternion"
             )
-        parts = [data[n] for n in QUATERNION]
-        if plan.quaternion == "xyzw":
-            parts = [parts[3], *parts[:3]]
-        q = np.stack(parts, axis=1)
+        order = ("qz", "qw", "qx", "qy") if plan.quaternion == "xyzw" else QUATERNION
+        q = stacked([data.pop(n) for n in order])
         q = frames.quaternion_to_ned_frd(q, body, world)
     return dict(zip(QUATERNION, q.T, strict=True))
 

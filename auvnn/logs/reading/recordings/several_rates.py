@@ -41,11 +41,11 @@ def settle(columns: dict[str, Array], plan: Mapping, where: str) -> tuple[dict[s
         return columns, []
     series = _with_quaternion(rates.of_table(columns), plan, where)
     rows = rates.rows_of(series, None, where)
+    steps = sorted({round(1.0 / s.step, 2) for s in series if np.isfinite(s.step)})
     out, repairs = rates.merge(series, rows, where, plan.commands.between, plan.commands.longest)
     for name in columns:
         if name not in out and name not in EULER:
             out[name] = np.full(len(out["t"]), np.nan)
-    steps = sorted({round(1.0 / s.step, 2) for s in series if np.isfinite(s.step)})
     told = ", ".join(f"{r:g}" for r in steps)
     words = (
         f"columns of several rates ({told} Hz) brought to the times of {rows.topic}, {1 / rows.step:.3g} Hz"

@@ -27,28 +27,34 @@ _BACK = 1.0  # s; a clock that goes back further was set
 def _merged(series: list[Series], recording: Recording, plan: Mapping, where: str, result: Table) -> None:
     """Merge the series part by part, a part being what lies between two restarts of the clock."""
     rows = rates.rows_of(series, plan.rows, where)
+    steps = {s.topic: s.step for s in series if len(s.t) > 1}
     pieces: list[dict[str, Array]] = []
-    for number, part in enumerate(_parts(series, rows, recording.parts, where, result)):
+    parts = _parts(series, rows, recording.parts, where, result)
+    alone = len(parts) == 1 and plan.run is None
+    topic = rows.topic
+    del rows  # with the list that `merge` empties, nothing else holds what it has done
+    for number, part in enumerate(parts):
         mine = rates.rows_of(part, plan.rows, where) if any(len(s.t) for s in part) else None
         if mine is None or len(mine.t) < 2:
             continue
         columns, notes = rates.merge(part, mine, where, plan.commands.between, plan.commands.longest)
-        columns.setdefault("run", np.full(len(columns["t"]), float(number + 1)))
+        if not alone:
+            columns.setdefault("run", np.full(len(columns["t"]), float(number + 1)))
         pieces.append(columns)
         result.repairs += [n for n in notes if n.what not in {r.what for r in result.repairs}]
     if not pieces:
         raise InputError(f"{where}: the topics of the mapping hold no two samples with a time")
-    names = list(dict.fromkeys(n for p in pieces for n in p))
-    for name in names:
-        if name == "run" and len(pieces) == 1 and plan.run is None:
-            continue
-        parts = [p.get(name, np.full(len(p["t"]), np.nan)) for p in pieces]
-        result.columns[name] = np.concatenate(parts)
+    if len(pieces) == 1:
+        result.columns |= pieces[0]
+        if plan.run is None:
+            result.columns.pop("run", None)
+    else:
+        for name in dict.fromkeys(n for p in pieces for n in p):
+            result.columns[name] = np.concatenate([p.get(name, np.full(len(p["t"]), np.nan)) for p in pieces])
     result.rows = len(result.columns["t"])
-    steps = {s.topic: s.step for s in series if len(s.t) > 1}
     if len(steps) > 1:
         told = ", ".join(f"{n} {1 / s:.3g} Hz" for n, s in steps.items() if np.isfinite(s))
-        words = f"sensors of several rates brought to the times of {rows.topic}: {told}"
+        words = f"sensors of several rates brought to the times of {topic}: {told}"
         result.repairs.append(Repair(words, where, len(steps), "info"))
 
 

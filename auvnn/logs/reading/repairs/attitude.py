@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from auvnn.errors import InputError
 from auvnn.logs.reading.repairs.repair import Repair
-from auvnn.logs.signals.rotation import continuous, from_euler
+from auvnn.logs.signals.rotation import continuous, from_euler, signs
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ def from_quaternions(raw: Array, where: str) -> tuple[Array, list[Repair]]:
         InputError: the typical norm is below 0.5, or most samples are no rotation.
     """
     repairs: list[Repair] = []
-    norm = np.linalg.norm(raw, axis=1)
+    norm = np.sqrt(np.einsum("ij,ij->i", raw, raw))
     present = np.isfinite(norm)  # an absurd number overflows here and counts as missing
     if not present.any():
         return np.full_like(raw, np.nan), repairs
@@ -61,17 +61,20 @@ def from_quaternions(raw: Array, where: str) -> tuple[Array, list[Repair]]:
         cure = "interpolate attitudes as rotations, not number by number"
         repairs.append(Repair(words, where, n_wrong, cure=cure))
     quaternion = raw.copy()
-    quaternion[wrong | ~present] = np.nan
+    if n_wrong or not present.all():
+        quaternion[wrong | ~present] = np.nan
     uneven = present & ~wrong & (np.abs(norm - 1.0) > _EXACT)
-    quaternion[uneven] /= norm[uneven, None]
+    if uneven.any():
+        quaternion /= np.where(uneven, norm, 1.0)[:, None]
     visible = int((np.abs(norm[present & ~wrong] / typical - 1.0) > 1e-6).sum())
     if visible:
         repairs.append(Repair("quaternions scaled to unit length", where, visible, "info"))
-    smooth = continuous(quaternion)
-    flips = int((np.diff(np.signbit((smooth * quaternion).sum(axis=1))[present & ~wrong]) != 0).sum())
+    turned = signs(quaternion)
+    flips = int((np.diff(turned[present & ~wrong]) != 0.0).sum())
     if flips:
         repairs.append(Repair("sign flips of the quaternion (the same attitude) undone", where, flips))
-    return smooth, repairs
+        quaternion *= turned[:, None]
+    return quaternion, repairs
 
 
 def from_angles(angles: Array, t: Array, yaw_rate: Array, where: str) -> tuple[Array, list[Repair]]:

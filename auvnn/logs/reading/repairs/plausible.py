@@ -6,11 +6,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from auvnn.errors import InputError
 from auvnn.logs.channels import VELOCITY, WRENCH
 from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.run import Run
+
+Array = NDArray[np.float64]
 
 _MAX_MISSING = 0.5
 _MAX_RATE = 20.0  # rad/s, three turns per second
@@ -44,7 +47,8 @@ def check_plausible(run: Run, where: str) -> tuple[Run, list[Repair]]:
     repairs = []
     for block, limit in _ABSURD.items():
         values = getattr(run, block)
-        if values is not None and (absurd := np.abs(values) > limit).any():
+        if values is not None and _reaches(values, limit):
+            absurd = np.abs(values) > limit
             changes[block] = np.where(absurd, np.nan, values)
             what = f"values of '{block}' beyond {limit:.0e}, which no vehicle reaches, read as missing"
             repairs.append(Repair(what, where, int(absurd.sum()), "warning", "look for damage in the file"))
@@ -55,7 +59,15 @@ def check_plausible(run: Run, where: str) -> tuple[Run, list[Repair]]:
     return run, repairs
 
 
+def _reaches(values: Array, limit: float) -> bool:
+    """Say whether any value is beyond a limit to either side, without a copy of the values."""
+    with np.errstate(invalid="ignore"):
+        return bool(np.fmax.reduce(values, axis=None) > limit or np.fmin.reduce(values, axis=None) < -limit)
+
+
 def _units(run: Run, where: str) -> None:
+    if not _reaches(run.nu[:, :3], _MAX_SPEED) and not _reaches(run.nu[:, 3:], _MAX_RATE):
+        return  # nor does any quantile of them
     typical = [float(np.nanquantile(np.abs(c), 0.99)) if np.isfinite(c).any() else 0.0 for c in run.nu.T]
     for name, value in zip(VELOCITY[3:], typical[3:], strict=True):
         if value > _MAX_RATE:
@@ -72,7 +84,7 @@ def _units(run: Run, where: str) -> None:
 def _commands(run: Run, where: str) -> None:
     if run.thrusters is None or not np.isfinite(run.thrusters).any():
         return
-    largest = float(np.nanmax(np.abs(run.thrusters)))
+    largest = max(float(np.nanmax(run.thrusters)), -float(np.nanmin(run.thrusters)))
     if largest > 1.0 + _COMMAND_SLACK:
         kind = "PWM" if largest > 500.0 else "percent" if largest > 2.0 else "of another range"
         cure = "curve: {neutral: 1500, span: 400}" if kind == "PWM" else f"scale: {1.0 / largest:.3g}"
@@ -83,6 +95,9 @@ def _commands(run: Run, where: str) -> None:
 
 
 def _missing(run: Run, where: str) -> None:
+    blocks = (run.nu, run.quaternion, run.thrusters if run.thrusters is not None else run.wrench)
+    if all(np.isfinite(b.sum()) for b in blocks if b is not None):
+        return
     needed = [*zip(VELOCITY, run.nu.T, strict=True), ("attitude", run.quaternion.sum(axis=1))]
     if run.thrusters is not None:
         needed += [(f"thruster_{i + 1}", c) for i, c in enumerate(run.thrusters.T)]
