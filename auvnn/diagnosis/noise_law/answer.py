@@ -8,11 +8,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.noise_law.command_holding import Holding, holding, squared_error
+from auvnn.diagnosis.noise_law.command_holding import Holding, holding, squared_error, uncertain_wrench
 from auvnn.diagnosis.noise_law.estimate_law import ALPHA_BOUNDARY
 from auvnn.diagnosis.noise_law.hypothesis import WithForce, under_its_law
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
@@ -25,8 +26,10 @@ from auvnn.diagnosis.residuals.variance_component_test import variance_component
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.diagnosis.stages.what_is_left import settled
+from auvnn.effects.base import AXES
 from auvnn.metrics.force_law import ForceLaw
 
+Array = NDArray[np.float64]
 # Share of a degree of freedom's force that measured inputs may predict (lower 95 % limit) before it is no noise.
 PREDICTABLE = 0.1
 # Share of the force beyond which a name has left most of it.
@@ -39,6 +42,8 @@ UNDECIDED = (
 )
 # Standard errors of a one-sided limit that holds in 19 of 20 logs.
 ONE_SIDED = 1.645
+# Standard deviations of what commands between samples leave uncertain within which a force is no more than that.
+COVERING = 2.0
 
 
 def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, Any], list[str]]:
@@ -52,6 +57,7 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         return state, {}, []
     least, held = _held(state)
     windows = held.applied(state.windows)
+    uncertain = uncertain_wrench(asked.layout.model, state.windows, held)
     asked.say("asking whether the sensors' noise is white")
     try:
         colour = noise_colour(least, windows, asked.floor)
@@ -62,14 +68,18 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         why += [] if colour.noise is None else ["the sensors' noise is not white"]
         asked.say(f"{' and '.join(why)}: searching again")
         state = search(asked, colour.applied(windows))
-    told: dict[str, Any] = {"commands": held.to_dict(), "noise": colour.to_dict()}
+    wrench = {axis: float(value) for axis, value in zip(AXES, uncertain, strict=True) if value > 0.0}
+    told: dict[str, Any] = {
+        "commands": {**held.to_dict(), **({"uncertain": wrench} if wrench else {})},
+        "noise": colour.to_dict(),
+    }
     if not state.leaves_something:
         return state, told, []
     if state.refuted is not None and not _leaves_force(asked, state, state.refuted):
         # With all names nothing significant is left: those that predict alone decide whether there is.
         state = settled(asked, state)
     try:
-        beside = _with_force(asked, state)
+        beside = _with_force(asked, state, uncertain)
     except UNSOLVED:
         # The first answer stands: it did not need what could not be solved here.
         return state, told, [UNDECIDED]
@@ -94,7 +104,9 @@ def _held(state: State) -> tuple[FittedHypothesis, Holding]:
     return state.first, Holding("held", 0.0, 0.0, 0.0)
 
 
-def _with_force(asked: Setting, state: State) -> tuple[State, ForceLaw | None, InputPrediction | None] | None:
+def _with_force(
+    asked: Setting, state: State, uncertain: Array
+) -> tuple[State, ForceLaw | None, InputPrediction | None] | None:
     """Return where a search beside the stochastic force ends, the law, and what measured inputs predict of it.
 
     None where there is no such force.
@@ -115,7 +127,8 @@ def _with_force(asked: Setting, state: State) -> tuple[State, ForceLaw | None, I
         again = beside.run(null, alone, asked.most)
         if _predictable(asked, again) is None:
             result, predicted = again, None
-    return _state(asked, state, result, chance=predicted is None), result.estimate.law, predicted
+    ended = _state(asked, state, result, uncertain, chance=predicted is None)
+    return ended, result.estimate.law, predicted
 
 
 def _leaves_force(asked: Setting, state: State, end: FittedHypothesis) -> bool:
@@ -130,10 +143,10 @@ def _predictable(asked: Setting, result: WithForce) -> InputPrediction | None:
     return None if predicted is None or predicted.least <= PREDICTABLE else predicted
 
 
-def _state(asked: Setting, state: State, result: WithForce, *, chance: bool) -> State:
+def _state(asked: Setting, state: State, result: WithForce, uncertain: Array, *, chance: bool) -> State:
     """Return the state with what was found together with the force in the place of what the first search found."""
     law, windows = result.estimate.law, state.windows
-    small = chance and negligible(asked, state, law)
+    small = chance and negligible(asked, state, law, uncertain)
     table = state.table
     for explanation in result.tried:
         table = fill_candidate(asked.layout, table, explanation, state.first)
@@ -187,13 +200,16 @@ def exceeds_actuators(asked: Setting, state: State, law: ForceLaw | None) -> boo
     return bool((mean[most > 0.0] > LARGEST * most[most > 0.0]).any())
 
 
-def negligible(asked: Setting, state: State, law: ForceLaw | None) -> bool:
+def negligible(asked: Setting, state: State, law: ForceLaw | None, uncertain: Array) -> bool:
     """Whether a stochastic force is within the tolerance, by its upper limit as a share of the actuators' force.
+
+    What the commands between samples leave uncertain is no lack of the model, however much it is.
 
     Args:
         asked: tolerance and layout.
         state: windows over which the force was sought.
         law: root mean square, N and N m, and correlation time, s, of the force; None where none was found.
+        uncertain: wrench that commands between samples leave uncertain, rms, N and N m, (6,).
     """
     if asked.tolerance.strict:
         return False
@@ -204,7 +220,8 @@ def negligible(asked: Setting, state: State, law: ForceLaw | None) -> bool:
     # Of a process of correlation time T, a span of 2 T is worth one independent value.
     independent = np.maximum(whole / (2.0 * np.maximum(law.time, 1e-9)), 1.0)
     upper = law.rms * (1.0 + ONE_SIDED / np.sqrt(2.0 * independent))
-    share = share_of(upper, actuators_of(asked.layout.model, state.windows))[law.rms > 0.0]
+    beyond = np.where(upper > COVERING * uncertain, upper, 0.0)
+    share = share_of(beyond, actuators_of(asked.layout.model, state.windows))[beyond > 0.0]
     return bool(np.isfinite(share).all() and (share < asked.tolerance.force).all())
 
 

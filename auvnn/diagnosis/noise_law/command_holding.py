@@ -29,6 +29,7 @@ from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.metrics.windows import Windows
+from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
 LINEAR = 0.5
@@ -81,6 +82,44 @@ def between(windows: Windows, share: float, *, smooth: bool = False) -> Windows:
 
     fins = None if given.fins is None else mixed(given.fins)
     return replace(windows, inputs=replace(given, command=mixed(given.command), fins=fins))
+
+
+def uncertain_wrench(model: GreyBox, windows: Windows, held: Holding) -> Array:
+    """Return the rms of the wrench that commands between samples leave uncertain, (6,), N and N m; zeros where held.
+
+    For smooth commands and such as go straight: the difference between cubic and straight line, and that between the
+    mean thrust of a straight line (by Simpson's rule, exact for a quadratic curve) and the thrust of the mean command.
+    For commands that change somewhere within an interval: the difference between held and straight line.
+
+    Args:
+        model: whose thrust curves, settled. What fins leave uncertain depends on the flow, and is not counted.
+        windows: of commands at the log's samples, as read.
+        held: how commands go by this log.
+    """
+    if not held.odds > 0.0:
+        return np.zeros(6)
+    command = windows.inputs.command
+    following = torch.cat([command[:, 1:], command[:, -1:]], dim=1)
+    # The last interval of a window lacks the sample that its cubic goes through.
+    seen = torch.as_tensor(np.arange(command.shape[1] - windows.warmup - 1) < windows.length[:, None] - 2)
+
+    def wrench(values: Tensor) -> Tensor:
+        settled = model.actuators.static(values) @ model.actuators.allocation.mT
+        return settled[:, windows.warmup : -1][seen]
+
+    def line(share: float) -> Tensor:
+        return wrench(command + share * (following - command))
+
+    with torch.no_grad():
+        straight = line(0.5)
+        if held.name == "ahead":
+            differences = [wrench(command) - straight]
+        else:
+            smooth = wrench(between(windows, LINEAR, smooth=True).inputs.command)
+            differences = [smooth - straight, (line(0.0) + 4.0 * straight + line(1.0)) / 6.0 - straight]
+        square = torch.stack([d**2 for d in differences]).sum(0)
+    known = square[torch.isfinite(square).all(-1)]
+    return torch.sqrt(known.mean(0)).numpy() if len(known) else np.zeros(6)
 
 
 def cubic_weights(share: float) -> tuple[float, ...]:

@@ -32,6 +32,12 @@ def stochastic_words(stochastic: Mapping[str, Any]) -> list[str]:
             else f"as {1 - next_one:.0%} of its own sample's and {next_one:.0%} of the next one's"
         )
         lines.append(f"Commands change between the log's samples: the mean of an interval was taken {along}.")
+        uncertain = {a: v for a, v in commands.get("uncertain", {}).items() if v > 0.0}
+        if uncertain:
+            sizes = [f"{MOTIONS[a]} {v:.2g} {'N' if a in 'XYZ' else 'N m'}" for a, v in uncertain.items()]
+            lines.append(
+                f"What these commands are between samples leaves a force uncertain (rms): {', '.join(sizes)}."
+            )
     return lines
 
 

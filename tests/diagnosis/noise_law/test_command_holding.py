@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,7 +14,13 @@ from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.answer import _held
-from auvnn.diagnosis.noise_law.command_holding import between, cubic_weights, holding
+from auvnn.diagnosis.noise_law.command_holding import (
+    Holding,
+    between,
+    cubic_weights,
+    holding,
+    uncertain_wrench,
+)
 from auvnn.logs import Log
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
@@ -98,3 +104,50 @@ def test_a_fit_that_grows_without_bound_is_passed_over(model):
 
     assert found(first, wild) == (first, holding(first, windows))
     assert found(wild)[1].name == "held"
+
+
+def commanded(values, curve=lambda u: u):
+    """Return a model whose six commands are its wrench by a curve, and windows of one command in surge."""
+    command = torch.zeros(1, len(values), 6, dtype=torch.float64)
+    command[0, :, 0] = torch.as_tensor(values)
+    actuators = SimpleNamespace(static=curve, allocation=torch.eye(6, dtype=torch.float64))
+    windows: Any = Shape(Given(command), length=np.array([len(values) - 2]))
+    return SimpleNamespace(actuators=actuators), windows
+
+
+@dataclass(frozen=True)
+class Given:
+    """What is given to a vehicle."""
+
+    command: torch.Tensor
+    fins: None = None
+
+
+@dataclass(frozen=True)
+class Shape:
+    """As much of windows as is looked at."""
+
+    inputs: Given
+    length: np.ndarray
+    warmup: int = 2
+
+
+def test_a_parabola_of_commands_leaves_the_sixth_of_its_bend_uncertain():
+    """The mean of b t^2 over an interval is b (k^2 + k + 1/3), that of its chord b (k^2 + k + 1/2)."""
+    k = np.arange(30.0)
+    model, windows = commanded(0.02 * k**2)
+    found = uncertain_wrench(model, windows, Holding("linear", 0.5, 9.0, 9.0))
+    assert found[0] == pytest.approx(0.02 / 6.0, rel=1e-9) and not found[1:].any()
+
+
+def test_a_curve_of_the_thrust_adds_what_the_mean_command_does_not_give():
+    """A straight line of commands with T = c^2: the mean of the square less the square of the mean is step^2 / 12."""
+    model, windows = commanded(0.1 * np.arange(20.0), lambda u: u**2)
+    found = uncertain_wrench(model, windows, Holding("smooth", 0.5, 9.0, 9.0))
+    assert found[0] == pytest.approx(0.1**2 / 12.0, rel=1e-9)
+
+
+def test_commands_that_change_within_intervals_leave_half_their_step_and_held_ones_nothing():
+    model, windows = commanded(0.3 * np.arange(20.0))
+    assert uncertain_wrench(model, windows, Holding("ahead", 0.3, 9.0, 9.0))[0] == pytest.approx(0.15)
+    assert not uncertain_wrench(model, windows, Holding("held", 0.0, 0.0, 0.0)).any()
