@@ -83,5 +83,7 @@ sys.exit(main(["simulate", "model=rov95", "runs=1", "duration=20", "out=made"]))
 """
     done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, timeout=200)
     assert done.returncode == 2, done.stderr
-    assert done.stderr.count("\n") == 1 and "cannot be written" in done.stderr
+    # On a machine that others use it is slow enough to tell of its progress.
+    said = [line for line in done.stderr.splitlines() if not line.startswith("progress")]
+    assert len(said) == 1 and "cannot be written" in said[0]
     assert not Path("made").exists()
