@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.diagnosis.noise_law.answer import exceeds_actuators
+from auvnn.diagnosis.noise_law.answer import exceeds_actuators, negligible
 from auvnn.diagnosis.residuals.forces import actuators_of
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.models import GreyBox
@@ -30,3 +31,25 @@ def test_the_mean_over_a_second_is_held_against_the_actuators(share, time, expec
     law = ForceLaw(rms, np.full(6, time), 0.5, 5.0)
     assert exceeds_actuators(asked, state, law) is expected
     assert not exceeds_actuators(asked, state, None)
+
+
+@pytest.mark.parametrize(
+    ("share", "uncertain", "tolerance", "expected"),
+    [
+        (0.005, 0.0, Tolerance(), True),
+        (0.05, 0.0, Tolerance(), False),
+        # Within twice what commands between samples leave uncertain, upper limit included; and beyond it.
+        (0.05, 0.04, Tolerance(), True),
+        (0.05, 0.02, Tolerance(), False),
+        (0.05, 0.04, Tolerance(cost=0.0, force=0.0), False),
+    ],
+)
+def test_what_commands_leave_uncertain_is_no_reason_against_adequate(share, uncertain, tolerance, expected):
+    model = GreyBox(small_vehicle())
+    windows = windows_for(model, make_log(model))
+    drive = actuators_of(model, windows)
+    asked: Any = SimpleNamespace(layout=SimpleNamespace(model=model), tolerance=tolerance)
+    state: Any = SimpleNamespace(windows=windows)
+    law = ForceLaw(np.array([0.0, 0.0, 0.0, share * drive[3], 0.0, 0.0]), np.full(6, 0.4), 0.2, 5.0)
+    unknown = np.array([0.0, 0.0, 0.0, uncertain * drive[3], 0.0, 0.0])
+    assert negligible(asked, state, law, unknown) is expected
