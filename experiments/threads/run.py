@@ -1,10 +1,11 @@
 """How many threads pay, command by command: unset, one, two, side by side in one run, idle and on a busy machine.
 
-    python experiments/threads/run.py OUT [--only=compare,train] [--repeats=3] [--seconds=40] [--no-busy]
+    python experiments/threads/run.py OUT [--only=compare,train] [--repeats=3] [--seconds=40] [--conditions=alone,busy]
 
 Each command runs as its user runs it, in a process of its own, in turn with OMP_NUM_THREADS unset, 1 and 2, so that
-what else the machine does falls on all settings alike; then again beside one busy process per core. The figure is the
-least wall time of the repeats. A command passes where, unset, it takes at most 1.2 times its best setting.
+what else the machine does falls on all settings alike; then again beside one busy process per core. A third condition,
+`given`, starts nothing: it is for a machine that other work keeps busy. The figure is the least wall time of the
+repeats. A command passes where, unset, it takes at most 1.2 times its best setting.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ SETTINGS = ("unset", "1", "2")
 # Unset may take so many times the best setting.
 ALLOWED = 1.2
 BUSY = "while True: pass"
+CONDITIONS = ("alone", "busy", "given")
 MODEL = "rov95"
 # What numerical libraries read; a measurement begins without any of them.
 NAMES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_WAIT_POLICY", "KMP_BLOCKTIME")
@@ -136,14 +138,17 @@ def main() -> None:
         chosen = {verb: chosen[verb] for verb in given["only"].split(",")}
     repeats, cores = int(given.get("repeats", 3)), os.cpu_count() or 1
     answer = {"cores": cores, "load_before": os.getloadavg(), "repeats": repeats}
-    for condition in ("alone", *([] if "no-busy" in given else ["busy"])):
+    conditions = given.get("conditions", "alone,busy").split(",")
+    if not {*conditions} <= {*CONDITIONS}:
+        raise SystemExit(f"--conditions={given['conditions']}: choose from {', '.join(CONDITIONS)}")
+    for condition in conditions:
         print(f"{condition}: seconds by OMP_NUM_THREADS", flush=True)
         with busy(cores if condition == "busy" else 0):
             times = measured(chosen, folder, repeats)
         answer[condition] = {verb: judged(t) for verb, t in times.items()}
     answer["load_after"] = os.getloadavg()
     (folder / "threads.json").write_text(json.dumps(answer, indent=1), encoding="utf-8")
-    slow = [f"{c}: {v}" for c in ("alone", "busy") for v, r in answer.get(c, {}).items() if not r["passes"]]
+    slow = [f"{c}: {v}" for c in conditions for v, r in answer[c].items() if not r["passes"]]
     print("all pass" if not slow else f"slower than allowed: {', '.join(slow)}")
 
 

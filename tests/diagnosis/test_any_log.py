@@ -124,7 +124,7 @@ def ends_well(seed):
     return told
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, 1, 2, 36, 52])
 def test_a_diagnosis_of_anything_ends_well(seed):
     ends_well(seed)
 

@@ -5,6 +5,7 @@ Where the first search leaves nothing, its answer stands as it is.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -13,20 +14,20 @@ from numpy.typing import NDArray
 from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.noise_law.command_holding import Holding, holding, squared_error, uncertain_wrench
+from auvnn.diagnosis.noise_law.command_holding import Holding, holding, squared_error
 from auvnn.diagnosis.noise_law.estimate_law import ALPHA_BOUNDARY
 from auvnn.diagnosis.noise_law.hypothesis import WithForce, under_its_law
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
 from auvnn.diagnosis.noise_law.noise_colour import Colour, noise_colour
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction, predicted_by_inputs
 from auvnn.diagnosis.noise_law.search import UNSOLVED, ForceSearch
+from auvnn.diagnosis.noise_law.uncertain_commands import UncertainWrench, uncertain_wrench
 from auvnn.diagnosis.noise_law.words import left
 from auvnn.diagnosis.residuals.forces import actuators_of, share_of
 from auvnn.diagnosis.residuals.variance_component_test import variance_component_test, white
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.diagnosis.stages.what_is_left import settled
-from auvnn.effects.base import AXES
 from auvnn.metrics.force_law import ForceLaw
 
 Array = NDArray[np.float64]
@@ -57,7 +58,7 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         return state, {}, []
     least, held = _held(state)
     windows = held.applied(state.windows)
-    uncertain = uncertain_wrench(asked.layout.model, state.windows, held)
+    uncertain = uncertain_wrench(least, state.windows, held)
     asked.say("asking whether the sensors' noise is white")
     try:
         colour = noise_colour(least, windows, asked.floor)
@@ -68,7 +69,7 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         why += [] if colour.noise is None else ["the sensors' noise is not white"]
         asked.say(f"{' and '.join(why)}: searching again")
         state = search(asked, colour.applied(windows))
-    wrench = {axis: float(value) for axis, value in zip(AXES, uncertain, strict=True) if value > 0.0}
+    wrench = uncertain.to_dict()
     told: dict[str, Any] = {
         "commands": {**held.to_dict(), **({"uncertain": wrench} if wrench else {})},
         "noise": colour.to_dict(),
@@ -92,20 +93,26 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
 def _held(state: State) -> tuple[FittedHypothesis, Holding]:
     """Return the explanation that leaves least, whatever the search made of it, and how commands go by it.
 
-    One that was tried and is about to diverge says nothing of them: then the next best is asked.
+    One that was tried and is about to diverge says nothing of them: then the next best is asked. Where no name stands,
+    the fit without any name is asked too whether the commands have noise: names fitted to such commands as they are
+    have taken up what the noise does to them.
     """
     sigma = state.first.fitted.sigma
     known = [state.first, *state.tried, state.refuted or state.current]
+    least, held = state.first, Holding("held", 0.0, 0.0, 0.0)
     for end in sorted(known, key=lambda e: squared_error(e, sigma)):
-        try:
-            return end, holding(end, state.windows)
-        except np.linalg.LinAlgError:
-            continue
-    return state.first, Holding("held", 0.0, 0.0, 0.0)
+        with suppress(np.linalg.LinAlgError):
+            least, held = end, holding(end, state.windows)
+            break
+    if held.name == "held" and not state.chosen and least is not state.first:
+        with suppress(np.linalg.LinAlgError):
+            plain = holding(state.first, state.windows)
+            held = plain if plain.name == "averaged" else held
+    return least, held
 
 
 def _with_force(
-    asked: Setting, state: State, uncertain: Array
+    asked: Setting, state: State, uncertain: UncertainWrench
 ) -> tuple[State, ForceLaw | None, InputPrediction | None] | None:
     """Return where a search beside the stochastic force ends, the law, and what measured inputs predict of it.
 
@@ -143,7 +150,9 @@ def _predictable(asked: Setting, result: WithForce) -> InputPrediction | None:
     return None if predicted is None or predicted.least <= PREDICTABLE else predicted
 
 
-def _state(asked: Setting, state: State, result: WithForce, uncertain: Array, *, chance: bool) -> State:
+def _state(
+    asked: Setting, state: State, result: WithForce, uncertain: UncertainWrench, *, chance: bool
+) -> State:
     """Return the state with what was found together with the force in the place of what the first search found."""
     law, windows = result.estimate.law, state.windows
     small = chance and negligible(asked, state, law, uncertain)
@@ -200,7 +209,7 @@ def exceeds_actuators(asked: Setting, state: State, law: ForceLaw | None) -> boo
     return bool((mean[most > 0.0] > LARGEST * most[most > 0.0]).any())
 
 
-def negligible(asked: Setting, state: State, law: ForceLaw | None, uncertain: Array) -> bool:
+def negligible(asked: Setting, state: State, law: ForceLaw | None, uncertain: UncertainWrench) -> bool:
     """Whether a stochastic force is within the tolerance, by its upper limit as a share of the actuators' force.
 
     What the commands between samples leave uncertain is no lack of the model, however much it is.
@@ -209,7 +218,7 @@ def negligible(asked: Setting, state: State, law: ForceLaw | None, uncertain: Ar
         asked: tolerance and layout.
         state: windows over which the force was sought.
         law: root mean square, N and N m, and correlation time, s, of the force; None where none was found.
-        uncertain: wrench that commands between samples leave uncertain, rms, N and N m, (6,).
+        uncertain: what commands between samples leave uncertain.
     """
     if asked.tolerance.strict:
         return False
@@ -220,7 +229,7 @@ def negligible(asked: Setting, state: State, law: ForceLaw | None, uncertain: Ar
     # Of a process of correlation time T, a span of 2 T is worth one independent value.
     independent = np.maximum(whole / (2.0 * np.maximum(law.time, 1e-9)), 1.0)
     upper = law.rms * (1.0 + ONE_SIDED / np.sqrt(2.0 * independent))
-    beyond = np.where(upper > COVERING * uncertain, upper, 0.0)
+    beyond = np.where(upper > COVERING * uncertain.over(law.time), upper, 0.0)
     share = share_of(beyond, actuators_of(asked.layout.model, state.windows))[beyond > 0.0]
     return bool(np.isfinite(share).all() and (share < asked.tolerance.force).all())
 

@@ -1,4 +1,4 @@
-"""How a command goes from one sample to the next: held, on a straight line, or changed ahead of its sample.
+"""How a command goes from one sample to the next: held, on a straight line, changed ahead of its sample, or noisy.
 
 A log has the command at its samples alone. A controller that runs faster changes it in between, and a model that holds
 the sample's command for the whole interval then lags behind by a part of it: errors that look like those of a lag or a
@@ -9,8 +9,14 @@ delay. What moves the vehicle over an interval is the mean of the command, and t
 a share of zero holds the command, one half is the straight line, anything between zero and one a command that
 changes so much of an interval before its sample. Where the command bends much within an interval, the straight line
 falls short: `smooth` is the mean of the cubic through four samples, over the interval that the share moves in the same
-way. Commands that change later than logged are another matter: that is `actuation_delay`. The log is asked by the
-likelihood of free running with everything that is uncertain following.
+way. A fast controller answers the noise of its sensors, too, and a log that takes every twentieth of its commands has
+that noise in each sample, but not the next nineteen that outweigh it. Taken as held, it attenuates what the vehicle seems
+to answer (errors in variables), as if it were heavier. `averaged` is a mean of more samples about the interval's middle,
+with binomial weights. Commands that change later than logged are another matter: that is `actuation_delay`. The log is
+asked by the likelihood of free running with everything that is uncertain following.
+
+Reference: Carroll, Ruppert, Stefanski and Crainiceanu (2006), Measurement error in nonlinear models, chapter 4, on
+regression calibration.
 """
 
 from __future__ import annotations
@@ -22,6 +28,7 @@ import numpy as np
 import torch
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
+from scipy.stats import binom
 from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
@@ -29,10 +36,11 @@ from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.metrics.windows import Windows
-from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
 LINEAR = 0.5
+# Samples whose mean is tried for commands with noise; more are tried as long as they are worth it.
+AVERAGED = (4, 8, 16)
 # Where the straight line does as well as a share of its own up to these odds, it is the plainer answer.
 PLAINER = float(np.log(10.0))
 
@@ -42,41 +50,48 @@ class Holding:
     """How commands go from sample to sample, by a log.
 
     Attributes:
-        name: "held", "linear", "ahead" or "smooth".
+        name: "held", "linear", "ahead", "smooth" or "averaged".
         share: of the next sample's command in an interval's mean.
         odds: logarithm of the odds against holding; zero where it is held.
         gain: fall of the weighted squared error, for the variance that the windows show.
+        samples: in an interval's mean, where it is averaged; else zero.
     """
 
     name: str
     share: float
     odds: float
     gain: float
+    samples: int = 0
 
     def applied(self, windows: Windows) -> Windows:
         """Return windows of commands that go so."""
-        return between(windows, self.share, smooth=self.name == "smooth")
+        return between(windows, self.share, smooth=self.name == "smooth", samples=self.samples)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
-        return {"between_samples": self.name, "share_of_next": self.share, "log_odds": self.odds}
+        told = {"between_samples": self.name, "share_of_next": self.share, "log_odds": self.odds}
+        return {**told, "samples": self.samples} if self.samples else told
 
 
-def between(windows: Windows, share: float, *, smooth: bool = False) -> Windows:
+def between(windows: Windows, share: float, *, smooth: bool = False, samples: int = 0) -> Windows:
     """Return windows whose commands and fins have the means that they take between samples.
 
     Args:
         windows: of commands that are held.
         share: of the next sample's command in an interval's mean.
         smooth: along the cubic through four samples instead of the straight line through two.
+        samples: in the mean with binomial weights, an even number; zero for the share's own law.
     """
     if share == 0.0 and not smooth:
         return windows
     given = windows.inputs
-    weights = cubic_weights(share) if smooth else (0.0, 1.0 - share, share, 0.0)
+    weights = cubic_weights(share) if smooth else (1.0 - share, share)
+    weights = binomial_weights(samples) if samples else weights
+    before, after = len(weights) // 2 - 1, len(weights) // 2
 
     def mixed(values: Tensor) -> Tensor:
-        whole = torch.cat([values[:, :1], values, values[:, -1:], values[:, -1:]], dim=1)
+        ends = values[:, :1].expand(-1, before, -1), values[:, -1:].expand(-1, after, -1)
+        whole = torch.cat([ends[0], values, ends[1]], dim=1)
         count = values.shape[1]
         return torch.stack([w * whole[:, j : j + count] for j, w in enumerate(weights)]).sum(0)
 
@@ -84,42 +99,9 @@ def between(windows: Windows, share: float, *, smooth: bool = False) -> Windows:
     return replace(windows, inputs=replace(given, command=mixed(given.command), fins=fins))
 
 
-def uncertain_wrench(model: GreyBox, windows: Windows, held: Holding) -> Array:
-    """Return the rms of the wrench that commands between samples leave uncertain, (6,), N and N m; zeros where held.
-
-    For smooth commands and such as go straight: the difference between cubic and straight line, and that between the
-    mean thrust of a straight line (by Simpson's rule, exact for a quadratic curve) and the thrust of the mean command.
-    For commands that change somewhere within an interval: the difference between held and straight line.
-
-    Args:
-        model: whose thrust curves, settled. What fins leave uncertain depends on the flow, and is not counted.
-        windows: of commands at the log's samples, as read.
-        held: how commands go by this log.
-    """
-    if not held.odds > 0.0:
-        return np.zeros(6)
-    command = windows.inputs.command
-    following = torch.cat([command[:, 1:], command[:, -1:]], dim=1)
-    # The last interval of a window lacks the sample that its cubic goes through.
-    seen = torch.as_tensor(np.arange(command.shape[1] - windows.warmup - 1) < windows.length[:, None] - 2)
-
-    def wrench(values: Tensor) -> Tensor:
-        settled = model.actuators.static(values) @ model.actuators.allocation.mT
-        return settled[:, windows.warmup : -1][seen]
-
-    def line(share: float) -> Tensor:
-        return wrench(command + share * (following - command))
-
-    with torch.no_grad():
-        straight = line(0.5)
-        if held.name == "ahead":
-            differences = [wrench(command) - straight]
-        else:
-            smooth = wrench(between(windows, LINEAR, smooth=True).inputs.command)
-            differences = [smooth - straight, (line(0.0) + 4.0 * straight + line(1.0)) / 6.0 - straight]
-        square = torch.stack([d**2 for d in differences]).sum(0)
-    known = square[torch.isfinite(square).all(-1)]
-    return torch.sqrt(known.mean(0)).numpy() if len(known) else np.zeros(6)
+def binomial_weights(samples: int) -> tuple[float, ...]:
+    """Return binomial weights of so many samples, half of them before the middle of an interval, half after it."""
+    return tuple(float(w) for w in binom.pmf(np.arange(samples), samples - 1, 0.5))
 
 
 def cubic_weights(share: float) -> tuple[float, ...]:
@@ -168,6 +150,11 @@ def holding(first: FittedHypothesis, windows: Windows) -> Holding:
     smooth = _vertex("smooth", (low, half, full), plain)
     if smooth is not None and smooth.odds > found.odds + PLAINER:
         found = smooth
+    for samples in AVERAGED:
+        gain = plain - cost_at_best(first, between(windows, LINEAR, samples=samples)) / factor
+        if 0.5 * gain <= found.odds + PLAINER:
+            break
+        found = Holding("averaged", LINEAR, 0.5 * gain, gain, samples)
     return found if found.odds > ODDS else held
 
 

@@ -31,6 +31,8 @@ HARMONICS = 3
 # freedom is reported.
 VARIANCES = np.logspace(-10.0, 2.0, 49)
 LEAST_ODDS = float(np.log(100.0))
+# Sums beyond this are of free running that has grown without bound: what is left of their differences is rounding.
+LARGEST = 1e60
 
 
 class VarianceComponents(Effect):
@@ -111,6 +113,9 @@ def variance_component_test(explanation: FittedHypothesis, windows: Windows, sig
         explanation: the fit.
         windows: those it was fitted to.
         sigma: (18,) standard deviations of the noise, infinite for channels that do not count; see `white`.
+
+    Raises:
+        numpy.linalg.LinAlgError: free running with the fit grows without bound.
     """
     fitted = explanation.fitted
     model = fitted.model
@@ -120,6 +125,8 @@ def variance_component_test(explanation: FittedHypothesis, windows: Windows, sig
     names = [*explanation.names, str(probe.name)]
     sums, _, _ = normal_equations(windows, linearise(asked, windows, fitted.initial, names), sigma)
     sums = sums.finite()
+    if not max(np.abs(sums.slope).max(initial=0.0), np.abs(sums.hessian).max(initial=0.0)) < LARGEST:
+        raise np.linalg.LinAlgError("free running grows without bound")
     known = len(fitted.theta)
     # What is known takes its share first: the fit weighed the channels otherwise.
     inside = fitted.priors.inside(fitted.theta)

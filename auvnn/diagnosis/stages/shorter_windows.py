@@ -30,14 +30,14 @@ GROSS, EXPLAINED = 0.5, 0.8
 
 
 def search_over_shorter(
-    asked: Setting, state: State, search: Callable[[Setting, Windows], State]
+    asked: Setting, state: State, search: Callable[[Setting, Windows, Callable[[State], bool]], State]
 ) -> tuple[Setting, State]:
     """Return what is asked and where the search stands, over shorter windows where these explain what the others do not.
 
     Args:
         asked: what is asked, the windows' length not having been stated.
         state: where the search over the usual windows has ended.
-        search: from what is asked and windows to the end of a search.
+        search: from what is asked, windows and whether it is worth going on to the end of a search.
     """
     step = float(np.median([run.dt for run in asked.log.runs]))
     length = step * state.windows.mask.shape[1]
@@ -49,7 +49,8 @@ def search_over_shorter(
     try:
         windows, notes = windows_that_hold(asked.layout.model, asked.log, SHORTER)
         shorter = replace(asked, floor=TRUST * motion(windows) + 1e-9)
-        other = search(shorter, windows)
+        # Names that leave most of the error here too are no reason to go on.
+        other = search(shorter, windows, lambda found: noise_share(found.current) >= GROSS)
     except (InputError, FitError, np.linalg.LinAlgError, SINGULAR):
         return asked, state
     if not other.chosen or noise_share(other.current) < EXPLAINED:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,15 +15,14 @@ from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.answer import _held
 from auvnn.diagnosis.noise_law.command_holding import (
-    Holding,
+    AVERAGED,
     between,
     cubic_weights,
     holding,
-    uncertain_wrench,
 )
 from auvnn.logs import Log
 from auvnn.models import GreyBox
-from tests.small_logs import make_log, small_vehicle
+from tests.small_logs import make_log, sines, small_vehicle
 
 STEP = 5
 
@@ -98,7 +97,7 @@ def test_a_fit_that_grows_without_bound_is_passed_over(model):
 
     def found(first, *tried):
         state: Any = SimpleNamespace(
-            first=first, tried=list(tried), current=wild, refuted=None, windows=windows
+            first=first, tried=list(tried), current=wild, refuted=None, windows=windows, chosen=()
         )
         return _held(state)
 
@@ -106,48 +105,28 @@ def test_a_fit_that_grows_without_bound_is_passed_over(model):
     assert found(wild)[1].name == "held"
 
 
-def commanded(values, curve=lambda u: u):
-    """Return a model whose six commands are its wrench by a curve, and windows of one command in surge."""
-    command = torch.zeros(1, len(values), 6, dtype=torch.float64)
-    command[0, :, 0] = torch.as_tensor(values)
-    actuators = SimpleNamespace(static=curve, allocation=torch.eye(6, dtype=torch.float64))
-    windows: Any = Shape(Given(command), length=np.array([len(values) - 2]))
-    return SimpleNamespace(actuators=actuators), windows
+def test_commands_with_the_noise_of_a_fast_controller_are_averaged(model):
+    """Each sample has noise that lasts a fifth of its interval: the mean of the samples about it is nearer the truth."""
+    random, t = np.random.default_rng(4), np.arange(40 * 25 + 1) / 25
+    slow = np.stack([0.2 * sines(t, 8, k, high=0.2) for k in range(2)])
+    noisy = slow + 0.5 * random.normal(size=slow.shape)
+    found = asked(
+        model,
+        thinned(make_log(model, command=noisy, duration=40.0, rate=25.0, noise=0.3, max_step=0.04), STEP),
+    )
+    assert found.name == "averaged" and found.samples >= 4 and found.to_dict()["samples"] == found.samples
+    held = asked(model, make_log(model, command=noisy[:, ::STEP], duration=40.0, rate=5.0, noise=0.3))
+    assert held.name == "held"
 
 
-@dataclass(frozen=True)
-class Given:
-    """What is given to a vehicle."""
-
-    command: torch.Tensor
-    fins: None = None
-
-
-@dataclass(frozen=True)
-class Shape:
-    """As much of windows as is looked at."""
-
-    inputs: Given
-    length: np.ndarray
-    warmup: int = 2
-
-
-def test_a_parabola_of_commands_leaves_the_sixth_of_its_bend_uncertain():
-    """The mean of b t^2 over an interval is b (k^2 + k + 1/3), that of its chord b (k^2 + k + 1/2)."""
-    k = np.arange(30.0)
-    model, windows = commanded(0.02 * k**2)
-    found = uncertain_wrench(model, windows, Holding("linear", 0.5, 9.0, 9.0))
-    assert found[0] == pytest.approx(0.02 / 6.0, rel=1e-9) and not found[1:].any()
-
-
-def test_a_curve_of_the_thrust_adds_what_the_mean_command_does_not_give():
-    """A straight line of commands with T = c^2: the mean of the square less the square of the mean is step^2 / 12."""
-    model, windows = commanded(0.1 * np.arange(20.0), lambda u: u**2)
-    found = uncertain_wrench(model, windows, Holding("smooth", 0.5, 9.0, 9.0))
-    assert found[0] == pytest.approx(0.1**2 / 12.0, rel=1e-9)
-
-
-def test_commands_that_change_within_intervals_leave_half_their_step_and_held_ones_nothing():
-    model, windows = commanded(0.3 * np.arange(20.0))
-    assert uncertain_wrench(model, windows, Holding("ahead", 0.3, 9.0, 9.0))[0] == pytest.approx(0.15)
-    assert not uncertain_wrench(model, windows, Holding("held", 0.0, 0.0, 0.0)).any()
+def test_an_average_has_binomial_weights(model):
+    """One and three and three and one eighths; a command that changes its sign with each sample vanishes in it."""
+    windows = windows_for(model, make_log(model, duration=12.0, rate=5.0))
+    plain = windows.inputs.command
+    own = (plain[:, :-3] + 3.0 * plain[:, 1:-2] + 3.0 * plain[:, 2:-1] + plain[:, 3:]) / 8.0
+    assert torch.allclose(between(windows, 0.5, samples=4).inputs.command[:, 1:-2], own)
+    sign = torch.as_tensor((-1.0) ** np.arange(plain.shape[1]))[None, :, None].expand_as(plain)
+    turned = replace(windows, inputs=replace(windows.inputs, command=sign))
+    for samples in AVERAGED:
+        mean = between(turned, 0.5, samples=samples).inputs.command
+        assert mean[:, samples // 2 : -samples // 2].abs().max() < 1e-12

@@ -11,6 +11,7 @@ import pytest
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.noise_law.answer import exceeds_actuators, negligible
+from auvnn.diagnosis.noise_law.uncertain_commands import UncertainWrench
 from auvnn.diagnosis.residuals.forces import actuators_of
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.models import GreyBox
@@ -52,4 +53,7 @@ def test_what_commands_leave_uncertain_is_no_reason_against_adequate(share, unce
     state: Any = SimpleNamespace(windows=windows)
     law = ForceLaw(np.array([0.0, 0.0, 0.0, share * drive[3], 0.0, 0.0]), np.full(6, 0.4), 0.2, 5.0)
     unknown = np.array([0.0, 0.0, 0.0, uncertain * drive[3], 0.0, 0.0])
-    assert negligible(asked, state, law, unknown) is expected
+    assert negligible(asked, state, law, UncertainWrench(unknown, np.zeros(6), 0.1)) is expected
+    # White over 0.1 s, a force of 0.4 s has the same power at low frequencies at sqrt(1 / 8) of its rms.
+    white = UncertainWrench(np.zeros(6), unknown * np.sqrt(8.0), 0.1)
+    assert negligible(asked, state, law, white) is expected

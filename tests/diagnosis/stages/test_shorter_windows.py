@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
@@ -66,8 +67,9 @@ def test_the_share_of_the_noise_is_the_ratio_of_the_squares():
 def test_names_that_leave_the_noise_alone_are_taken_and_said(asked):
     seen = []
 
-    def search(what, windows):
+    def search(what, windows, worthwhile):
         seen.append(windows.mask.shape[1] * STEP)
+        assert worthwhile(state(1.5)) and not worthwhile(state(5.0))
         return state(1.1, ("body_lift",))
 
     given, found = search_over_shorter(asked, state(5.0), search)
@@ -108,3 +110,14 @@ def test_too_few_samples_or_a_model_that_runs_away_keep_the_answer(asked, monkey
     assert search_over_shorter(asked, before, refuse) == (asked, before)
     slow = replace(asked, log=SimpleNamespace(runs=[SimpleNamespace(dt=0.5)]))
     assert search_over_shorter(slow, before, refuse) == (slow, before)
+
+
+def test_a_search_is_given_up_after_the_first_round_that_is_not_worth_it(monkeypatch):
+    module = importlib.import_module("auvnn.diagnosis.search")
+    rounds = iter([2.0, 5.0, 1.0])
+    monkeypatch.setattr(module, "fit_null", lambda *_: SimpleNamespace(ended=False))
+    monkeypatch.setattr(
+        module, "search_round", lambda *_: SimpleNamespace(ended=False, current=explanation(next(rounds)))
+    )
+    left = module.search(None, None, lambda found: noise_share(found.current) >= 0.5)
+    assert noise_share(left.current) == pytest.approx(0.2) and next(rounds) == 1.0

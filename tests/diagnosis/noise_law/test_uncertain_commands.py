@@ -1,0 +1,133 @@
+"""What commands between samples leave uncertain, against closed forms and a controller made by hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.noise_law.command_holding import Holding
+from auvnn.diagnosis.noise_law.uncertain_commands import (
+    UncertainWrench,
+    law_differences,
+    noise_answered,
+    uncertain_wrench,
+)
+from auvnn.models import GreyBox, load
+from tests.small_logs import make_log, small_vehicle
+
+
+def fitted(model, log):
+    windows, layout = windows_for(model, log), lay_out(model, [])
+    return fit_hypothesis(layout, windows, list(layout.names), (), iterations=4), windows
+
+
+def commanded(values, curve=lambda u: u):
+    """Return a model whose six commands are its wrench by a curve, and windows of one command in surge."""
+    command = torch.zeros(1, len(values), 6, dtype=torch.float64)
+    command[0, :, 0] = torch.as_tensor(values)
+    actuators = SimpleNamespace(static=curve, allocation=torch.eye(6, dtype=torch.float64))
+    windows: Any = Shape(Given(command), length=np.array([len(values) - 2]))
+    return SimpleNamespace(actuators=actuators), windows
+
+
+@dataclass(frozen=True)
+class Given:
+    """What is given to a vehicle."""
+
+    command: torch.Tensor
+    fins: torch.Tensor | None = None
+
+
+@dataclass(frozen=True)
+class Shape:
+    """As much of windows as is looked at."""
+
+    inputs: Given
+    length: np.ndarray
+    nu: torch.Tensor | None = None
+    warmup: int = 2
+
+
+def test_a_parabola_of_commands_leaves_the_sixth_of_its_bend_uncertain():
+    """The mean of b t^2 over an interval is b (k^2 + k + 1/3), that of its chord b (k^2 + k + 1/2)."""
+    k = np.arange(30.0)
+    model, windows = commanded(0.02 * k**2)
+    found = law_differences(model, windows, Holding("linear", 0.5, 9.0, 9.0))
+    assert found[0] == pytest.approx(0.02 / 6.0, rel=1e-9) and not found[1:].any()
+
+
+def test_a_curve_of_the_thrust_adds_what_the_mean_command_does_not_give():
+    """A straight line of commands with T = c^2: the mean of the square less the square of the mean is step^2 / 12."""
+    model, windows = commanded(0.1 * np.arange(20.0), lambda u: u**2)
+    found = law_differences(model, windows, Holding("smooth", 0.5, 9.0, 9.0))
+    assert found[0] == pytest.approx(0.1**2 / 12.0, rel=1e-9)
+
+
+def test_commands_that_change_within_intervals_leave_half_their_step():
+    model, windows = commanded(0.3 * np.arange(20.0))
+    assert law_differences(model, windows, Holding("ahead", 0.3, 9.0, 9.0))[0] == pytest.approx(0.15)
+
+
+def test_noisy_commands_leave_the_difference_of_line_and_average():
+    """Of white noise with variance 1: (1, 3, 3, 1) / 8 less (0, 4, 4, 0) / 8 has the variance 4 / 64."""
+    model, windows = commanded(np.random.default_rng(1).normal(size=20000))
+    found = law_differences(model, windows, Holding("averaged", 0.5, 9.0, 9.0, 4))
+    assert found[0] == pytest.approx(0.25, rel=0.02)
+
+
+def test_the_power_at_low_frequencies_is_compared():
+    """White over 0.05 s with rms 2: an Ornstein-Uhlenbeck force of 0.4 s has as much at 2 sqrt(0.05 / 0.8) = 0.5."""
+    white = UncertainWrench(np.zeros(6), np.full(6, 2.0), 0.05)
+    assert white.over(np.full(6, 0.4)) == pytest.approx(np.full(6, 0.5))
+    assert white.over(np.full(6, 0.01)) == pytest.approx(np.full(6, 2.0))
+    smooth = UncertainWrench(np.full(6, 3.0), np.full(6, 4.0), 0.05)
+    assert smooth.over(np.full(6, 1e9)) == pytest.approx(np.full(6, 3.0), abs=1e-3)
+    assert smooth.to_dict() == pytest.approx(dict.fromkeys("XYZKMN", 5.0))
+
+
+def test_commands_that_answer_the_noise_leave_its_share_uncertain():
+    """Heave's command is -30 N s/m of the measured velocity: of its noise of 0.004 m/s that is 0.12 N."""
+    model = GreyBox(small_vehicle(), actuation="wrench")
+    log = make_log(model, duration=40.0, rate=10.0, noise=1.0)
+    first, windows = fitted(model, log)
+    assert (noise_answered(first, windows) < 0.25 * 0.12).all()
+    noise = torch.as_tensor(np.random.default_rng(3).normal(size=windows.nu.shape[:2])) * 0.004
+    nu, command = windows.nu.clone(), windows.inputs.command.clone()
+    nu[..., 2] += noise
+    command[:, windows.warmup :, 2] -= 30.0 * noise
+    answering = replace(windows, nu=nu, inputs=replace(windows.inputs, command=command))
+    found = noise_answered(first, answering)
+    # Half of the noise is the log's own, which nothing answers: what is regressed on is noisy itself.
+    assert 0.5 * 0.12 < found[2] < 1.1 * 0.12 and (np.delete(found, 2)[:2] < 0.4 * found[2]).all()
+
+
+def test_what_is_held_is_uncertain_only_as_far_as_it_answers_noise():
+    model = GreyBox(small_vehicle())
+    first, windows = fitted(model, make_log(model, duration=20.0, rate=5.0, noise=0.3))
+    held = uncertain_wrench(first, windows, Holding("held", 0.0, 0.0, 0.0))
+    assert not held.smooth.any() and held.step == pytest.approx(0.2)
+    straight = uncertain_wrench(first, windows, Holding("linear", 0.5, 9.0, 9.0))
+    assert straight.smooth.any() and straight.white == pytest.approx(held.white)
+
+
+def test_fins_in_the_flow_count_too():
+    """A stern plane that swings by one degree from sample to sample: by the lift of a flat fin, all but the noise."""
+    model = load("remus100")
+    fins = np.zeros((40, 4))
+    fins[::2, 2:], fins[1::2, 2:] = 0.01, -0.01
+    nu = torch.zeros(1, 38, 6, dtype=torch.float64)
+    nu[..., 0] = 1.5
+    given = Given(torch.zeros(1, 40, 1, dtype=torch.float64), torch.as_tensor(fins)[None])
+    windows: Any = Shape(given, length=np.array([38]), nu=nu)
+    found = law_differences(model, windows, Holding("ahead", 0.3, 9.0, 9.0))
+    fin = model.vehicle.fins[2]
+    lift = 0.5 * model.vehicle.water_density * fin.area * fin.lift_slope * 1.5**2 * 0.01
+    assert np.hypot(found[1], found[2]) == pytest.approx(2.0 * lift, rel=0.02)
