@@ -58,7 +58,10 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         return state, {}, []
     least, held = _held(state)
     windows = held.applied(state.windows)
-    uncertain = uncertain_wrench(least, state.windows, held)
+    try:
+        uncertain = uncertain_wrench(least, state.windows, held)
+    except UNSOLVED:
+        uncertain = UncertainWrench(np.zeros(6), np.zeros(6), 0.0)
     asked.say("asking whether the sensors' noise is white")
     try:
         colour = noise_colour(least, windows, asked.floor)

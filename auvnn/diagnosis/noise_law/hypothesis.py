@@ -27,6 +27,10 @@ Array = NDArray[np.float64]
 # How often parameters that would leave their bounds are held there.
 ROUNDS = 3
 HORIZON = "5"
+# Members of a group that the log cannot tell apart, at most.
+GROUP = 3
+# Share of the gain by which an effect that is known to be confused with the best may fall short of it.
+CLOSE = 0.05
 
 
 @dataclass(frozen=True)
@@ -144,19 +148,42 @@ def p_value_of(layout: Layout, after: Hypothesis, before: Hypothesis) -> float:
     return float(chi2.sf(max(before.misfit - after.misfit, 0.0), degrees))
 
 
-def tied(layout: Layout, good: list[Hypothesis]) -> list[Hypothesis]:
-    """Return the best and those that the log cannot tell from it, the plainer one first."""
+def tied(layout: Layout, good: list[Hypothesis], before: Hypothesis) -> list[Hypothesis]:
+    """Return the best and those that the log cannot tell from it, the plainer one first.
+
+    The law of the force is no more than near the truth, and what it gets wrong grows with what is explained: of two
+    effects that the catalogue knows to be confused, one that explains nearly as much as the best is not refuted.
+
+    Args:
+        layout: for the number of an effect's parameters.
+        good: explanations with one effect more, the most evident first.
+        before: the explanation without it.
+    """
     best = good[0]
     for other in good[1:]:
         # Evidence weighs how large parameters might have been, which is a guess: it must not outvote the fit.
         extra = len(layout.columns[other.name])
         if best.misfit - other.misfit > chi2.isf(ALPHA_REFUTED, extra):
             best = other
-    rest = [h for h in good if h is not best and best.evidence - h.evidence < ODDS]
     mine = len(layout.columns[best.name])
-    rest = [h for h in rest if h.misfit - best.misfit < chi2.isf(ALPHA_REFUTED, mine)]
+    alike, near = [], []
+    for h in good:
+        if h is best:
+            continue
+        worse = h.misfit - best.misfit
+        if best.evidence - h.evidence < ODDS and worse < chi2.isf(ALPHA_REFUTED, mine):
+            alike.append(h)
+        elif confused(best.name, h.name) and worse < CLOSE * (before.misfit - best.misfit):
+            near.append(h)
+    # Those that are only nearly as good never make a group too large to be given.
+    rest = [*alike, *near[: max(GROUP - 1 - len(alike), 0)]]
     plainer = effect_class(best.name).plainer
     return sorted([best, *rest], key=lambda h: h.name not in plainer)
+
+
+def confused(one: str, other: str) -> bool:
+    """Whether the catalogue knows that one effect is confused with the other."""
+    return other in effect_class(one).confused_with or one in effect_class(other).confused_with
 
 
 def predicts_better(after: Hypothesis, before: Hypothesis, least: float) -> bool:

@@ -24,6 +24,7 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, fol
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, shapes
 from auvnn.diagnosis.noise_law.estimate_law import estimate
 from auvnn.diagnosis.noise_law.hypothesis import (
+    GROUP,
     Hypothesis,
     WithForce,
     free_running_cost,
@@ -57,8 +58,6 @@ ALPHA_NAME, ALPHA_FURTHER = 0.01, 0.001
 GAIN, GAIN_FURTHER = 1.0, 2.0
 # Fitted in full beside those that the first search has fitted: so many of those that lead under the law.
 LEADERS = 3
-# Members of a group that the log cannot tell apart, at most.
-GROUP = 3
 STEPS = 6
 # Share of the odds that a further name needs, which its test must promise before it is fitted.
 WORTH_A_FIT = 0.3
@@ -171,7 +170,7 @@ class ForceSearch:
             ]
             if not good:
                 break
-            group = tied(self.layout, good)
+            group = tied(self.layout, good, current)
             if len(group) > GROUP:
                 break
             names = [h.name for h in group]

@@ -18,11 +18,11 @@ from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.command_holding import LINEAR, Holding, between
+from auvnn.diagnosis.residuals.forces import fins_of
 from auvnn.effects.base import AXES
 from auvnn.estimation.window_normal_equations import linearise
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.physics.fins import fin_force
 
 Array = NDArray[np.float64]
 # The difference of white noise from the mean of its neighbours has so many times its variance.
@@ -178,24 +178,9 @@ def _rms(differences: list[Tensor], windows: Windows) -> Array:
 
 def _wrench(model: GreyBox, windows: Windows) -> Tensor:
     """Return the wrench of commands and fins, (B, L - 1, 6)."""
-    return _thrust(model, windows.inputs.command, windows) + _fins(model, windows)
+    return _thrust(model, windows.inputs.command, windows) + fins_of(model, windows)[:, :-1]
 
 
 def _thrust(model: GreyBox, command: Tensor, windows: Windows) -> Tensor:
     """Return the wrench of commands, actuators settled, (B, L - 1, 6)."""
     return (model.actuators.static(command) @ model.actuators.allocation.mT)[:, windows.warmup : -1]
-
-
-def _fins(model: GreyBox, windows: Windows) -> Tensor | float:
-    """Return the wrench of the fins in still water at the measured velocities, (B, L - 1, 6); NaN where these lack."""
-    angles = windows.inputs.fins
-    if angles is None:
-        return 0.0
-    vehicle = model.vehicle
-    place, axis, area, slope, stall = (
-        torch.tensor(np.array([getattr(f, n) for f in vehicle.fins]), dtype=torch.float64)
-        for n in ("position", "axis", "area", "lift_slope", "stall")
-    )
-    density = float(vehicle.water_density)
-    wrench = fin_force(windows.nu, angles[:, windows.warmup :], place, axis, area, slope, stall, density)
-    return wrench[:, :-1]

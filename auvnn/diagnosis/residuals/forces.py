@@ -15,6 +15,7 @@ from auvnn.metrics.free_run import predict
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 from auvnn.physics.attitude import quat_to_matrix
+from auvnn.physics.fins import fin_force
 
 Array = NDArray[np.float64]
 AXES = ("X", "Y", "Z", "K", "M", "N")
@@ -52,14 +53,28 @@ def forces_of(found: FittedHypothesis, windows: Windows, names: Sequence[str]) -
 
 
 def actuators_of(model: GreyBox, windows: Windows) -> Array:
-    """Return the root mean square wrench that the commands stand for, actuators settled, (6,), N and N m."""
+    """Return the root mean square wrench that commands and fins stand for, actuators settled, (6,), N and N m."""
     command = windows.inputs.command[:, windows.warmup :]
     with torch.no_grad():
-        wrench = model.actuators.static(command) @ model.actuators.allocation.mT
+        wrench = model.actuators.static(command) @ model.actuators.allocation.mT + fins_of(model, windows)
     seen = torch.as_tensor(np.arange(command.shape[1]) < windows.length[:, None])
     kept = wrench[seen]
     kept = kept[torch.isfinite(kept).all(-1)]
     return torch.sqrt((kept**2).mean(0)).numpy() if len(kept) else np.zeros(6)
+
+
+def fins_of(model: GreyBox, windows: Windows) -> Tensor:
+    """Return the wrench of the fins in still water at the measured velocities, (B, L, 6); zeros without fins."""
+    angles = windows.inputs.fins
+    if angles is None:
+        return torch.zeros(1, windows.inputs.command.shape[1] - windows.warmup, 6, dtype=torch.float64)
+    vehicle = model.vehicle
+    place, axis, area, slope, stall = (
+        torch.tensor(np.array([getattr(f, n) for f in vehicle.fins]), dtype=torch.float64)
+        for n in ("position", "axis", "area", "lift_slope", "stall")
+    )
+    density = float(vehicle.water_density)
+    return fin_force(windows.nu, angles[:, windows.warmup :], place, axis, area, slope, stall, density)
 
 
 def share_of(force: Array, actuators: Array) -> Array:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.noise_law.hypothesis import tied
 from auvnn.models import GreyBox
 from tests.diagnosis.noise_law.wandering import wandering_log
 from tests.small_logs import small_vehicle
@@ -44,3 +48,40 @@ def test_a_force_alone_has_no_name():
 def test_without_a_force_the_answer_is_the_plain_search():
     found = said({"net_buoyancy": {"force": 8.0}}, rms=np.zeros(6))
     assert found.missing == ["net_buoyancy"] and "force" not in found.stochastic
+
+
+def hypothesis(name, misfit, evidence=None):
+    """Return as much of a hypothesis as a comparison looks at."""
+    return SimpleNamespace(name=name, misfit=misfit, evidence=-0.5 * misfit if evidence is None else evidence)
+
+
+COLUMNS: Any = SimpleNamespace(
+    columns={
+        "added_mass": range(6),
+        "trapped_water": range(1),
+        "net_buoyancy": range(1),
+        "thruster_lag": range(8),
+    }
+)
+
+
+def names_of(good, before=10000.0):
+    return [h.name for h in tied(COLUMNS, good, hypothesis("", before))]
+
+
+def test_what_is_known_to_be_confused_and_explains_nearly_as_much_is_tied():
+    best, other = hypothesis("added_mass", 5000.0), hypothesis("trapped_water", 5200.0)
+    assert names_of([best, other]) == ["added_mass", "trapped_water"]
+    # Beyond a twentieth of the gain it is refuted; and what is not known to be confused is refuted much earlier.
+    assert names_of([best, hypothesis("trapped_water", 5300.0)]) == ["added_mass"]
+    assert names_of([best, hypothesis("net_buoyancy", 5200.0)]) == ["added_mass"]
+    assert names_of([best, hypothesis("net_buoyancy", 5000.5)]) == ["added_mass", "net_buoyancy"]
+
+
+def test_the_nearly_as_good_do_not_make_a_group_too_large():
+    good = [hypothesis("added_mass", 5000.0), hypothesis("net_buoyancy", 5000.5)]
+    assert names_of([*good, hypothesis("trapped_water", 5100.0), hypothesis("thruster_lag", 5150.0)]) == [
+        "added_mass",
+        "net_buoyancy",
+        "trapped_water",
+    ]
