@@ -22,7 +22,7 @@ class Biofouling(Effect):
     cause = "drag grows with time"
     symbol = "k_f"
     reference = "Schultz et al. (2015), Biofouling 31; Anderlini et al. (2021), IEEE JOE"
-    confused_with = ("voltage_droop", "quadratic_damping")
+    confused_with = ("voltage_droop", "quadratic_damping", "tether")
     manoeuvre = "coast_down"
     told_apart_by = "the same coast-down repeated early and late"
     plainer = ("quadratic_damping",)

@@ -6,14 +6,39 @@ first search may have found it together with others only; its values there are w
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
+from auvnn.diagnosis.noise_law.hypothesis import Hypothesis, confused
+from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
 
 STEPS = 6
+# Effects that are known to be confused with the one that leads: so many of them are fitted in full.
+RIVALS = 2
+
+
+def rivals_of(found: Sequence[Hypothesis], scores: Mapping[str, Score], level: float) -> list[str]:
+    """Return effects to fit because the catalogue knows them to be confused with the most evident one.
+
+    An effect with many parameters may lead because it imitates one with few, which leads nowhere by itself: a cable of
+    which more is dragged the farther the vehicle goes is drag that grows with time.
+
+    Args:
+        found: explanations that were judged.
+        scores: of the tests, by effect.
+        level: at which chance among all effects is rejected.
+    """
+    if not found:
+        return []
+    best, known = max(found, key=lambda h: h.evidence), {h.name for h in found}
+    sure = level / max(sum(s.degrees > 0 for s in scores.values()), 1)
+    names = [n for n, s in scores.items() if n not in known and s.degrees and confused(best.name, n)]
+    names = [n for n in names if scores[n].p_value < sure]
+    return sorted(names, key=lambda n: scores[n].p_value)[:RIVALS]
 
 
 def fitted_alone(asked: Setting, state: State) -> list[FittedHypothesis]:

@@ -33,6 +33,7 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     predicts_better,
     tied,
 )
+from auvnn.diagnosis.noise_law.leaders import rivals_of
 from auvnn.diagnosis.noise_law.sums import CELL, force_sums
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.score_tests.score import Score
@@ -198,14 +199,20 @@ class ForceSearch:
         fitted: Sequence[FittedHypothesis], odds: float,
     ) -> list[Hypothesis]:  # fmt: skip
         """Return the leading effects, fitted and judged, the most evident first."""
-        assert current.estimate.law is not None
         leading = self._leading(tested, current, base, chosen, fitted, WORTH_A_FIT * odds)
-        found = []
-        for explanation in leading:
+        found = self._all_judged(leading, current)
+        rivals = () if chosen else rivals_of(found, tested.scores, ALPHA_NAME)
+        more = [self._one(n, tested.scores[n], tested.at, current, base, chosen) for n in rivals]
+        return sorted([*found, *self._all_judged([e for e in more if e], current)], key=lambda h: -h.evidence)
+
+    def _all_judged(self, explanations: Sequence[FittedHypothesis], current: Hypothesis) -> list[Hypothesis]:
+        law, found = current.estimate.law, []
+        assert law is not None
+        for explanation in explanations:
             # One whose free running grows so that nothing can be said of it is passed over.
             with suppress(*UNSOLVED):
-                found.append(self.judged(explanation, current.estimate.law))
-        return sorted(found, key=lambda h: -h.evidence)
+                found.append(self.judged(explanation, law))
+        return found
 
     def _leading(
         self,

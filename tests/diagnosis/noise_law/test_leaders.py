@@ -10,7 +10,7 @@ import pytest
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.noise_law.leaders import fitted_alone
+from auvnn.diagnosis.noise_law.leaders import fitted_alone, rivals_of
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
 
@@ -33,3 +33,21 @@ def test_an_effect_that_was_named_second_is_fitted_by_itself():
     assert found[("constant_force",)] is alone
     value = float(found[("net_buoyancy",)].fitted.theta[0])
     assert value == pytest.approx(5.0, abs=0.5)
+
+
+def test_what_is_known_to_be_confused_with_the_leader_is_fitted_too():
+    def score(p_value, degrees=1):
+        return SimpleNamespace(p_value=p_value, degrees=degrees)
+
+    found: Any = [
+        SimpleNamespace(name="tether", evidence=-10.0),
+        SimpleNamespace(name="waves", evidence=-20.0),
+    ]
+    scores: Any = {
+        "tether": score(1e-9), "waves": score(1e-9), "payload": score(1e-9), "biofouling": score(1e-5),
+        "ocean_current": score(1e-7), "net_buoyancy": score(0.3), "constant_force": score(1e-6, degrees=0),
+    }  # fmt: skip
+    # "payload" is not known to be confused with a tether, and of a constant force such a log says nothing.
+    assert rivals_of(found, scores, 0.01) == ["ocean_current", "biofouling"]
+    assert rivals_of(found, scores, 1e-5) == ["ocean_current"]
+    assert rivals_of([], scores, 0.01) == []
