@@ -83,7 +83,13 @@ def uncertain_wrench(end: FittedHypothesis, windows: Windows, held: Holding) -> 
 
 
 def law_differences(model: GreyBox, windows: Windows, held: Holding) -> Array:
-    """Return the rms of the wrench by which other laws of the commands differ from the one that was found, (6,)."""
+    """Return the rms of the wrench by which other laws of the commands differ from the one that was found, (6,).
+
+    Args:
+        model: whose actuators turn commands into a wrench.
+        windows: of commands at the log's samples, as read.
+        held: how commands go by this log; not held ones, which leave nothing open.
+    """
     command = windows.inputs.command
     following = torch.cat([command[:, 1:], command[:, -1:]], dim=1)
 
