@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from auvnn.errors import InputError
 from auvnn.logs.readers import ros_definitions
@@ -147,6 +148,8 @@ class _Columns:
         # Eight bytes a message: a list of Python's integers takes five times as much.
         self.arrivals, self.stamps = array("q"), array("q")
         self.columns: dict[str, array[Any]] = {}
+        # Of a sequence that is asked for, the items lie row by row, as a log's commands do: they are not copied again.
+        self.rows: dict[str, tuple[list[str], array[Any]]] = {}
         self.decoded = self.count = self.last = 0
 
     def add(self, stamp: int, data: bytes) -> None:
@@ -169,9 +172,13 @@ class _Columns:
             count = len(self.waiting)
             part = self.decoder.decode(self.waiting)
             sec, nano = (part.pop(name, None) for name in _STAMP)
-            none = np.zeros(count, np.int64)
-            whole = none if sec is None or nano is None else sec * 1_000_000_000 + nano
-            self.stamps.frombytes(whole.astype(np.int64, copy=False).tobytes())
+            if sec is not None and nano is not None:
+                if not self.stamps:
+                    self.stamps.frombytes(bytes(8 * self.decoded))
+                self.stamps.frombytes((sec * 1_000_000_000 + nano).tobytes())
+            elif self.stamps:
+                self.stamps.frombytes(bytes(8 * count))
+            self._side_by_side(part, count)
             for name, values in part.items():
                 if name not in self.columns:
                     if len(self.columns) >= _FIELDS and self.decoder.wanted is None:
@@ -183,6 +190,20 @@ class _Columns:
                     column.extend(_missing(np.dtype("f8" if column.typecode == "d" else "i8"), count))
             self.decoded += count
         self.waiting, self.bytes = [], 0
+
+    def _side_by_side(self, part: dict[str, NDArray[Any]], count: int) -> None:
+        """Take the items of the sequences that are asked for out of a batch and keep them row by row."""
+        assert self.decoder is not None
+        if not self.decoded and self.decoder.wanted is not None:
+            for name, values in part.items():
+                if name.endswith("]") and values.dtype == np.float64:
+                    self.rows.setdefault(name[: name.rindex("[")], ([], array("d")))[0].append(name)
+        for names, kept in self.rows.values():
+            block = np.full((count, len(names)), np.nan)
+            for k, name in enumerate(names):
+                if name in part:
+                    block[:, k] = part.pop(name)
+            kept.frombytes(block.tobytes())
 
     def note(self, where: str, notes: Notes) -> None:
         if self.decoder is not None and self.decoder.bad:
@@ -201,6 +222,8 @@ class _Columns:
         self.stamps = array("q")
         kinds = {"d": np.float64, "q": np.int64}
         columns = {n: np.frombuffer(c, kinds[c.typecode]) for n, c in self.columns.items()}
+        for names, kept in self.rows.values():
+            columns |= zip(names, np.frombuffer(kept, np.float64).reshape(-1, len(names)).T, strict=True)
         return Topic(self.channel.topic, self.channel.kind, t, columns, words, arrival, self.count)
 
 

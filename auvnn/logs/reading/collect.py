@@ -112,18 +112,22 @@ def collect(
         rows = _without_repeats(table, mine, rows, here, collector.repairs)
         stretches, notes = clock.order_in_time(mine if len(rows) == len(mine) else t[rows], here)
         collector.repairs.extend(notes)
-        for i, stretch in enumerate(stretches):
+        for i in range(len(stretches)):
             if i:
                 highest += 1
-            taken = rows[stretch]
+            taken = rows[stretches[i]]
             # A log that needs no sorting is not copied: it may be large.
             whole = len(taken) == table.rows and bool((np.diff(taken) == 1).all())
             pick = slice(None) if whole else taken
             columns = {n: c[pick].astype(np.float64, copy=False) for n, c in table.columns.items()}
-            if whole and consume:
-                table.columns.clear()
-            del taken
             columns["t"] = clock_origin.counted_from(t[pick], begin.origin)
+            del taken
+            if whole and consume:
+                # This was all: the table, and row numbers as large as a column, are given up before the run is built.
+                table.columns.clear()
+                stretches.clear()
+                groups.clear()
+                del t, mine, rows
             columns, notes = delays.undo_delays(columns, plan, here)
             collector.repairs.extend(notes)
             columns, notes = several_rates.settle(columns, plan, here)

@@ -25,13 +25,14 @@ def stacked(columns: list[Array]) -> Array:
 
 
 def _one(columns: list[Array]) -> Array | None:
-    whole = columns[0].base
-    if not isinstance(whole, np.ndarray) or whole.shape != (len(columns[0]), len(columns)):
+    owner = columns[0].base
+    if not isinstance(owner, np.ndarray) or owner.size != len(columns[0]) * len(columns):
         return None
-    if whole.dtype != np.float64 or not whole.flags.c_contiguous:
+    if owner.dtype != np.float64 or not owner.flags.c_contiguous:
         return None
+    whole = owner.reshape(len(columns[0]), len(columns))
     same = all(
-        c.base is whole and c.strides == whole.strides[:1] and c.ctypes.data == whole.ctypes.data + 8 * i
+        c.base is owner and c.strides == whole.strides[:1] and c.ctypes.data == whole.ctypes.data + 8 * i
         for i, c in enumerate(columns)
     )
     return whole if same else None

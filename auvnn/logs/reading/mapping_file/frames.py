@@ -27,7 +27,7 @@ def position_to_ned(values: Array, world: str) -> Array:
     return values[:, [1, 0, 2]] * np.array([1.0, 1.0, -1.0]) if world == "ENU" else values
 
 
-def quaternion_to_ned_frd(q: Array, body: str, world: str) -> Array:
+def quaternion_to_ned_frd(q: Array, body: str, world: str, own: bool = False) -> Array:
     """Return attitudes body to world (N, 4) as FRD to NED, given in these frames.
 
     With R' = W R B, where B turns FRD into FLU and W turns ENU into NED.
@@ -36,10 +36,11 @@ def quaternion_to_ned_frd(q: Array, body: str, world: str) -> Array:
         q: quaternions (w, x, y, z), (N, 4).
         body: "FRD" or "FLU".
         world: "NED" or "ENU".
+        own: whether the result may take the place of `q`.
     """
     if body != "FLU" and world != "ENU":
         return q
-    out = np.empty(q.shape)
+    out = q if own else np.empty(q.shape)
     for at in range(0, len(q), _BLOCK):
         part = q[at : at + _BLOCK]
         if body == "FLU":

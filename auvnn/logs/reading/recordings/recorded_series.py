@@ -66,7 +66,7 @@ def _series(
     rule = plan.topics.get(topic.name) or plan.topics.get(base_name(topic.name))
     body = (rule.body if rule else None) or plan.body
     world = (rule.world if rule else None) or plan.world
-    t = times.of(topic) - delay
+    t = times.of(topic) - delay if delay else times.of(topic)
     data = dict(zip(names, values, strict=True))
     values.clear()  # what the columns are turned into takes their place
     changed = [plan.columns[n].more for n in names]
@@ -76,7 +76,8 @@ def _series(
     elif world == "ENU" and (in_world or set(names) & set(POSITION)):
         data = _to_ned(data, VELOCITY[:3] if in_world else POSITION)
     elif body == "FLU" and not in_world:
-        data = {n: -v if n in _FLIPS else v for n, v in data.items()}
+        for name in _FLIPS & {*data}:
+            data[name] = -data[name]  # one after the other: each takes the place of what it was
     if any(m.difference for m in changed):
         return [_difference(names, data, t, topic, plan)]
     if changed[0].over is not None:
@@ -119,7 +120,8 @@ def _attitude(
             )
         order = ("qz", "qw", "qx", "qy") if plan.quaternion == "xyzw" else QUATERNION
         q = stacked([data.pop(n) for n in order])
-        q = frames.quaternion_to_ned_frd(q, body, world)
+        # Memory of another array is the recording's, which must stay as it is.
+        q = frames.quaternion_to_ned_frd(q, body, world, own=q.base is None)
     return dict(zip(QUATERNION, q.T, strict=True))
 
 

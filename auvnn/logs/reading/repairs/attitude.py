@@ -60,12 +60,13 @@ def from_quaternions(raw: Array, where: str) -> tuple[Array, list[Repair]]:
         words = f"quaternions that are no rotation (norm down to {norm[wrong].min():.2g}) read as missing"
         cure = "interpolate attitudes as rotations, not number by number"
         repairs.append(Repair(words, where, n_wrong, cure=cure))
-    quaternion = raw.copy()
+    quaternion = raw
     if n_wrong or not present.all():
+        quaternion = raw.copy()
         quaternion[wrong | ~present] = np.nan
     uneven = present & ~wrong & (np.abs(norm - 1.0) > _EXACT)
     if uneven.any():
-        quaternion /= np.where(uneven, norm, 1.0)[:, None]
+        quaternion = quaternion / np.where(uneven, norm, 1.0)[:, None]
     visible = int((np.abs(norm[present & ~wrong] / typical - 1.0) > 1e-6).sum())
     if visible:
         repairs.append(Repair("quaternions scaled to unit length", where, visible, "info"))
@@ -73,7 +74,7 @@ def from_quaternions(raw: Array, where: str) -> tuple[Array, list[Repair]]:
     flips = int((np.diff(turned[present & ~wrong]) != 0.0).sum())
     if flips:
         repairs.append(Repair("sign flips of the quaternion (the same attitude) undone", where, flips))
-        quaternion *= turned[:, None]
+        quaternion = quaternion * turned[:, None]
     return quaternion, repairs
 
 
