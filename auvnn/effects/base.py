@@ -49,6 +49,8 @@ class Effect(nn.Module):
     reference: ClassVar[str]
     channels: ClassVar[tuple[str, ...]] = ()
     excludes: ClassVar[tuple[str, ...]] = ()
+    # Parameters of shape in which what the effect does is linear while it is small: the place of a load.
+    levers: ClassVar[tuple[str, ...]] = ()
     # For people: effects that leave a similar trace, and the manoeuvre (configs/excitation) that tells them apart.
     confused_with: ClassVar[tuple[str, ...]] = ()
     manoeuvre: ClassVar[str] = ""
@@ -131,22 +133,6 @@ class Effect(nn.Module):
         The test is corrected for taking the best of them.
         """
         return [{}]
-
-    @classmethod
-    def closer(
-        cls, parameters: tuple[Parameter, ...], extent: Extent, start: dict[str, float]
-    ) -> list[dict[str, float]]:
-        """Return further starts near the best one, where an effect has more shapes than can always be asked for.
-
-        They are asked for where the best start promises much or nothing else does; an empty list, the default, says
-        that there are none.
-
-        Args:
-            parameters: of the effect, as `describe` returns them.
-            extent: how far the log reaches in time and space.
-            start: the best start so far, parameters by name.
-        """
-        return []
 
     @classmethod
     def closest(

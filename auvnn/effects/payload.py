@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import torch
@@ -40,6 +39,7 @@ class Payload(Effect):
     confused_with = ("net_buoyancy", "cg_offset", "flooding")
     manoeuvre = "multisine"
     told_apart_by = "the same motion before and after the load is taken, turning included"
+    levers = PLACES
     plainer = ("net_buoyancy",)
     time_varying = True
 
@@ -60,18 +60,6 @@ class Payload(Effect):
     def starts(cls, parameters: tuple[Parameter, ...], extent: Extent) -> list[dict[str, float]]:
         """Return eight times, evenly over what was recorded."""
         return [{"time": extent.moment((k + 0.5) / TIMES)} for k in range(TIMES)]
-
-    @classmethod
-    def closer(
-        cls, parameters: tuple[Parameter, ...], extent: Extent, start: dict[str, float]
-    ) -> list[dict[str, float]]:
-        """Return eight places at the time found: what a load turns shows more than what it lifts."""
-        half = {p.name: 0.5 * p.scale for p in parameters if p.name in PLACES}
-        corners = itertools.product((-1.0, 1.0), repeat=3)
-        return [
-            {**start, **{n: sign * half[n] for n, sign in zip(PLACES, signs, strict=True)}}
-            for signs in corners
-        ]
 
     @classmethod
     def closest(

@@ -11,7 +11,7 @@ import torch
 from auvnn.effects import Extent
 from auvnn.models import GreyBox
 from auvnn.testing.effect_derivatives import has_right_gradient, recovers, transforms
-from auvnn.testing.effect_texts import Kind, _all_starts, describes_itself, refuses
+from auvnn.testing.effect_texts import Kind, describes_itself, refuses
 from auvnn.testing.scene import (
     EXAMPLE,
     THETA,
@@ -40,7 +40,7 @@ def vanishes(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters
     """
     scene, expected = _without(vehicle, actuation)
     described = kind.describe(vehicle, actuation)
-    shapes = [{}, *_all_starts(kind, described, Extent(0.0, 1.0, 1.0, (3.0, 5.0)))[:5]]
+    shapes = [{}, *kind.starts(described, Extent(0.0, 1.0, 1.0, (3.0, 5.0)))[:5]]
     shapes.append({p.name: v for p in described if p.shape for v in (p.probes or (p.null + 0.3 * p.scale,))})
     for shape in shapes:
         null = Predictor(GreyBox(vehicle, [kind.build(vehicle, actuation, shape)], actuation=actuation))

@@ -59,8 +59,9 @@ def describes_itself(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "t
         require(all(p.low <= x <= p.high for x in p.probes), f"{where}: a probe is out of bounds")
     require(not all(p.shape for p in described), f"{name}: every parameter is a shape, none says how much")
     shapes = {p.name for p in described if p.shape}
-    for start in _all_starts(kind, described, Extent(0.0, 60.0, 60.0, (3.0, 8.0))):
+    for start in kind.starts(described, Extent(0.0, 60.0, 60.0, (3.0, 8.0))):
         require(set(start) <= shapes, f"{name}: starts name {sorted(start)}, shapes are {sorted(shapes)}")
+    require(set(kind.levers) <= shapes, f"{name}: levers are {kind.levers}, shapes are {sorted(shapes)}")
     _looks_around(kind, described)
     built = kind.build(vehicle, actuation)
     require(built.values() == {p.name: p.null for p in described}, f"{name} does not start at its null")
@@ -83,12 +84,6 @@ def _looks_around(kind: Kind, described: tuple[Any, ...]) -> None:
                 require(not out, f"{kind.name}: closest looks where {out} is no shape within its bounds")
             shape, level = around[0], level + 1
             require(level < MOST_LEVELS, f"{kind.name}: closest does not end")
-
-
-def _all_starts(kind: Kind, described: tuple[Any, ...], extent: Extent) -> list[dict[str, float]]:
-    """Return an effect's starts, a closer one than the first before the others where there are such."""
-    starts = kind.starts(described, extent)
-    return [*kind.closer(described, extent, starts[0])[:1], *starts]
 
 
 def refuses(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:

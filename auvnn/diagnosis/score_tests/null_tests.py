@@ -13,7 +13,7 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.score_tests.probes import Probed, extent_of, probed
 from auvnn.diagnosis.score_tests.score import Score, similarity
-from auvnn.diagnosis.score_tests.shape_search import ShapeSearch
+from auvnn.diagnosis.score_tests.shape_search import ShapeSearch, best_of
 from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.estimation.priors import set_parameters
 from auvnn.estimation.window_normal_equations import Statistics, linearise, normal_equations
@@ -111,25 +111,27 @@ class NullTests:
     ) -> dict[str, Score]:
         """Return the scores of effects that were looked at more closely, by name.
 
-        An effect of many shapes is looked at at a few. Where one of them takes away more of the errors than any other
-        effect does, or than chance does where no effect is significant, what the shapes in between would take is worth
-        knowing: the errors that a wrong shape leaves count as noise in its test, and may hide it.
+        At its null place an effect on a lever shows what it lifts alone. Amounts and moments are asked for together,
+        and where that takes away more of the errors than any other effect does, or than chance does where no effect is
+        significant, place and time are worth finding: the errors that wrong ones leave count as noise in the test.
         """
         # A stated coefficient that is set free takes what was stated of it away too: its gain is another matter.
         told = {n: s for n, s in scores.items() if s.degrees and n not in self.layout.nuisance}
-        if not told:
-            return {}
-        promises = max(told, key=lambda n: told[n].gain - told[n].degrees)
-        surest = max(told, key=lambda n: told[n].evidence)
-        nothing = len(told) * min(s.p_value for s in told.values()) >= ALPHA
         closer = ShapeSearch(at, self.windows, current, base, chosen, self.extent)
+        seen = {n: on for n in told if closer.due(n) and (on := closer.on_levers(n))}
+        if not seen:
+            return {}
+        joint = {n: best_of(on).score for n, on in seen.items()}
+        by = {**told, **joint}
+        promises = max(by, key=lambda n: by[n].gain - by[n].degrees)
+        surest = max(by, key=lambda n: by[n].evidence)
+        nothing = len(told) * min(s.p_value for s in told.values()) >= ALPHA
         found: dict[str, Score] = {}
-        for n in told if nothing else dict.fromkeys([promises, surest]):
-            promised = chi2.sf(told[n].gain, told[n].degrees)
-            if promised * len(told) >= ALPHA or not closer.due(n):
+        for n in seen if nothing else {promises, surest} & {*seen}:
+            if chi2.sf(joint[n].gain, joint[n].degrees) * len(told) >= ALPHA:
                 continue
             self.say(f"looking at {n} more closely")
-            best = closer.look(n)
+            best = closer.look(n, seen[n])
             if best is not None and best.p_value < told[n].p_value:
                 found[n] = best
         return found

@@ -204,10 +204,14 @@ class Probed:
             name: of the effect that is tested.
             free: effects whose priors are wide.
         """
+        return self.score(self.sums(windows, at), base, name, free)[0]
+
+    def sums(self, windows: Windows, at: FittedHypothesis) -> Statistics:
+        """Return the sums over the windows of a log at a fit, all parameters of the layout in them."""
         model = self.layout.model
         answered = linearise(model, windows, at.fitted.initial, model.effect_names)
         sums, _, _ = normal_equations(windows, answered, at.fitted.sigma)
-        return self.score(sums.finite(), base, name, free)[0]
+        return sums.finite()
 
     def labels(self, name: str) -> list[str]:
         """Return under which names the layout knows an effect: its own, or those of its stand-ins."""

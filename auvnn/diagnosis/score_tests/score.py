@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from auvnn.diagnosis.hypotheses.stated_priors import DETERMINED, FREE, Layout, priors, scales
-from auvnn.diagnosis.score_tests.variance_inflation import TINY, variance_inflation
+from auvnn.diagnosis.score_tests.variance_inflation import TINY, variance_inflation, white_spread
 from auvnn.estimation.nuisance_elimination import NormalEquations, carry_of
 from auvnn.estimation.priors import parameters_of
 from auvnn.estimation.window_normal_equations import Statistics
@@ -26,6 +26,8 @@ from auvnn.estimation.window_normal_equations import Statistics
 Array = NDArray[np.float64]
 # Information on a parameter in units of its plausible scale that leaves it no better known than its prior does.
 BLIND = (DETERMINED**-2 - 1.0) / FREE**2
+# Degrees of freedom of the scores' variance that are believed where there are few windows.
+FEW = 40.0
 
 
 @dataclass(frozen=True)
@@ -120,14 +122,13 @@ def projection(
     return Projection(c, f, left.carry, left.equations.right, left.information)
 
 
-def _explained_share(
-    statistics: Statistics, layout: Layout, base: Sequence[str], effect: str, free: Sequence[str], step: Array
+def _information_by_window(
+    statistics: Statistics, layout: Layout, base: Sequence[str], effect: str, free: Sequence[str]
 ) -> Array:
-    """Return what of the scores by window (B, p) a step of the effect's parameters explains, the base following."""
+    """Return what each window says of an effect's parameters, (B, p, p), the base following."""
     c, f, carry = following(statistics.total, layout, base, effect, free)
-    both = np.concatenate([c, f])
-    moved = statistics.hessian[:, both[:, None], both] @ np.concatenate([step, -carry.T @ step])
-    return moved[:, : len(c)] - moved[:, len(c) :] @ carry.T
+    both, turn = np.concatenate([c, f]), np.hstack([np.eye(len(c)), -carry])
+    return turn @ statistics.hessian[:, both[:, None], both] @ turn.T
 
 
 def following(
@@ -161,10 +162,15 @@ def score(
         free: effects of the base whose priors are wide.
     """
     by_window, gradient, information = project(statistics, layout, base, effect, free)
+    windows = len(by_window)
 
     def factor(step: Array, spent: int) -> float:
         # An effect that shows in few windows makes their scores differ; that is no noise, and is taken out first.
-        left = by_window - _explained_share(statistics, layout, base, effect, free, step)
+        by_itself = _information_by_window(statistics, layout, base, effect, free)
+        left = by_window - by_itself @ step
+        if windows - spent + 1 < FEW:
+            white = white_spread(by_itself, information, statistics.run)
+            return variance_inflation(left, information, statistics.run, white=white)
         return variance_inflation(left, information, statistics.run, spent)
 
     return score_from_sums(layout, effect, gradient, information, factor, len(by_window))
@@ -222,12 +228,28 @@ def score_from_sums(
             - np.linalg.slogdet(beyond)[1]
         )
     degrees = len(values)
-    p_value = float(stats.f.sf(statistic / degrees, degrees, max(windows - degrees, 4)))
+    p_value = float(stats.f.sf(statistic / degrees, degrees, freedom(windows, degrees)))
     estimate = now + scale * (vectors @ along)
     std = scale * np.sqrt(vectors**2 @ spread + unseen)
     std = np.where(posterior < (DETERMINED * FREE) ** 2, std, np.nan)
     gain = float(np.sum((along - centre) ** 2 * values))
     return Score(effect, p_value, statistic, degrees, factor, estimate, std, evidence, gain)
+
+
+def freedom(windows: int, degrees: int) -> float:
+    """Return the degrees of freedom with which the scores' variance is known.
+
+    With many windows, those of a whole covariance of the scores (Hotelling, 1931, Ann. Math. Stat. 2), which is safe
+    where correlation inflates some directions more than others. What is estimated is one number, though, the mean of
+    as many directions as there are parameters, with neighbours at half weight: with few windows, long ones of
+    vehicles without velocities, that is all there is, and it is worth up to `FEW`.
+
+    Args:
+        windows: B.
+        degrees: parameters that are tested.
+    """
+    one_number = degrees * (windows - 1) / (1.0 + 2.0 * 0.5**2)
+    return max(windows - degrees, min(FEW, one_number), 4.0)
 
 
 def _prior_variance(layout: Layout, effect: str, vectors: Array) -> Array | None:

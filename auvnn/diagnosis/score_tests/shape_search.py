@@ -1,4 +1,4 @@
-"""A closer look at effects of more shapes than can always be asked for: an onset, and where the load hangs."""
+"""A closer look at effects that act on a lever: where the load hangs, and the onset in steps that a fit can follow."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess
+from auvnn.diagnosis.score_tests.levers import OnLevers, seen_on_levers, with_levers
 from auvnn.diagnosis.score_tests.probes import Probed, extent_of, narrowed, null_is_no_start, probed
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.effects import Extent, effect_class
@@ -43,34 +44,59 @@ class ShapeSearch:
 
     def due(self, name: str) -> bool:
         """Return whether there is a closer look at an effect."""
+        return bool(effect_class(name).levers)
+
+    def on_levers(self, name: str, starts: Sequence[Mapping[str, float]] | None = None) -> list[OnLevers]:
+        """Return the joint tests of an effect's amounts and of what they turn, at each of its starts, see `levers`.
+
+        Args:
+            name: the effect.
+            starts: shapes, the levers left out; those of the effect where None.
+        """
         kind, described = effect_class(name), self.layout.model.effect(name).parameters_of
-        return any(
-            kind.closer(described, self.extent, shape) for shape in kind.starts(described, self.extent)
+        if not kind.levers:
+            return []
+        starts = kind.starts(described, self.extent) if starts is None else starts
+        at, out = self._beside(name), []
+        for k in range(0, len(starts), NEARER):
+            asked = probed(
+                at, [name], self.extent, {name: with_levers(described, kind.levers, starts[k : k + NEARER])}
+            )
+            out += seen_on_levers(asked, asked.sums(self.windows, self.found), self.base, name, self.free)
+        return out
+
+    def look(self, name: str, seen: Sequence[OnLevers] = ()) -> Score | None:
+        """Return an effect's score by a closer look, the place from what it turns, then the time; None if there is none.
+
+        The score is that at one place and time; what it must stand against is that of all places together.
+
+        Args:
+            name: the effect.
+            seen: what `on_levers` has returned, where that has been asked already.
+        """
+        seen = seen or self.on_levers(name)
+        if not seen:
+            return None
+        looks, counted = self.around(name, best_of(seen).shape, len(seen))
+        shape = self._shape(name, _best(looks).estimate) if looks else best_of(seen).shape
+        levers = effect_class(name).levers
+        again = self.on_levers(name, [{n: v for n, v in shape.items() if n not in levers}])
+        joint = best_of([*seen, *again])
+        looks.append(self._seen(probed(self._beside(name), [name], self.extent, {name: [joint.shape]}), name))
+        p_values = [len(seen) * min(s.score.p_value for s in seen), counted * again[0].score.p_value]
+        return replace(
+            _best(looks),
+            p_value=min(1.0, *p_values),
+            statistic=joint.score.statistic,
+            degrees=joint.score.degrees,
+            inflation=joint.score.inflation,
+            evidence=joint.score.evidence - float(np.log(counted)),
         )
 
-    def nearer(self, name: str) -> list[Probed]:
-        """Return the closer looks at an effect, each around some of its starts; an empty list where it has none.
+    def around(self, name: str, shape: Mapping[str, float], counted: int) -> tuple[list[Score], int]:
+        """Return an effect's scores around a shape, by levels, and among how many shapes the last was chosen.
 
-        Around all of them: which of the starts is best says little while what lies between them is what counts.
-        """
-        described = self.layout.model.effect(name).parameters_of
-        kind = effect_class(name)
-        closer = [kind.closer(described, self.extent, shape) for shape in kind.starts(described, self.extent)]
-        at, whole = self._beside(name), {name: sum(map(len, closer))}
-        groups = [[s for some in closer[k : k + NEARER] for s in some] for k in range(0, len(closer), NEARER)]
-        return [replace(probed(at, [name], self.extent, {name: g}), counts=whole) for g in groups if g]
-
-    def look(self, name: str) -> Score | None:
-        """Return an effect's score by a closer look, and closer still around the best; None where there is none."""
-        asked = self.nearer(name)
-        if not asked:
-            return None
-        looks = [self._seen(each, name) for each in asked]
-        looks += self.around(name, self._shape(name, _best(looks).estimate), asked[0].counts[name])
-        return replace(_best(looks), p_value=min(s.p_value for s in looks))
-
-    def around(self, name: str, shape: Mapping[str, float], counted: int) -> list[Score]:
-        """Return an effect's scores around a shape, each level of the look around the best that the last has found.
+        Each level looks around the best that has been found before.
 
         Args:
             name: the effect.
@@ -85,7 +111,7 @@ class ShapeSearch:
             asked = replace(probed(at, [name], self.extent, {name: around}), counts={name: counted})
             looks.append(self._seen(asked, name))
             near = self._shape(name, _best(looks).estimate)
-        return looks
+        return looks, counted
 
     def start(self, name: str) -> Layout:
         """Return the layout at the fit, the effect set to the best of its shapes.
@@ -146,6 +172,11 @@ def searched_start(
     if not null_is_no_start(layout, name):
         return None
     return search_shapes(layout, windows, found, base).start(name)
+
+
+def best_of(seen: Sequence[OnLevers]) -> OnLevers:
+    """Return the start at which amounts and moments together take away most."""
+    return max(seen, key=lambda one: one.score.gain - one.score.degrees)
 
 
 def _best(looks: Sequence[Score]) -> Score:

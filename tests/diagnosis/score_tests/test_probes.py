@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+
 import numpy as np
 import pytest
 import torch
@@ -9,10 +10,11 @@ import torch
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.score_tests.levers import OnLevers
 from auvnn.diagnosis.score_tests.null_tests import NullTests
 from auvnn.diagnosis.score_tests.probes import extent_of, probed
 from auvnn.diagnosis.score_tests.score import Score, score
-from auvnn.diagnosis.score_tests.shape_search import ShapeSearch, search_shapes
+from auvnn.diagnosis.score_tests.shape_search import ShapeSearch, best_of, search_shapes
 from auvnn.effects import EFFECTS, Extent
 from auvnn.estimation.priors import set_parameters
 from auvnn.estimation.sensitivity import respond
@@ -124,8 +126,8 @@ def test_what_is_absent_is_left_out_and_predicts_the_same(model, windows):
     assert "velocity_scale" in whole.without_absent().effect_names
 
 
-def test_a_load_off_the_centre_is_seen_at_the_places_around_it(model):
-    """What it turns is no slope at the centre, and as noise it hid what it lifts; the choice is paid for."""
+def test_a_load_off_the_centre_is_seen_by_what_it_turns(model):
+    """At the centre it shows what it lifts alone; amounts and moments together hold it wherever it hangs."""
     load_ = {"time": 8.0, "mass": 0.0, "x": 0.15, "y": -0.2, "z": 0.0, "buoyancy": -0.6}
     made = simulate(
         model,
@@ -138,43 +140,45 @@ def test_a_load_off_the_centre_is_seen_at_the_places_around_it(model):
         rate=10.0,
         max_step=0.05,
     )
-    windows, layout = windows_for(model, made.log), lay_out(model, ["payload"])
+    windows, layout = windows_for(model, made.log), lay_out(model, ["payload", "waves"])
     base = list(layout.nuisance)
     fit = fit_hypothesis(layout, windows, base, ())
-
-    def found(asked):
-        names = asked.layout.model.effect_names
-        sums, _, _ = normal_equations(
-            windows, linearise(asked.layout.model, windows, fit.fitted.initial, names), fit.fitted.sigma
-        )
-        return *asked.score(sums, base, "payload", []), asked, sums
-
     extent = extent_of(windows)
-    far = found(probed(layout, ["payload"], extent))[0]
-    looks = [found(asked) for asked in ShapeSearch(layout, windows, fit, base, [], extent).nearer("payload")]
-    near, label, asked, sums = max(looks, key=lambda look: look[0].gain)
-    assert near.gain > 2.0 * far.gain and near.evidence > far.evidence + 20.0 and near.p_value < far.p_value
-    names = [p.name for p in layout.model.effect("payload").parameters_of]
-    place = dict(zip(names, near.estimate, strict=True))
-    # Twice the load at half of the arm is the same moment: what counts are the signs. Weight and buoyancy are one.
-    assert 9.81 * place["mass"] - place["buoyancy"] > 0 and place["y"] < 0 < place["x"]
-    assert abs(place["time"] - 8.0) < 1.0
-    # Eight places at each of eight times.
-    assert sum(len(look[2].starts["payload"]) for look in looks) == 64
-    assert near.p_value == pytest.approx(64 * score(sums, asked.layout, base, label, []).p_value)
-    assert ShapeSearch(lay_out(model, ["waves"]), windows, fit, [], [], extent).nearer("waves") == []
-    # A search looks there as well, where the first look promises more than chance.
+    search = search_shapes(layout, windows, fit, base)
+
+    def at(shape):
+        asked = probed(layout, ["payload"], extent, {"payload": [shape]})
+        return asked.seen(windows, fit, base, "payload", [])
+
+    far = probed(layout, ["payload"], extent).seen(windows, fit, base, "payload", [])
+    on = search.on_levers("payload")
+    joint = best_of(on)
+    # One joint test for each of eight times, and what it takes away is no less than the effect does at any place.
+    assert len(on) == 8 and abs(joint.shape["time"] - 8.0) < 1.5
+    signs = ((0.15, -0.15, -0.15), (0.15, -0.15, 0.15))  # of eight corners those that the load is nearest to
+    corners = [at({"time": joint.shape["time"], "x": x, "y": y, "z": z}) for x, y, z in signs]
+    there = at(joint.shape)
+    assert max(c.gain for c in corners) < joint.score.gain and far.gain < 0.5 * joint.score.gain
+    # The place that follows from the sums is better than any of the corners. The inertia, square in it, is little.
+    assert max(c.gain for c in corners) < there.gain < 1.001 * joint.score.gain
+    assert joint.shape["x"] == pytest.approx(0.15, abs=0.05) and joint.shape["y"] == pytest.approx(
+        -0.2, abs=0.05
+    )
+    assert search.on_levers("waves") == []
+    # A search looks there as well, where it promises more than chance; the choice among the times is paid for.
     asked_for = NullTests(layout, windows, lambda words: None)(fit, ["payload"], base, [])
-    assert asked_for.scores["payload"].gain > 2.0 * far.gain
-    # Whoever asks for a load starts from there.
+    seen = asked_for.scores["payload"]
+    assert seen.gain > 2.0 * far.gain and seen.p_value < far.p_value and seen.degrees == joint.score.degrees
+    again = search.on_levers("payload", [{"time": float(seen.estimate[0])}])[0].score
+    paid = [8 * min(one.score.p_value for one in on), 8 * 16 * again.p_value]
+    assert seen.p_value == pytest.approx(min(paid), rel=1e-3)
+    # Whoever asks for a load starts from there. At that place other times have been looked at.
     values = search_shapes(layout, windows, fit, base).start("payload").model.effect("payload").values()
-    shape = ("x", "y", "z")
-    assert [values[n] for n in shape] == pytest.approx([place[n] for n in shape]) and values["mass"] != 0
-    # At that place other times have been looked at.
-    assert abs(values["time"] - 8.0) < 0.3
+    assert 9.81 * values["mass"] - values["buoyancy"] == pytest.approx(0.6, rel=0.2)
+    assert values["x"] == pytest.approx(0.15, abs=0.05) and abs(values["time"] - 8.0) < 0.3
 
 
-def test_what_leads_by_evidence_is_looked_at_as_well_as_what_promises_most(model, windows, monkeypatch):
+def test_what_acts_on_a_lever_is_looked_at_where_it_promises_most_or_leads(model, windows, monkeypatch):
     """An effect of rough errors may promise more than the one that the test is surer of."""
     layout = lay_out(model, ["payload", "constant_force", "waves"])
     tests = NullTests(layout, windows, lambda words: None)
@@ -182,16 +186,22 @@ def test_what_leads_by_evidence_is_looked_at_as_well_as_what_promises_most(model
     def score_of(effect, p_value, gain, evidence):
         return Score(effect, p_value, gain, 8, 1.0, np.zeros(8), np.ones(8), evidence, gain)
 
-    looked = []
-    monkeypatch.setattr(ShapeSearch, "look", lambda self, name: looked.append(name))
+    looked, joint = [], [score_of("payload", 1e-9, 200.0, 50.0)]
+    monkeypatch.setattr(ShapeSearch, "on_levers", lambda self, name: [OnLevers(joint[0], {})])
+    monkeypatch.setattr(ShapeSearch, "look", lambda self, name, seen: looked.append(name))
     scores = {
-        "payload": score_of("payload", 1e-9, 200.0, 50.0),
+        "payload": score_of("payload", 0.5, 9.0, -5.0),
         "constant_force": score_of("constant_force", 1e-6, 240.0, 5.0),
     }
     assert tests._closer(None, layout, [], [], scores) == {} and looked == ["payload"]
-    # Where it neither promises most nor leads, it is not.
+    # Where it neither promises most nor leads, it is not; nor where chance does as much.
     looked.clear()
-    scores["payload"] = score_of("payload", 1e-9, 200.0, 4.0)
+    joint[0] = score_of("payload", 1e-9, 200.0, 4.0)
+    assert tests._closer(None, layout, [], [], scores) == {} and looked == []
+    scores["constant_force"] = score_of("constant_force", 0.5, 5.0, -3.0)
+    assert tests._closer(None, layout, [], [], scores) == {} and looked == ["payload"]
+    looked.clear()
+    joint[0] = score_of("payload", 0.1, 12.0, -3.0)
     assert tests._closer(None, layout, [], [], scores) == {} and looked == []
 
 

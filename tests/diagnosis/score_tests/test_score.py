@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.stats import kstest
 
 from auvnn.diagnosis.hypotheses.stated_priors import priors
-from auvnn.diagnosis.score_tests.score import project, score, similarity
-from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
+from auvnn.diagnosis.score_tests.score import freedom, project, score, similarity
+from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation, white_spread
 from tests.diagnosis.linear_world import STATED, World, layout
 
 DRAWS = 300
@@ -195,6 +196,35 @@ def whitened(random, information, windows, factor):
         @ np.linalg.cholesky(information / windows).T
         * np.sqrt(factor)
     )
+
+
+@pytest.mark.parametrize(
+    ("windows", "parameters", "larger"), [(20, 14, 1.0), (20, 8, 3.0), (12, 3, 1.0), (30, 8, 3.0)]
+)
+def test_chance_is_as_rare_as_stated_with_few_windows(windows, parameters, larger):
+    """Scores drawn with a variance that is as told, or larger in all directions alike, most of it in some windows."""
+    rng, draws = np.random.default_rng(0), 3000
+    root = rng.normal(size=(windows, parameters, 2 * parameters)) * rng.gamma(0.5, 1.0, (windows, 1, 1))
+    each, run = root @ root.transpose(0, 2, 1), np.zeros(windows, dtype=int)
+    information = each.sum(0)
+    inverse = np.linalg.inv(information)
+    white = white_spread(each, information, run)
+    below = []
+    for _ in range(draws):
+        by_window = np.sqrt(larger) * (root @ rng.normal(size=(windows, 2 * parameters, 1)))[..., 0]
+        gradient = by_window.sum(0)
+        left = by_window - each @ (inverse @ gradient)
+        factor = variance_inflation(left, information, run, white=white)
+        statistic = gradient @ inverse @ gradient / factor
+        below.append(stats.f.sf(statistic / parameters, parameters, freedom(windows, parameters)))
+    for level in (0.05, 0.005):
+        assert np.mean(np.array(below) < level) < level + 3 * np.sqrt(level / draws)
+    # Nor is it a test that hardly ever rejects.
+    assert np.mean(np.array(below) < 0.3) > 0.1
+
+
+def test_with_many_windows_the_whole_covariance_of_the_scores_is_allowed_for():
+    assert freedom(200, 8) == 192 and freedom(20, 14) == 40 and freedom(20, 1) == 19 and freedom(3, 1) == 4
 
 
 @pytest.mark.parametrize("factor", [1.0, 3.0, 20.0])
