@@ -17,7 +17,7 @@ _NEEDS = {
     "attitude": (QUATERNION, EULER),
     "velocity": (VELOCITY[:3],),
     "rates": (VELOCITY[3:],),
-    "commands": (("thruster_1",), ("tau_X",), ("fin_1",)),
+    "commands": (("thruster_1",), ("tau_X",), ("fin_1",), ("ballast",)),
 }
 
 

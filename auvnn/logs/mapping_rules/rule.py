@@ -22,6 +22,7 @@ BLOCKS = (
     "fins",
     "altitude",
     "voltage",
+    "ballast",
     "acceleration",
 )
 

@@ -6,6 +6,7 @@ import json
 import resource
 import sys
 from pathlib import Path
+from typing import Any
 
 
 def main(folder: str, memory: str, path: str, lists: str) -> None:
@@ -29,11 +30,9 @@ def main(folder: str, memory: str, path: str, lists: str) -> None:
 
         log = dbdreader.DBD(path, cacheDir=lists)
         with (out / "arrays.bin").open("wb") as stream:
-            for name in log.parameterNames:
-                try:
-                    t, v = log.get(name)
-                except (dbdreader.DbdError, ValueError):
-                    continue
+            names = list(log.parameterNames)
+            # Each call goes through the whole file: one for all of some hundred sensors takes a moment, one each minutes.
+            for name, (t, v) in zip(names, _all(log, names), strict=True):
                 for mark, values in (("t", t), ("v", v)):
                     data = np.ascontiguousarray(values, dtype="<f8")
                     entries.append([f"{name}|{mark}", "<f8", list(data.shape), offset])
@@ -46,6 +45,13 @@ def main(folder: str, memory: str, path: str, lists: str) -> None:
         (out / "index.json").write_text(json.dumps({"error": words}))
         return
     (out / "index.json").write_text(json.dumps({"arrays": entries}))
+
+
+def _all(log: Any, names: list[str]) -> list[tuple[Any, Any]]:
+    """Return times and values of each sensor; nothing of one that the file announces and does not hold."""
+    if len(names) == 1:
+        return [log.get(names[0], check_for_invalid_parameters=False)]
+    return log.get(*names, check_for_invalid_parameters=False) if names else []
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 from auvnn.errors import InputError
 from auvnn.logs import Log
+from auvnn.logs.readers.slocum import SlocumReader
 
 _PARENT = Path(__file__).resolve().parents[4]
 FOLDER = Path(os.environ.get("AUVNN_DATA", _PARENT / "shared" / "data")) / "formats"
@@ -100,5 +102,26 @@ def test_turtles_are_seen() -> None:
 @pytest.mark.parametrize("ending", ["dbd", "ebd"])
 def test_a_glider_is_read_or_says_what_it_takes(ending: str) -> None:
     path = FOLDER / "slocum" / f"gf_comet-2016-174-05-001.{ending}"
+    if importlib.util.find_spec("dbdreader") is not None and ending == "dbd":
+        run = Log.read(path).runs[0]
+        assert run.samples == 674 and run.ballast is not None and run.position is not None
+        # A shallow dive of the Baltic: the pump moves 230 cm3 either way, and down is where the nose points.
+        assert np.nanmax(np.abs(run.ballast)) == pytest.approx(231e-6, rel=0.02)
+        rate = np.gradient(run.position[:, 2], run.t)
+        moving = np.isfinite(rate) & (np.abs(run.euler[:, 1]) > 0.3)
+        assert np.corrcoef(rate[moving], -np.sin(run.euler[moving, 1]))[0, 1] > 0.9
+        return
     with pytest.raises(InputError, match=r"dbdreader|missing|known"):
         Log.read(path)
+
+
+def test_a_gliders_sensors_are_those_that_its_library_reads_one_by_one() -> None:
+    dbdreader = pytest.importorskip("dbdreader", reason="dbdreader is not installed")
+    path = FOLDER / "slocum" / "gf_comet-2016-174-05-001.dbd"
+    found = SlocumReader().record(path).topics
+    log = dbdreader.DBD(str(path), cacheDir=str(path.parent / "cac"))
+    begin = min(log.get(n)[0].min() for n in ("m_depth", "m_pitch", "m_air_pump"))
+    for name in ("m_depth", "m_pitch", "m_ballast_pumped", "m_battpos", "m_water_vx"):
+        t, values = log.get(name)
+        np.testing.assert_array_equal(found[name].columns["value"], values)
+        np.testing.assert_allclose(found[name].t - (t - begin), found["m_depth"].t[0], atol=1e-6)

@@ -55,10 +55,7 @@ class Series:
 
     def __post_init__(self) -> None:
         """Leave out what has no time, and rows in which everything is missing."""
-        keep = np.zeros(len(self.t), dtype=bool)
-        for column in self.values.T:
-            keep |= np.isfinite(column)
-        keep &= np.isfinite(self.t)
+        keep = np.isfinite(self.t) & np.isfinite(self.values).any(axis=1)
         if not keep.all():
             for name in ("t", "values", "arrival"):
                 value = getattr(self, name)
