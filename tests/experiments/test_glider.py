@@ -70,6 +70,25 @@ def test_what_is_expected_holds_together():
     assert abs(found["value"]) < 2.0 * found["std"]
 
 
+def test_an_oracle_sees_too_little_of_it_and_it_is_named_where_there_is_more():
+    expected = json.loads((HERE / "expected.json").read_text())
+    oracle, text = expected["oracle"], (HERE / "README.md").read_text()
+    halves = [oracle[h]["force, as stated"] for h in ("first", "second")]
+    both = sum(h["std"] ** -2 for h in halves) ** -0.5
+    together = sum(h["estimate"] * h["std"] ** -2 for h in halves) * both**2
+    # 5e-10 per Pa, by the hydrostatic pressure of a metre of this water.
+    assert oracle["published"] == pytest.approx(5e-10 * 1005.3 * 9.80665)
+    assert f"**{oracle['published'] / both:.1f}** |" in text and oracle["published"] / both < 3.0
+    assert f"together {1e6 * together:.1f}e-6 +- {1e6 * both:.1f}e-6" in text
+    # What is likelier with the published value, without it, and with what the other half says.
+    assert sum(h["published_adds"] for h in halves) < 0.0
+    assert oracle["first_half_estimate_adds_on_second"]["force, as stated"] < 0.0
+    for made in expected["made"]:
+        assert made["missing"] == (["compressibility"] if made["hidden"] else [])
+        found = made["parameters"]["per_metre"]
+        assert abs(found["value"] - made["hidden"]) < 3.0 * found["std"]
+
+
 ABSENT = pytest.mark.skipif(
     not (DATA / "gliderflight_data.npy").is_file(),
     reason="the glider's record is not here: set AUVNN_DATA to the folder above glider/",
