@@ -100,7 +100,7 @@ def made(data: Path, out: Path, hidden: float, seed: int) -> dict[str, Any]:
     rng, known = np.random.default_rng(seed), completed(model, first)
     runs = []
     for plain_run, run in zip(first.runs, known.runs, strict=True):
-        runs.append(_made(there, known, run, plain_run, rng))
+        runs.append(_made(there, model, known, run, plain_run, rng))
     log = replace(first, runs=tuple(runs))
     given = load(HERE / "glider.yaml")
     found = diagnose(given, log, whiteness=False, advice=False, costs=False, progress=print)
@@ -116,9 +116,10 @@ def made(data: Path, out: Path, hidden: float, seed: int) -> dict[str, Any]:
     }
 
 
-def _made(model: GreyBox, log: Log, run: Run, recorded: Run, rng: np.random.Generator) -> Run:
+def _made(there: GreyBox, model: GreyBox, log: Log, run: Run, recorded: Run, rng: np.random.Generator) -> Run:
     windows = cut_windows(log.select(run.number), np.inf, warmup=0.0, kind="wrench")
-    eta, _ = predict(model, windows, likely_states(model, windows), engine="firm")
+    # From where the recorded dive began: whatever is hidden, the dives begin alike.
+    eta, _ = predict(there, windows, likely_states(model, windows), engine="firm")
     first, count = int(windows.first[0]), int(windows.length[0])
     assert recorded.position is not None
     position = np.full(recorded.position.shape, np.nan)
