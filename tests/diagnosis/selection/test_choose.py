@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -87,6 +89,7 @@ def test_the_values_told_are_those_of_the_fit_with_all_that_was_found(model, two
 def test_two_effects_that_do_as_badly_alone_are_named_together(model, two, monkeypatch):
     """As if neither were ahead of the other; alone they leave what both together explain."""
     monkeypatch.setattr(ModelComparison, "told_apart", lambda self, best, other: False)
+    monkeypatch.setattr(sys.modules[Chooser.__module__], "REACH", np.inf)
     found = diagnose(model, two, NAMES, stochastic=False)
     assert found.steps[0]["verdict"] == "named" and set(found.steps[0]["effects"]) == set(NAMES)
     assert set(found.missing) == set(NAMES)
