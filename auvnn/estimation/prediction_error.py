@@ -205,7 +205,9 @@ def fit(
     if not _sound(statistics, a, slopes):
         what = ", ".join(names) or "the initial states"
         raise FitError(f"the fit of {what} has no finite errors: choose shorter windows with window=")
-    initial = moved(initial, torch.as_tensor(a))
+    at = moved(initial, torch.as_tensor(a))
+    # A fit that has settled is nearly linear there; in another one the last step may lead away.
+    initial = at if converged else _nearer(model, windows, names, sigma, here, initial, at)
     total = float(statistics.cost.sum()) + penalty(theta)
     return Fitted(model, names, theta, initial, sigma, statistics, priors, total, converged, taken)
 
@@ -242,6 +244,32 @@ def _answered(
         return list(linearise(model, windows, initial, names, runs))
     except SINGULAR:
         return None
+
+
+def _nearer(
+    model: GreyBox, windows: Windows, names: Sequence[str], sigma: Array, here: list[Response], old: Tensor, new: Tensor
+) -> Tensor:  # fmt: skip
+    """Return of each window's initial states, (B, 13), the new one where its error is not larger than at the old one.
+
+    Args:
+        model: at the fitted values.
+        windows: B windows.
+        names: effects whose parameters were fitted.
+        sigma: weights of the errors, (18,).
+        here: answers at the old ones.
+        old: initial states, (B, 13).
+        new: where a step of Gauss and Newton leads, (B, 13).
+    """
+    if windows.law is not None or not bool(torch.isfinite(new).all()):
+        return new if bool(torch.isfinite(new).all()) else old
+    weight = weights_of(sigma)
+
+    def squared(errors: Sequence[Tensor]) -> Tensor:
+        return torch.cat([((e * weight) ** 2).flatten(1).sum(1) for e in errors])
+
+    before = squared([r.error for r in here])
+    after = squared([error for _, _, error in runs_by_block(model, windows, new, names)])
+    return torch.where((after <= before)[:, None], new, old)
 
 
 def _sound(statistics: Statistics, a: Array, slopes: Array) -> bool:
