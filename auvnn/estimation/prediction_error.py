@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.errors import InputError
+from auvnn.estimation.initial_steps import better_of, shorter_steps, window_costs
 from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
 from auvnn.estimation.sensitivity import Response
@@ -173,6 +174,14 @@ def fit(
             trial = moved(initial, torch.as_tensor(change / (1 + damping)))
             most = now * (1 + 1e-9) + 1e-6
             there = _answered(model, windows, trial, names, sigma, most - penalty(reached))
+            if there is None and windows.law is None:
+                # A few windows that are far from linear in their initial states must not hold up all others.
+                costs = window_costs([r.error for r in here], sigma)
+                shares = change - a, a, 1.0 / (1.0 + damping)
+                shorter = shorter_steps(model, windows, names, sigma, costs, initial, trial, shares)
+                if shorter is not None:
+                    trial = shorter
+                    there = _answered(model, windows, trial, names, sigma, most - penalty(reached))
             then = np.inf if there is None else cost_of(there, sigma) + penalty(reached)
             if there is not None and then <= most:
                 break
@@ -207,7 +216,10 @@ def fit(
         raise FitError(f"the fit of {what} has no finite errors: choose shorter windows with window=")
     at = moved(initial, torch.as_tensor(a))
     # A fit that has settled is nearly linear there; in another one the last step may lead away.
-    initial = at if converged else _nearer(model, windows, names, sigma, here, initial, at)
+    if not converged and windows.law is None:
+        costs = window_costs([r.error for r in here], sigma)
+        at = better_of(model, windows, names, sigma, costs, initial, at)
+    initial = at
     total = float(statistics.cost.sum()) + penalty(theta)
     return Fitted(model, names, theta, initial, sigma, statistics, priors, total, converged, taken)
 
@@ -244,32 +256,6 @@ def _answered(
         return list(linearise(model, windows, initial, names, runs))
     except SINGULAR:
         return None
-
-
-def _nearer(
-    model: GreyBox, windows: Windows, names: Sequence[str], sigma: Array, here: list[Response], old: Tensor, new: Tensor
-) -> Tensor:  # fmt: skip
-    """Return of each window's initial states, (B, 13), the new one where its error is not larger than at the old one.
-
-    Args:
-        model: at the fitted values.
-        windows: B windows.
-        names: effects whose parameters were fitted.
-        sigma: weights of the errors, (18,).
-        here: answers at the old ones.
-        old: initial states, (B, 13).
-        new: where a step of Gauss and Newton leads, (B, 13).
-    """
-    if windows.law is not None or not bool(torch.isfinite(new).all()):
-        return new if bool(torch.isfinite(new).all()) else old
-    weight = weights_of(sigma)
-
-    def squared(errors: Sequence[Tensor]) -> Tensor:
-        return torch.cat([((e * weight) ** 2).flatten(1).sum(1) for e in errors])
-
-    before = squared([r.error for r in here])
-    after = squared([error for _, _, error in runs_by_block(model, windows, new, names)])
-    return torch.where((after <= before)[:, None], new, old)
 
 
 def _sound(statistics: Statistics, a: Array, slopes: Array) -> bool:

@@ -35,7 +35,7 @@ def test_the_last_step_of_an_unsettled_fit_raises_no_windows_error(monkeypatch):
         seen["old"], seen["new"] = given[-2:]
         return given[-1]
 
-    monkeypatch.setattr(prediction_error, "_nearer", kept)
+    monkeypatch.setattr(prediction_error, "better_of", kept)
     fit(model, windows, [], none, iterations=1)
     old, new, last = squared(seen["old"]), squared(seen["new"]), squared(found.initial)
     assert new.sum() > 5 * last.sum(), "taken as a whole, the step leads away"
