@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.errors import InputError
+from auvnn.estimation.initial_steps import better_of, shorter_steps, window_costs
 from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
 from auvnn.estimation.sensitivity import Response
@@ -173,6 +174,14 @@ def fit(
             trial = moved(initial, torch.as_tensor(change / (1 + damping)))
             most = now * (1 + 1e-9) + 1e-6
             there = _answered(model, windows, trial, names, sigma, most - penalty(reached))
+            if there is None and windows.law is None:
+                # A few windows that are far from linear in their initial states must not hold up all others.
+                costs = window_costs([r.error for r in here], sigma)
+                shares = change - a, a, 1.0 / (1.0 + damping)
+                shorter = shorter_steps(model, windows, names, sigma, costs, initial, trial, shares)
+                if shorter is not None:
+                    trial = shorter
+                    there = _answered(model, windows, trial, names, sigma, most - penalty(reached))
             then = np.inf if there is None else cost_of(there, sigma) + penalty(reached)
             if there is not None and then <= most:
                 break
@@ -205,7 +214,12 @@ def fit(
     if not _sound(statistics, a, slopes):
         what = ", ".join(names) or "the initial states"
         raise FitError(f"the fit of {what} has no finite errors: choose shorter windows with window=")
-    initial = moved(initial, torch.as_tensor(a))
+    at = moved(initial, torch.as_tensor(a))
+    # A fit that has settled is nearly linear there; in another one the last step may lead away.
+    if not converged and windows.law is None:
+        costs = window_costs([r.error for r in here], sigma)
+        at = better_of(model, windows, names, sigma, costs, initial, at)
+    initial = at
     total = float(statistics.cost.sum()) + penalty(theta)
     return Fitted(model, names, theta, initial, sigma, statistics, priors, total, converged, taken)
 

@@ -58,6 +58,15 @@ def test_diagnosis_says_its_verdict(unseen, verdict, words):
     assert "not judged: needs altitude" in page.text
 
 
+def test_inputs_that_the_log_cannot_tell_apart_are_said_together(unseen):
+    depends = {"Z": {"u": 0.295, "fin_3": 0.293, "fin_4": 0.292}}
+    answer = diagnosis("unknown", depends_on=depends, inseparable={"Z": [["u", "fin_3", "fin_4"]]})
+    answer.json = (*answer.json, "inseparable")
+    text = PageText(drawer("diagnosis").page(answer)).text
+    assert "What remains depends most on u" in text
+    assert "This log cannot tell it from fin_3 or fin_4." in text
+
+
 @pytest.mark.parametrize(("accepted", "words"), [(True, ": accepted."), (False, ": not accepted.")])
 def test_improvement_says_whether_it_was_accepted(unseen, accepted, words):
     page = PageText(drawer("improvement").page(improvement(60, accepted=accepted)))

@@ -44,6 +44,7 @@ class Diagnosis(Answer):
         tolerance: what does not matter.
         judged_by: how the costs were worked out.
         baseline: error of the model as given, of a plain regression and of persistence, and where it loses to them.
+        inseparable: degree of freedom to groups of inputs in `depends_on` that the log cannot tell from one another.
     """
 
     kind = "diagnosis"
@@ -75,6 +76,7 @@ class Diagnosis(Answer):
     whole_log: dict[str, Any] | None = None
     baseline: dict[str, Any] = field(default_factory=dict)
     stochastic: dict[str, Any] = field(default_factory=dict)
+    inseparable: dict[str, list[list[str]]] = field(default_factory=dict)
 
     @property
     def surfaces(self) -> list[dict[str, Any]]:
@@ -132,6 +134,7 @@ class Diagnosis(Answer):
             "candidates",
             "unexplained",
             "depends_on",
+            "inseparable",
             "acts_in",
             "nearest",
             "matters",

@@ -20,7 +20,7 @@ from auvnn.diagnosis.hypotheses.candidates import HORIZON, WARMUP
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import has_stated_uncertainty
 from auvnn.diagnosis.residuals.additive_force_test import additive_force_test
-from auvnn.diagnosis.residuals.attribution import attribute_residual
+from auvnn.diagnosis.residuals.attribution import Attribution, attribute_residual
 from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.diagnosis.residuals.whiteness import residual_tests
 from auvnn.diagnosis.stages.partial import without
@@ -41,6 +41,7 @@ def answer(asked: Setting, state: State) -> Diagnosis:
     verdict = leading["verdict"]
     without = _fits_without(asked, state)
     found = _worth(asked, state, without, notes)
+    depends = _depends(asked, state, verdict, notes)
     given = names_by_worth(given, found.names)
     # Of a leading group one member is to be added; what was found after it stands in the steps.
     missing = OneOf(leading["effects"]) if verdict == "ambiguous" else given
@@ -52,7 +53,8 @@ def answer(asked: Setting, state: State) -> Diagnosis:
         steps=[s.copy() for s in state.steps],
         candidates=_candidates(asked, state, given, without),
         unexplained=_unexplained(state, verdict),
-        depends_on=_depends(asked, state, verdict, notes),
+        depends_on=depends.shares,
+        inseparable=depends.inseparable,
         next_experiment=_next(asked, state, notes),
         warnings=[*_warnings(asked, state), *notes, *asked.notes],
         absorbed=asked.absorbed,
@@ -122,13 +124,14 @@ def _unexplained(state: State, verdict: str) -> float:
     return round(state.unexplained, 6)
 
 
-def _depends(asked: Setting, state: State, verdict: str, notes: list[str]) -> dict[str, dict[str, float]]:
+def _depends(asked: Setting, state: State, verdict: str, notes: list[str]) -> Attribution:
     if verdict not in ("unknown", "partial") and state.steps[-1]["verdict"] != "unknown":
-        return {}
+        return Attribution({}, {})
     asked.say("tracing what is left to the measured inputs")
+    found = Attribution({}, {})
     try:
         found = attribute_residual(state.current, state.windows)
-        if any(found.values()):
+        if any(found.shares.values()):
             return found
         traced = state.traced
         if traced is None or state.current is state.first:
@@ -136,9 +139,9 @@ def _depends(asked: Setting, state: State, verdict: str, notes: list[str]) -> di
             traced = additive_force_test(state.current, asked.layout, state.windows, noise, (), SURE)
     except np.linalg.LinAlgError:
         notes.append("what is left could not be traced to the measured inputs: its sums cannot be solved")
-        return {}
+        return found
     if traced.p_value < SURE:
-        found = {**found, traced.axis: {traced.input: traced.share}}
+        return Attribution({**found.shares, traced.axis: {traced.input: traced.share}}, {})
     return found
 
 

@@ -130,7 +130,7 @@ def _dependence(diagnosis: Diagnosis) -> list[str]:
         if shares:
             top = max(shares, key=lambda n: shares[n])
             if shares[top] >= 0.05:
-                strong.append(f"{axis} on {top} ({shares[top]:.0%})")
+                strong.append(f"{axis} on {top}{_inseparable(diagnosis, axis, top)} ({shares[top]:.0%})")
     if not strong and any(diagnosis.depends_on.values()):
         axis = max(diagnosis.depends_on, key=lambda a: max(diagnosis.depends_on[a].values(), default=0.0))
         top = max(diagnosis.depends_on[axis], key=lambda n: diagnosis.depends_on[axis][n])
@@ -138,5 +138,13 @@ def _dependence(diagnosis: Diagnosis) -> list[str]:
     return ["The remaining residual depends on: " + ", ".join(strong) + "."] if strong else []
 
 
-def _series(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+def _inseparable(diagnosis: Diagnosis, axis: str, top: str) -> str:
+    """Say which inputs the log cannot tell from one that is named."""
+    for group in diagnosis.inseparable.get(axis, []):
+        if top in group:
+            return f", which this log cannot tell from {_series([n for n in group if n != top], 'or')}"
+    return ""
+
+
+def _series(names: list[str], last: str = "and") -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {last} {names[-1]}"

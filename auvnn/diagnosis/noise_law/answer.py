@@ -20,7 +20,8 @@ from auvnn.diagnosis.noise_law.hypothesis import WithForce, under_its_law
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
 from auvnn.diagnosis.noise_law.noise_colour import Colour, noise_colour
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction, predicted_by_inputs
-from auvnn.diagnosis.noise_law.search import UNSOLVED, ForceSearch
+from auvnn.diagnosis.noise_law.relinearise import UNSOLVED
+from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.diagnosis.noise_law.uncertain_commands import UncertainWrench, uncertain_wrench
 from auvnn.diagnosis.noise_law.words import left
 from auvnn.diagnosis.residuals.forces import actuators_of, share_of

@@ -17,10 +17,9 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from torch import Tensor
 
 from auvnn.answer_types import SearchStep
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, folds, left_out
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, shapes
 from auvnn.diagnosis.noise_law.estimate_law import estimate
 from auvnn.diagnosis.noise_law.hypothesis import (
@@ -34,24 +33,20 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     tied,
 )
 from auvnn.diagnosis.noise_law.leaders import rivals_of
+from auvnn.diagnosis.noise_law.relinearise import UNSOLVED, relinearised
 from auvnn.diagnosis.noise_law.sums import CELL, force_sums
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.diagnosis.stages.state import Setting
-from auvnn.estimation.initial_states import fit_initial_states
-from auvnn.estimation.prediction_error import SINGULAR, FitError
+from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
-from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.metrics.force_law import ForceLaw, cell_for
 from auvnn.metrics.rollouts import scale_of
 from auvnn.metrics.windows import Windows
-from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
-# What is raised where free running grows without bound, and sums of it cannot be solved.
-UNSOLVED = (FitError, np.linalg.LinAlgError, SINGULAR)
 # A name is given where chance would seldom do as well among all effects that were asked for; a further one on
 # stronger grounds, because each time chance gets another turn.
 ALPHA_NAME, ALPHA_FURTHER = 0.01, 0.001
@@ -177,7 +172,7 @@ class ForceSearch:
             names = [h.name for h in group]
             verdict = "ambiguous" if len(group) > 1 else "named"
             steps.append({"verdict": verdict, "effects": names, "p_value": sure[group[0].name]})
-            current = self._taken(group[0])
+            current = relinearised(group[0], self.windows, self.weights, self.judged)
             if len(group) > 1:
                 groups.append([current.explanation, *(h.explanation for h in group[1:])])
             chosen.append(group[0].name)
@@ -244,55 +239,29 @@ class ForceSearch:
     def _one(
         self, name: str, score: Score, at: Layout, current: Hypothesis, base: list[str], chosen: list[str]
     ) -> FittedHypothesis | None:
-        """Return an effect fitted from what its test estimates, or from nearer its null; None where every fit fails."""
+        """Return an effect fitted from what its test estimates, or from nearer its null; None where every fit fails.
+
+        One that ends with larger errors than there are without it began too far off.
+        """
         self.say(f"fitting {name} together with the force")
         known, start = parameters_of(at.model, [name]), initial_guess(self.layout, name, score.estimate)
-        shape = shapes(self.layout, name)
+        shape, found = shapes(self.layout, name), []
         for share in (1.0, 0.1):
             guess = at.model.rebuilt(at.model.copied_effects())
             set_parameters(guess, [name], np.where(shape, start, known + share * (start - known)))
-            try:
-                return fit_hypothesis(
-                    self.layout, self.windows, base, [*chosen, name], start=current.explanation.fitted,
-                    guess=replace(at, model=guess), sigma=self.weights, iterations=STEPS,
+            with suppress(FitError):
+                found.append(
+                    fit_hypothesis(
+                        self.layout, self.windows, base, [*chosen, name], start=current.explanation.fitted,
+                        guess=replace(at, model=guess), sigma=self.weights, iterations=STEPS,
+                    )
                 )  # fmt: skip
-            except FitError:
-                continue
-        return None
+                if self._squared(found[-1]) <= self._squared(current.explanation):
+                    break
+        return min(found, key=self._squared, default=None)
 
-    def _taken(self, best: Hypothesis) -> Hypothesis:
-        """Return a hypothesis at the parameters that its law has moved it to.
-
-        The windows stay linear about the free running without the force, with the initial states that suit it best: a
-        force takes an unstable vehicle too far from the free running for a linearisation about its own initial states.
-        """
-        law = best.estimate.law
-        assert law is not None
-        found = best.explanation
-        for share in (1.0, 0.3):
-            theta = found.fitted.theta + share * best.estimate.step
-            model = found.fitted.model.rebuilt(found.fitted.model.copied_effects())
-            set_parameters(model, found.names, theta)
-            try:
-                initial = fit_initial_states(
-                    model.without_absent(found.names), self.windows, self.weights, found.fitted.initial
-                )
-                again = self.judged(self._at(found, model, theta, initial), law)
-            except UNSOLVED:
-                continue
-            # Where the windows are far from linear, a whole step leads away.
-            if again.evidence > best.evidence - ODDS:
-                return again
-        return best
-
-    def _at(self, found: FittedHypothesis, model: GreyBox, theta: Array, initial: Tensor) -> FittedHypothesis:
-        """Return an explanation at other values, its sums without a force computed again there."""
-        fitted, judged_by = found.fitted, found.judged or found.fitted.priors
-        sums, _, _ = normal_equations(
-            self.windows, linearise(model, self.windows, initial, found.names), fitted.sigma
-        )
-        cost = float(sums.cost.sum()) + fitted.priors.penalty(theta)
-        moved = replace(fitted, model=model, theta=theta, initial=initial, statistics=sums, cost=cost)
-        return replace(
-            found, fitted=moved, left_out=left_out(sums, theta, judged_by, folds(self.windows.run))
-        )
+    def _squared(self, explanation: FittedHypothesis) -> float:
+        """Return the squared errors of free running by the search's weights."""
+        usable = np.isfinite(self.weights)
+        each = explanation.fitted.statistics.channel.sum(0)[usable]
+        return float((each / self.weights[usable] ** 2).sum())

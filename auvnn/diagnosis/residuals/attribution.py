@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,28 +17,47 @@ Array = NDArray[np.float64]
 # Share of what is unexplained, below which a dependence is not worth a word; standard errors of its gain, below which
 # it may be chance; and the most inputs that are reported.
 LEAST, SURE, MOST = 0.02, 2.0, 8
+# Inputs told beside the one that gains most, where the log cannot tell them from it: by less than a standard error of
+# the difference, or by less than this share of the gain.
+BESIDE, CLOSE = 2, 0.05
 
 
-def attribute_residual(explanation: FittedHypothesis, windows: Windows) -> dict[str, dict[str, float]]:
+@dataclass(frozen=True)
+class Attribution:
+    """On which measured inputs a residual depends.
+
+    Attributes:
+        shares: degree of freedom to {input: share of the unexplained error}, the largest first.
+        inseparable: degree of freedom to groups of inputs of which each explains as much as the others, and the log
+            cannot tell which; the shares of one group are of the same error.
+    """
+
+    shares: dict[str, dict[str, float]]
+    inseparable: dict[str, list[list[str]]]
+
+
+def attribute_residual(explanation: FittedHypothesis, windows: Windows) -> Attribution:
     """Return by degree of freedom the share of the unexplained error that each measured input explains.
 
-    Forces that are simple functions of one input each (`InputForces`) are added to free running, the input and the
-    degree of freedom first that gains most on what is left out, then the next beside it, for as long as the gain is
-    beyond its own uncertainty. So of two inputs that go together only the one that says more is told, and smooth
-    residuals in position and attitude count, which no derivative would show.
+    Forces that are simple functions of one input each (`InputForces`) are added to free running: of those whose gain
+    on what is left out is beyond its own uncertainty, the input and the degree of freedom first that gain most, then
+    the next beside it. So of two inputs that go together only the one that says more is told, and smooth residuals in
+    position and attitude count, which no derivative would show. Where another input says as much, both are told: a
+    rudder that follows the speed cannot be told from it by a log, and must not be passed over for it.
 
     Args:
         explanation: what was found; what it leaves is looked at.
         windows: those it was fitted to.
 
     Returns:
-        degree of freedom to {input: share}, the largest first; empty where nothing measured explains anything.
+        the shares; none where nothing measured explains anything.
     """
     fitted = explanation.fitted
     found: dict[str, dict[str, float]] = {axis: {} for axis in AXES}
+    groups: list[tuple[str, dict[str, float]]] = []
     whole = excess_variance(explanation, explanation)
     if whole <= 0:
-        return found
+        return Attribution(found, {})
     probe = InputForces(fitted.model, windows)
     model = fitted.model
     asked = model.extended_by(probe)
@@ -53,16 +74,39 @@ def attribute_residual(explanation: FittedHypothesis, windows: Windows) -> dict[
         gains = {}
         for i, n in open_:
             more = [*chosen, *(known + probe.columns(i, n))]
-            gains[i, n] = left - _left(sums, more, explanation, scale, fold)
-        (axis, name), gain = max(gains.items(), key=lambda item: float(item[1].sum()))
-        total = float(gain.sum())
-        if total < LEAST * whole or total < SURE * np.sqrt(len(gain)) * float(gain.std(ddof=1)):
+            gain = left - _left(sums, more, explanation, scale, fold)
+            if gain.sum() >= LEAST * whole and gain.sum() >= SURE * _standard_error(gain):
+                gains[i, n] = gain
+        if not gains:
             break
-        found[AXES[axis]][name] = float(np.clip(total / whole, 0.0, 1.0))
+        (axis, name), gain = max(gains.items(), key=lambda item: float(item[1].sum()))
+        shares = {n: float(np.clip(g.sum() / whole, 0.0, 1.0)) for (i, n), g in gains.items() if i == axis}
+        alike = [n for (i, n), g in gains.items() if i == axis and n != name and _close(gain, g)]
+        alike = sorted(alike, key=lambda n: -shares[n])[:BESIDE]
+        found[AXES[axis]][name] = shares[name]
+        groups.append((AXES[axis], {n: shares[n] for n in (name, *alike)}))
         chosen += list(known + probe.columns(axis, name))
         left = left - gain
         open_.remove((axis, name))
-    return found
+    inseparable: dict[str, list[list[str]]] = {}
+    for label, group in groups:
+        # What explains more beside the first of its group has been told for itself.
+        first, *others = [n for i, n in enumerate(group) if i == 0 or n not in found[label]]
+        if others:
+            found[label].update({n: group[n] for n in others})
+            inseparable.setdefault(label, []).append([first, *others])
+    ordered = {a: dict(sorted(row.items(), key=lambda item: -item[1])) for a, row in found.items()}
+    return Attribution(ordered, inseparable)
+
+
+def _standard_error(gain: Array) -> float:
+    return float(np.sqrt(len(gain)) * gain.std(ddof=1))
+
+
+def _close(best: Array, other: Array) -> bool:
+    """Whether one gain by window is not surely larger than another."""
+    lacks = best - other
+    return float(lacks.sum()) < max(_standard_error(lacks), CLOSE * float(best.sum()))
 
 
 def _left(

@@ -83,7 +83,7 @@ class DiagnosisPage(Page):
             out += _best_of_the_rest(candidates)
         if verdict in ("unknown", "partial"):
             out += _force_words(view)
-            out += _dependence_words(view.mapping("depends_on"))
+            out += _dependence_words(view)
         after = view.mapping("next_experiment")
         if after.get("words"):
             out.append(f"Next: {str(after['words']).rstrip('.')}.")

@@ -40,7 +40,6 @@ def test_the_force_of_a_fin_in_the_probe_grows_with_the_square_of_the_speed(mode
 
 
 @pytest.mark.long
-@pytest.mark.xfail(strict=True, reason="on trial: a survey's rudder moves with u, and u is what is found")
 def test_what_a_weak_rudder_leaves_is_traced_to_its_angle(model):
     log = logged(model, {"fin_gain": WEAK}, 3, 40.0, "survey")
     found = diagnose(

@@ -99,7 +99,7 @@ export class MissingScreen {
       h("p", {}, this.answer.verdict === "adequate" ? "What is left looks like noise." : `${percent(this.answer.unexplained).replace("<", "Less than ")} of the residual's energy above the noise is explained by nothing in the catalogue.`),
       this.answer.acts_in && Object.keys(this.answer.acts_in).length > 0 && h("p", { class: "soft" }, `It acts in ${Object.keys(this.answer.acts_in).join(", ")}.`),
       (this.answer.nearest || []).length > 0 && h("p", { class: "soft" }, `Nearest, but not the cause: ${this.answer.nearest.join(", ")}.`),
-      depends.length > 0 && h("p", { class: "soft" }, "It depends on: ", depends.map(([axis, shares]) => { const top = Object.entries(shares).sort((a, b) => b[1] - a[1])[0]; return top ? `${axis} on ${top[0]} (${percent(top[1])})` : null; }).filter(Boolean).join(", ")));
+      depends.length > 0 && h("p", { class: "soft" }, "It depends on: ", depends.map(([axis, shares]) => { const top = Object.entries(shares).sort((a, b) => b[1] - a[1])[0]; const group = top && ((this.answer.inseparable || {})[axis] || []).find((g) => g.includes(top[0])), alike = (group || []).filter((n) => n !== top[0]); return top ? `${axis} on ${top[0]}${alike.length ? `, which this log cannot tell from ${alike.join(" or ")}` : ""} (${percent(top[1])})` : null; }).filter(Boolean).join(", ")));
   }
 
   // What each name costs, and names that predict without being the cause, where the answer states them.

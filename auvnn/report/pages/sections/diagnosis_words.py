@@ -157,10 +157,10 @@ def _alone_words(candidates: list[Mapping[str, Any]], nearest: list[str]) -> str
     )
 
 
-def _dependence_words(depends: Mapping[str, Any]) -> list[str]:
+def _dependence_words(view: View) -> list[str]:
     shares = [
         (share, axis, channel)
-        for axis, row in depends.items()
+        for axis, row in view.mapping("depends_on").items()
         if isinstance(row, Mapping)
         for channel, value in row.items()
         if (share := finite(value)) is not None
@@ -168,8 +168,17 @@ def _dependence_words(depends: Mapping[str, Any]) -> list[str]:
     if not shares:
         return []
     share, axis, channel = max(shares)
+    groups = view.mapping("inseparable").get(axis)
+    alike = [
+        str(name)
+        for group in (groups if isinstance(groups, list) else [])
+        if isinstance(group, list) and channel in group
+        for name in group
+        if name != channel
+    ]
+    also = f" This log cannot tell it from {listing(alike, last='or')}." if alike else ""
     return [
-        f"What remains depends most on {channel}, which explains {percent(share)} of the residual in {axis}."
+        f"What remains depends most on {channel}, which explains {percent(share)} of the residual in {axis}.{also}"
     ]
 
 
