@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.noise_law.command_holding import Holding, holding, squared_error
+from auvnn.diagnosis.noise_law.command_holding import Holding, cost_at_best, holding, squared_error
 from auvnn.diagnosis.noise_law.estimate_law import ALPHA_BOUNDARY
 from auvnn.diagnosis.noise_law.hypothesis import WithForce, under_its_law
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
@@ -97,9 +97,9 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
 def _held(state: State) -> tuple[FittedHypothesis, Holding]:
     """Return the explanation that leaves least, whatever the search made of it, and how commands go by it.
 
-    One that was tried and is about to diverge says nothing of them: then the next best is asked. Where no name stands,
-    the fit without any name is asked too whether the commands have noise: names fitted to such commands as they are
-    have taken up what the noise does to them.
+    One that was tried and is about to diverge says nothing of them: then the next best is asked. The fit without any name
+    is asked too: names fitted to such commands as they are have taken up what the commands do to them. It decides where
+    the commands have noise and no name stands, and where another law alone explains as much as the names do.
     """
     sigma = state.first.fitted.sigma
     known = [state.first, *state.tried, state.refuted or state.current]
@@ -108,10 +108,14 @@ def _held(state: State) -> tuple[FittedHypothesis, Holding]:
         with suppress(np.linalg.LinAlgError):
             least, held = end, holding(end, state.windows)
             break
-    if held.name == "held" and not state.chosen and least is not state.first:
+    if held.name == "held" and least is not state.first:
         with suppress(np.linalg.LinAlgError):
             plain = holding(state.first, state.windows)
-            held = plain if plain.name == "averaged" else held
+            if plain.name == "averaged" and not state.chosen:
+                return least, plain
+            alone = cost_at_best(state.first, plain.applied(state.windows))
+            if plain.odds > 0.0 and alone <= cost_at_best(least, state.windows, sigma):
+                return state.first, plain
     return least, held
 
 

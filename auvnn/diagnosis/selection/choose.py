@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, log_evidence
-from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, shapes
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, scales, shapes
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.model_comparison import ALPHA_NEEDED, ODDS, ModelComparison
 from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
@@ -30,6 +30,8 @@ LEADERS, REACH, REACH_SHARE = 5, 30.0, 0.5
 # Parts of what a test estimates from which a fit is begun, the next where the one before diverged: near the
 # bottom the force grows faster than any slope says.
 SHARES = (1.0, 0.1)
+# Within this share of its plausible scale of its null, an effect does nothing.
+NOTHING = 1e-4
 
 
 @dataclass(frozen=True)
@@ -132,9 +134,20 @@ class Chooser(Pruning):
             group = sorted([best, *rivals], key=lambda e: e.effects[-1] not in plainer)
             # The first stands for all of them while more is asked for.
             final = self._settled(group[0], at, base)
+            if self._vanished(final):
+                return self._among([e for e in tried if e is not group[0]], clear, at, base, current)
             return Choice("ambiguous", final, tried, [final, *group[1:]])
         final = self._settled(best, at, base)
+        if self._vanished(final):
+            return self._among([e for e in tried if e is not best], clear, at, base, current)
         return Choice("named", final, [final, *tried[1:]] if tried[0] is best else [final, *tried], [])
+
+    def _vanished(self, final: FittedHypothesis) -> bool:
+        """Return whether a fit that has settled has taken the last effect back to its null, where it does nothing."""
+        name = final.effects[-1]
+        away = parameters_of(final.fitted.model, [name]) - self.layout.means[name]
+        live = ~shapes(self.layout, name)
+        return bool((np.abs(away[live]) < NOTHING * scales(self.layout, name)[live]).all())
 
     @staticmethod
     def _promising(significant: list[Score], leading: list[Score]) -> list[Score]:

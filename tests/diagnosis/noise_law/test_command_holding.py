@@ -13,9 +13,11 @@ import torch
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.noise_law import answer
 from auvnn.diagnosis.noise_law.answer import _held
 from auvnn.diagnosis.noise_law.command_holding import (
     AVERAGED,
+    Holding,
     between,
     cubic_weights,
     holding,
@@ -130,3 +132,24 @@ def test_an_average_has_binomial_weights(model):
     for samples in AVERAGED:
         mean = between(turned, 0.5, samples=samples).inputs.command
         assert mean[:, samples // 2 : -samples // 2].abs().max() < 1e-12
+
+
+@pytest.mark.parametrize(("explains", "name"), [(0.0, "held"), (1.0, "law")])
+def test_names_stand_against_another_law_only_if_they_explain_more(model, monkeypatch, explains, name):
+    """Names with which commands seem held, though without them they do not: what explains more decides."""
+    log = thinned(make_log(model, duration=20.0, rate=25.0, noise=0.3, max_step=0.04), STEP)
+    windows, layout = windows_for(model, log), lay_out(model, [])
+    first = fit_hypothesis(layout, windows, list(layout.names), (), iterations=4)
+    less = replace(first.fitted.statistics, channel=0.9 * first.fitted.statistics.channel)
+    named = replace(first, effects=("lag",), fitted=replace(first.fitted, statistics=less))
+    held = Holding("held", 0.0, 0.0, 0.0)
+    monkeypatch.setattr(answer, "holding", lambda e, w: held if e is named else holding(e, w))
+    cost = answer.cost_at_best
+    monkeypatch.setattr(
+        answer, "cost_at_best", lambda e, *more: cost(e, *more) * (explains if e is named else 1.0)
+    )
+    state: Any = SimpleNamespace(
+        first=first, tried=(named,), refuted=None, current=named, windows=windows, chosen=("lag",)
+    )
+    least, law = _held(state)
+    assert (law.name == "held") == (name == "held") and (least is named) == (name == "held")

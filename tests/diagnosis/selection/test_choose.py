@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.diagnosis.selection.model_comparison import ModelComparison
+from auvnn.estimation.priors import set_parameters
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
 
@@ -142,3 +144,20 @@ def test_what_might_fit_better_than_the_one_in_the_lead_is_tried_however_many_pa
         "14 more by six parameters are chance in three of a hundred"
     )
     assert promising([leader, clear], [leader, clear]) == [] == promising([clear], [])
+
+
+def test_an_effect_that_its_fit_takes_back_to_its_null_is_not_named(model, monkeypatch):
+    log = logged(model, LIGHT)
+    assert diagnose(model, log, NAMES, stochastic=False).missing == ["net_buoyancy"]
+    settled = Chooser._settled
+
+    def nothing(self, best, at, base):
+        found = settled(self, best, at, base)
+        if found.effects[-1] == "net_buoyancy":
+            at_null = found.fitted.model.rebuilt(found.fitted.model.copied_effects())
+            set_parameters(at_null, ["net_buoyancy"], np.zeros(1))
+            return replace(found, fitted=replace(found.fitted, model=at_null))
+        return found
+
+    monkeypatch.setattr(Chooser, "_settled", nothing)
+    assert "net_buoyancy" not in diagnose(model, log, NAMES, stochastic=False).missing
