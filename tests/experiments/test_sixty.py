@@ -41,3 +41,18 @@ def test_targets_are_of_the_median_and_of_nine_in_ten(sixty):
     assert found["median"] == pytest.approx(0.95) and found["reach_three_quarters"] == pytest.approx(0.8)
     assert not found["met"] and sixty.judged([*rows[:8], *rows[:2]])["share"]["met"]
     assert sixty.judged([{"size": "15%", "share": None, "fault": "x"}])["faults"] == 1
+
+
+def test_the_rows_that_are_kept_are_the_logs_that_were_drawn_and_give_what_is_told(sixty):
+    rows = [json.loads(line) for line in (HERE / "rows.jsonl").read_text().splitlines()]
+    drawn = json.loads((HERE / "sixty.json").read_text())
+    assert [{k: r[k] for k in ("hidden", "size", "seed")} for r in rows] == drawn
+    for r in rows:
+        assert r["share"] == pytest.approx(sixty.share(r["errors"], "given"))
+    found = sixty.judged(rows)
+    assert found["faults"] == 0 and found["share"]["met"] and found["share_from_refitted"]["met"]
+    text = (HERE / "README.md").read_text()
+    for key in ("share", "share_from_refitted"):
+        count = found[key]["logs"]
+        assert f"{round(found[key]['reach_three_quarters'] * count)} of {count}" in text
+        assert f"{found[key]['median']:.3f}" in text
