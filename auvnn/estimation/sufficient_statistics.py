@@ -101,6 +101,28 @@ class Combination:
 
 
 @dataclass(frozen=True)
+class InformationShares:
+    """What each window knows of some parameters as a share of what all do: A_b = R^T U H_b U^T R, H_b its matrix (P, P).
+
+    Attributes:
+        moved: U, how all columns follow these parameters, (p, P).
+        root: R, (p, r), with R R^T the inverse of the information of all windows.
+    """
+
+    moved: Array
+    root: Array
+
+    def of(self, statistics: Statistics) -> Array:
+        """Return the shares of each window, row by row, (B, r r)."""
+        return self.rows(self.moved @ statistics.hessian @ self.moved.T, self.root)
+
+    @staticmethod
+    def rows(information: Array, root: Array) -> Array:
+        """Return the shares of windows of known information, (B, p, p), row by row, (B, r r)."""
+        return (root.T @ information @ root).reshape(len(information), -1)
+
+
+@dataclass(frozen=True)
 class ScoreMoments:
     """Second moments of vectors u (p,), one per window in the order of time, and of neighbours in a run.
 

@@ -14,16 +14,19 @@ from auvnn.diagnosis.full_data.map_reduce import LinearisationPoint, MapReduce
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import DETERMINED, Layout
 from auvnn.diagnosis.residuals.autocorrelation import slower_than_white
+from auvnn.diagnosis.score_tests.few_windows import are_few
 from auvnn.diagnosis.score_tests.probes import Probed
 from auvnn.diagnosis.score_tests.score import Score, following, projection, score_from_sums
-from auvnn.diagnosis.score_tests.variance_inflation import ratio
+from auvnn.diagnosis.score_tests.variance_inflation import inflation, inverse_root, ratio, share_left
 from auvnn.effects import Extent
 from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
-from auvnn.estimation.sufficient_statistics import Combination, WindowSums
+from auvnn.estimation.sufficient_statistics import Combination, InformationShares, WindowSums
 from auvnn.log_chunks.scan import WindowCut
 
 Array = NDArray[np.float64]
+# The scores' spread, (p, p), and the share of white noise's that is left in it; None where there are many windows.
+_Spread = tuple[Array, float | None]
 # Steps of the fit on everything; it begins where the fit on the sample has ended, and ends when a step would change the
 # weighted squared error by less than `ENOUGH`.
 STEPS, ENOUGH = 4, 0.05
@@ -59,12 +62,16 @@ def score_tests(
     sums = passes.sums(point, "testing at the null")
     held = point.probed
     first = {n: [_accept(held, sums, base, label, None) for label in held.labels(n)] for n in asked}
-    wanted = [test for tests in first.values() for test in tests]
-    combinations = [t.combination for t in wanted if t.combination is not None]
-    spreads = [m.spread() for m in passes.moments(point, combinations, "how much the scores vary")]
-    known = {
-        t.label: s for t, s in zip([t for t in wanted if t.combination is not None], spreads, strict=True)
-    }
+    wanted = [t for tests in first.values() for t in tests if t.combination is not None]
+    asked_of = [c for t in wanted for c in (t.combination, t.shares) if c is not None]
+    moments = iter(passes.moments(point, asked_of, "how much the scores vary"))
+    known: dict[str, _Spread] = {}
+    for t in wanted:
+        spread = next(moments).spread()
+        known[t.label] = (
+            spread,
+            None if t.shares is None else share_left(next(moments), t.shares.root.shape[1]),
+        )
     scores = {
         n: held.best(n, lambda label: _accept(held, sums, base, label, known.get(label)).score)[0]
         for n in asked
@@ -77,27 +84,30 @@ class _Test:
     label: str
     score: Score
     combination: Combination | None
+    shares: InformationShares | None
 
 
-def _accept(held: Probed, sums: WindowSums, base: Sequence[str], label: str, spread: Array | None) -> _Test:
-    """Test one effect; without the scores' spread, say for which combination it is wanted."""
+def _accept(held: Probed, sums: WindowSums, base: Sequence[str], label: str, known: _Spread | None) -> _Test:
+    """Test one effect; without the scores' spread, say of what it is wanted."""
     found = projection(sums.hessian, sums.slope, held.layout, base, label)
-    wanted: list[Combination] = []
+    wanted: list[tuple[Combination, InformationShares | None]] = []
 
     def factor(step: Array, spent: int) -> float:
-        if spread is not None:
-            return ratio(spread, found.information, sums.windows, spent)
+        if known is not None:
+            return inflation(known[0], found.information, sums.windows, spent, known[1])
         size, own = len(sums.slope), np.eye(len(found.own))
         c, f, carry = following(sums.hessian, held.layout, base, label)
         scores, moved, along = np.zeros((len(own), size)), np.zeros((len(own), size)), np.zeros(size)
         scores[:, found.own], scores[:, found.others] = own, -found.carry
         moved[:, c], moved[:, f] = own, -carry
         along[c], along[f] = step, -carry.T @ step
-        wanted.append(Combination(scores, moved, along))
+        few = are_few(sums.windows, spent)
+        shares = InformationShares(moved, inverse_root(found.information)) if few else None
+        wanted.append((Combination(scores, moved, along), shares))
         return 1.0
 
     score = score_from_sums(held.layout, label, found.gradient, found.information, factor, sums.windows)
-    return _Test(label, score, wanted[0] if wanted else None)
+    return _Test(label, score, *(wanted[0] if wanted else (None, None)))
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from auvnn.effects import Extent
 from auvnn.estimation.initial_states import ROUNDS, fit_initial_states
 from auvnn.estimation.sufficient_statistics import (
     Combination,
+    InformationShares,
     ScoreMoments,
     WindowSums,
     add_parts,
@@ -56,7 +57,7 @@ class LinearisationPoint:
     sigma: Array
     cut: WindowCut
     rounds: int = ROUNDS
-    combinations: tuple[Combination, ...] = ()
+    combinations: tuple[Combination | InformationShares, ...] = ()
 
     @cached_property
     def probed(self) -> Probed:
@@ -137,7 +138,7 @@ class MapReduce:
         return total
 
     def moments(
-        self, point: LinearisationPoint, combinations: Sequence[Combination], words: str
+        self, point: LinearisationPoint, combinations: Sequence[Combination | InformationShares], words: str
     ) -> list[ScoreMoments]:
         """Return the second moments of combinations of all windows' sums.
 

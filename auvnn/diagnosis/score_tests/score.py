@@ -18,16 +18,16 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from auvnn.diagnosis.hypotheses.stated_priors import DETERMINED, FREE, Layout, priors, scales
-from auvnn.diagnosis.score_tests.variance_inflation import TINY, variance_inflation, white_spread
+from auvnn.diagnosis.score_tests.few_windows import are_few, freedom
+from auvnn.diagnosis.score_tests.variance_inflation import TINY, inverse_root, share_left, variance_inflation
 from auvnn.estimation.nuisance_elimination import NormalEquations, carry_of
 from auvnn.estimation.priors import parameters_of
+from auvnn.estimation.sufficient_statistics import InformationShares, ScoreMoments
 from auvnn.estimation.window_normal_equations import Statistics
 
 Array = NDArray[np.float64]
 # Information on a parameter in units of its plausible scale that leaves it no better known than its prior does.
 BLIND = (DETERMINED**-2 - 1.0) / FREE**2
-# Degrees of freedom of the scores' variance that are believed where there are few windows.
-FEW = 40.0
 
 
 @dataclass(frozen=True)
@@ -168,10 +168,12 @@ def score(
         # An effect that shows in few windows makes their scores differ; that is no noise, and is taken out first.
         by_itself = _information_by_window(statistics, layout, base, effect, free)
         left = by_window - by_itself @ step
-        if windows - spent + 1 < FEW:
-            white = white_spread(by_itself, information, statistics.run)
-            return variance_inflation(left, information, statistics.run, white=white)
-        return variance_inflation(left, information, statistics.run, spent)
+        if not are_few(windows, spent):
+            return variance_inflation(left, information, statistics.run, spent)
+        root = inverse_root(information)
+        shares = ScoreMoments.of(InformationShares.rows(by_itself, root), statistics.run)
+        noise = share_left(shares, root.shape[1])
+        return variance_inflation(left, information, statistics.run, left=noise)
 
     return score_from_sums(layout, effect, gradient, information, factor, len(by_window))
 
@@ -234,22 +236,6 @@ def score_from_sums(
     std = np.where(posterior < (DETERMINED * FREE) ** 2, std, np.nan)
     gain = float(np.sum((along - centre) ** 2 * values))
     return Score(effect, p_value, statistic, degrees, factor, estimate, std, evidence, gain)
-
-
-def freedom(windows: int, degrees: int) -> float:
-    """Return the degrees of freedom with which the scores' variance is known.
-
-    With many windows, those of a whole covariance of the scores (Hotelling, 1931, Ann. Math. Stat. 2), which is safe
-    where correlation inflates some directions more than others. What is estimated is one number, though, the mean of
-    as many directions as there are parameters, with neighbours at half weight: with few windows, long ones of
-    vehicles without velocities, that is all there is, and it is worth up to `FEW`.
-
-    Args:
-        windows: B.
-        degrees: parameters that are tested.
-    """
-    one_number = degrees * (windows - 1) / (1.0 + 2.0 * 0.5**2)
-    return max(windows - degrees, min(FEW, one_number), 4.0)
 
 
 def _prior_variance(layout: Layout, effect: str, vectors: Array) -> Array | None:

@@ -19,6 +19,7 @@ from auvnn.diagnosis.full_data.full_data import score_tests
 from auvnn.diagnosis.full_data.large_logs import diagnose_files
 from auvnn.diagnosis.full_data.map_reduce import LinearisationPoint, MapReduce, PartTask, sums_of
 from auvnn.diagnosis.hypotheses.fit import standard_errors
+from auvnn.diagnosis.score_tests import few_windows
 from auvnn.diagnosis.score_tests.probes import probed
 from auvnn.diagnosis.score_tests.score import score
 from auvnn.errors import ConfigError, InputError
@@ -85,9 +86,9 @@ def close(one: Any, other: Any) -> None:
     assert np.allclose(one, other, rtol=1e-10, atol=1e-10 * max(scale, 1e-300), equal_nan=True)
 
 
-def test_tests_of_effects_are_those_of_the_log_in_memory(paths, small_parts, monkeypatch):
-    """As for many windows: of few, a log in memory is asked window by window for what white noise would leave."""
-    monkeypatch.setattr(sys.modules[score.__module__], "FEW", 0.0)
+@pytest.mark.parametrize("few", [40.0, 0.0])
+def test_tests_of_effects_are_those_of_the_log_in_memory(paths, small_parts, monkeypatch, few):
+    monkeypatch.setattr(few_windows, "FEW", few)
     asked = ["ocean_current", "payload"]
     plan, cut = planned(paths)
     at, windows, base = point(paths, cut, asked)

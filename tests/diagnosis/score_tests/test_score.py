@@ -8,8 +8,10 @@ from scipy import stats
 from scipy.stats import kstest
 
 from auvnn.diagnosis.hypotheses.stated_priors import priors
-from auvnn.diagnosis.score_tests.score import freedom, project, score, similarity
-from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation, white_spread
+from auvnn.diagnosis.score_tests.few_windows import freedom
+from auvnn.diagnosis.score_tests.score import project, score, similarity
+from auvnn.diagnosis.score_tests.variance_inflation import inverse_root, share_left, variance_inflation
+from auvnn.estimation.sufficient_statistics import InformationShares, ScoreMoments
 from tests.diagnosis.linear_world import STATED, World, layout
 
 DRAWS = 300
@@ -208,13 +210,14 @@ def test_chance_is_as_rare_as_stated_with_few_windows(windows, parameters, large
     each, run = root @ root.transpose(0, 2, 1), np.zeros(windows, dtype=int)
     information = each.sum(0)
     inverse = np.linalg.inv(information)
-    white = white_spread(each, information, run)
+    shares = InformationShares.rows(each, inverse_root(information))
+    noise = share_left(ScoreMoments.of(shares, run), parameters)
     below = []
     for _ in range(draws):
         by_window = np.sqrt(larger) * (root @ rng.normal(size=(windows, 2 * parameters, 1)))[..., 0]
         gradient = by_window.sum(0)
         left = by_window - each @ (inverse @ gradient)
-        factor = variance_inflation(left, information, run, white=white)
+        factor = variance_inflation(left, information, run, left=noise)
         statistic = gradient @ inverse @ gradient / factor
         below.append(stats.f.sf(statistic / parameters, parameters, freedom(windows, parameters)))
     for level in (0.05, 0.005):
