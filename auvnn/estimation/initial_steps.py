@@ -59,7 +59,7 @@ def better_of(
 
 def shorter_steps(
     model: GreyBox, windows: Windows, names: Sequence[str], sigma: Array, before: Tensor, initial: Tensor,
-    trial: Tensor, change: tuple[Array, Array, float],
+    follows: Array, own: Array,
 ) -> Tensor | None:  # fmt: skip
     """Return initial states (B, 13) after steps of which some windows take a share; None where that is no remedy.
 
@@ -70,10 +70,10 @@ def shorter_steps(
         sigma: weights of the errors, (18,).
         before: each window's error before the step, (B,).
         initial: states before it, (B, 13).
-        trial: states after the whole of it, (B, 13).
-        change: how the initial states follow the parameters' step, (B, 12), what they gain for themselves, (B, 12), and
-            the share of both that damping leaves.
+        follows: how the initial states follow the parameters' step, (B, 12), see `moved`.
+        own: what each gains for itself, (B, 12), of which a window may take a share.
     """
+    trial = moved(initial, torch.as_tensor(follows + own))
     if not bool(torch.isfinite(trial).all()):
         return None
     lowest = _costs(model, windows, names, sigma, trial)
@@ -81,10 +81,10 @@ def shorter_steps(
     if not bool(raised.any()) or float(raised.double().mean()) > MOST:
         return None
     chosen = raised.numpy()
-    some, follows, own = windows.pick(chosen), change[0][chosen], change[1][chosen]
+    some, follows, own = windows.pick(chosen), follows[chosen], own[chosen]
     best, least = trial[raised], lowest[raised]
     for share in SHARES:
-        at = moved(initial[raised], torch.as_tensor((follows + share * own) * change[2]))
+        at = moved(initial[raised], torch.as_tensor(follows + share * own))
         cost = _costs(model, some, names, sigma, at)
         best = torch.where((cost < least)[:, None], at, best)
         least = torch.minimum(cost, least)

@@ -177,8 +177,8 @@ def fit(
             if there is None and windows.law is None:
                 # A few windows that are far from linear in their initial states must not hold up all others.
                 costs = window_costs([r.error for r in here], sigma)
-                shares = change - a, a, 1.0 / (1.0 + damping)
-                shorter = shorter_steps(model, windows, names, sigma, costs, initial, trial, shares)
+                follows, own = (change - a) / (1 + damping), a / (1 + damping)
+                shorter = shorter_steps(model, windows, names, sigma, costs, initial, follows, own)
                 if shorter is not None:
                     trial = shorter
                     there = _answered(model, windows, trial, names, sigma, most - penalty(reached))

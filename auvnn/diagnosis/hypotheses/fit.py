@@ -61,6 +61,11 @@ class FittedHypothesis:
         """Root-mean-square weighted error on what was left out; one is noise alone."""
         return float(np.sqrt(self.left_out.sum() / max(self.left_out_count.sum(), 1.0)))
 
+    def squared_error(self, sigma: Array) -> float:
+        """Return the squared error of free running by weights that all explanations of a log share, sigma (18,)."""
+        seen = np.isfinite(sigma)
+        return float((self.fitted.statistics.channel.sum(0)[seen] / sigma[seen] ** 2).sum())
+
 
 def folds(run: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the fold of windows of these runs, (B,): by run where there are several, else by stretch of time."""

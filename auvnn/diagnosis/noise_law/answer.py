@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.noise_law.command_holding import Holding, cost_at_best, holding, squared_error
+from auvnn.diagnosis.noise_law.command_holding import Holding, cost_at_best, holding
 from auvnn.diagnosis.noise_law.estimate_law import ALPHA_BOUNDARY
 from auvnn.diagnosis.noise_law.hypothesis import WithForce, under_its_law
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
@@ -104,7 +104,7 @@ def _held(state: State) -> tuple[FittedHypothesis, Holding]:
     sigma = state.first.fitted.sigma
     known = [state.first, *state.tried, state.refuted or state.current]
     least, held = state.first, Holding("held", 0.0, 0.0, 0.0)
-    for end in sorted(known, key=lambda e: squared_error(e, sigma)):
+    for end in sorted(known, key=lambda e: e.squared_error(sigma)):
         with suppress(np.linalg.LinAlgError):
             least, held = end, holding(end, state.windows)
             break

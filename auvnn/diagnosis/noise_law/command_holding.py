@@ -171,12 +171,6 @@ def _vertex(name: str, costs: tuple[float, float, float], plain: float) -> Holdi
     return Holding(name, share, odds, plain - least)
 
 
-def squared_error(explanation: FittedHypothesis, sigma: Array) -> float:
-    """Return an explanation's squared error by weights that all explanations of a log share, sigma (18,)."""
-    seen = np.isfinite(sigma)
-    return float((explanation.fitted.statistics.channel.sum(0)[seen] / sigma[seen] ** 2).sum())
-
-
 def cost_at_best(first: FittedHypothesis, windows: Windows, sigma: Array | None = None) -> float:
     """Return the squared error with everything that is uncertain following, to first order, its priors in it.
 

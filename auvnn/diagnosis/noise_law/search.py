@@ -256,12 +256,6 @@ class ForceSearch:
                         guess=replace(at, model=guess), sigma=self.weights, iterations=STEPS,
                     )
                 )  # fmt: skip
-                if self._squared(found[-1]) <= self._squared(current.explanation):
+                if found[-1].squared_error(self.weights) <= current.explanation.squared_error(self.weights):
                     break
-        return min(found, key=self._squared, default=None)
-
-    def _squared(self, explanation: FittedHypothesis) -> float:
-        """Return the squared errors of free running by the search's weights."""
-        usable = np.isfinite(self.weights)
-        each = explanation.fitted.statistics.channel.sum(0)[usable]
-        return float((each / self.weights[usable] ** 2).sum())
+        return min(found, key=lambda e: e.squared_error(self.weights), default=None)

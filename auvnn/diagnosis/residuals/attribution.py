@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,8 @@ from auvnn.estimation.window_normal_equations import Statistics, linearise, norm
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
+# A degree of freedom and what is measured.
+Input = tuple[int, str]
 # Share of what is unexplained, below which a dependence is not worth a word; standard errors of its gain, below which
 # it may be chance; and the most inputs that are reported.
 LEAST, SURE, MOST = 0.02, 2.0, 8
@@ -53,11 +56,9 @@ def attribute_residual(explanation: FittedHypothesis, windows: Windows) -> Attri
         the shares; none where nothing measured explains anything.
     """
     fitted = explanation.fitted
-    found: dict[str, dict[str, float]] = {axis: {} for axis in AXES}
-    groups: list[tuple[str, dict[str, float]]] = []
     whole = excess_variance(explanation, explanation)
     if whole <= 0:
-        return Attribution(found, {})
+        return Attribution({axis: {} for axis in AXES}, {})
     probe = InputForces(fitted.model, windows)
     model = fitted.model
     asked = model.extended_by(probe)
@@ -66,17 +67,36 @@ def attribute_residual(explanation: FittedHypothesis, windows: Windows) -> Attri
     sums = sums.finite()
     known = len(fitted.theta)
     scale = np.array([p.scale for p in probe.parameters_of])
-    chosen = list(range(known))
     fold = folds(windows.run)
-    left = _left(sums, chosen, explanation, scale, fold)
-    open_ = [(i, n) for i in range(6) for n in probe.inputs]
+
+    def left(chosen: Sequence[Input]) -> Array:
+        columns = [c for i, n in chosen for c in probe.columns(i, n)]
+        return _left(sums, [*range(known), *(known + c for c in columns)], explanation, scale, fold)
+
+    return select_inputs(left, [(i, n) for i in range(6) for n in probe.inputs], whole)
+
+
+def select_inputs(
+    left: Callable[[Sequence[Input]], Array], inputs: Sequence[Input], whole: float
+) -> Attribution:
+    """Return the inputs that explain most, one after the other, each beside those before it.
+
+    Args:
+        left: from inputs to each window's error, (B,), with forces that are functions of these.
+        inputs: that are asked, each for a degree of freedom.
+        whole: the unexplained error of all windows.
+    """
+    found: dict[str, dict[str, float]] = {axis: {} for axis in AXES}
+    groups: list[tuple[str, dict[str, float]]] = []
+    chosen: list[Input] = []
+    now = left(chosen)
     for _ in range(MOST):
         gains = {}
-        for i, n in open_:
-            more = [*chosen, *(known + probe.columns(i, n))]
-            gain = left - _left(sums, more, explanation, scale, fold)
-            if gain.sum() >= LEAST * whole and gain.sum() >= SURE * _standard_error(gain):
-                gains[i, n] = gain
+        for each in inputs:
+            if each not in chosen:
+                gain = now - left([*chosen, each])
+                if gain.sum() >= LEAST * whole and gain.sum() >= SURE * _standard_error(gain):
+                    gains[each] = gain
         if not gains:
             break
         (axis, name), gain = max(gains.items(), key=lambda item: float(item[1].sum()))
@@ -85,9 +105,8 @@ def attribute_residual(explanation: FittedHypothesis, windows: Windows) -> Attri
         alike = sorted(alike, key=lambda n: -shares[n])[:BESIDE]
         found[AXES[axis]][name] = shares[name]
         groups.append((AXES[axis], {n: shares[n] for n in (name, *alike)}))
-        chosen += list(known + probe.columns(axis, name))
-        left = left - gain
-        open_.remove((axis, name))
+        chosen.append((axis, name))
+        now = now - gain
     inseparable: dict[str, list[list[str]]] = {}
     for label, group in groups:
         # What explains more beside the first of its group has been told for itself.
