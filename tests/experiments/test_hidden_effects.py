@@ -66,3 +66,28 @@ def test_the_readme_is_filled_between_its_marks_and_can_be_filled_again(script, 
     assert once.startswith(text[: text.index(script.BEGIN)]) and once.endswith(text[text.index(script.END) :])
     assert "| `cg_offset` | 4 |" in once and "(figures/confusion.png)" in once
     assert (tmp_path / "figures" / "confusion.png").read_bytes() == b"png"
+
+
+def rows_of(name):
+    return [json.loads(line) for line in (HERE / name).read_text().splitlines()]
+
+
+def test_fresh_logs_of_nothing_are_as_the_text_says():
+    rows = rows_of("rows-nothing.jsonl")
+    adequate = sum(r["verdict"] == "adequate" for r in rows)
+    assert len({r["seed"] for r in rows}) == len(rows) == 200
+    assert sum(bool(r["missing"]) for r in rows) == 200 - adequate
+    assert f"{adequate} of 200 adequate" in (HERE / "README.md").read_text()
+
+
+def test_logs_run_again_have_the_answers_that_the_text_says():
+    def key(row):
+        return tuple(row[k] for k in ("part", "hidden", "size", "seed", "vehicle"))
+
+    def answer(row):
+        return row["verdict"], row["missing"]
+
+    before = {key(r): answer(r) for r in rows_of("rows.jsonl")}
+    again = [r for r in rows_of("rows-paired.jsonl") if key(r) in before]
+    same = sum(answer(r) == before[key(r)] for r in again)
+    assert f"{same} of {len(again)} have the answer" in (HERE / "README.md").read_text()
