@@ -43,3 +43,13 @@ def test_derivatives_are_treated_alike():
 def test_the_measurement_before_is_found_across_gaps():
     mask = torch.tensor([1.0, 0.0, 0.0, 1.0, 1.0])[None, :, None]
     assert previous(mask)[0, :, 0].tolist() == [-1, 0, 0, 0, 3]
+
+
+def test_two_measurements_of_one_moment_are_as_good_as_one():
+    """They say the same of a process: their difference is rounding, and must not count as infinitely unlikely."""
+    mask, times = torch.ones(1, 3, 18), torch.tensor([[0.0, 1.0, 1.0]], dtype=torch.float64)
+    colour = NoiseColour(np.full(18, 0.5))
+    errors = torch.tensor([1.0, 2.0, 2.0], dtype=torch.float64)[None, :, None].expand(1, 3, 18).contiguous()
+    found = colour.whitened(errors, mask, times)
+    assert torch.isfinite(found).all() and (found[:, 2].abs() < 0.1).all()
+    assert torch.isfinite(torch.as_tensor(colour.log_determinant(mask, times)))

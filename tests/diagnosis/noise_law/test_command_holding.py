@@ -153,3 +153,21 @@ def test_names_stand_against_another_law_only_if_they_explain_more(model, monkey
     )
     least, law = _held(state)
     assert (law.name == "held") == (name == "held") and (least is named) == (name == "held")
+
+
+@pytest.mark.parametrize(("chosen", "name"), [((), "averaged"), (("lag",), "held")])
+def test_noisy_commands_count_where_no_name_stands(model, monkeypatch, chosen, name):
+    """By what was tried commands seem held, for it has taken up their noise; the fit without any name says averaged."""
+    log = make_log(model, duration=12.0, rate=5.0, noise=0.3)
+    windows, layout = windows_for(model, log), lay_out(model, [])
+    first = fit_hypothesis(layout, windows, list(layout.names), (), iterations=2)
+    less = replace(first.fitted.statistics, channel=0.5 * first.fitted.statistics.channel)
+    tried = replace(first, effects=("lag",), fitted=replace(first.fitted, statistics=less))
+    held, averaged = Holding("held", 0.0, 0.0, 0.0), Holding("averaged", 0.5, 9.0, 9.0, 4)
+    monkeypatch.setattr(answer, "holding", lambda e, w: held if e is tried else averaged)
+    monkeypatch.setattr(answer, "cost_at_best", lambda e, *more: float(e is first))
+    state: Any = SimpleNamespace(
+        first=first, tried=(tried,), refuted=None, current=first, windows=windows, chosen=chosen
+    )
+    least, law = _held(state)
+    assert law.name == name and least is tried

@@ -13,6 +13,7 @@ import torch
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.noise_law import uncertain_commands
 from auvnn.diagnosis.noise_law.command_holding import Holding
 from auvnn.diagnosis.noise_law.uncertain_commands import (
     UncertainWrench,
@@ -116,6 +117,20 @@ def test_what_is_held_is_uncertain_only_as_far_as_it_answers_noise():
     assert not held.smooth.any() and held.step == pytest.approx(0.2)
     straight = uncertain_wrench(first, windows, Holding("linear", 0.5, 9.0, 9.0))
     assert straight.smooth.any() and straight.white == pytest.approx(held.white)
+
+
+@pytest.mark.parametrize("name", ["held", "linear", "averaged"])
+def test_what_answers_noise_counts_by_every_law_of_the_commands(monkeypatch, name):
+    model = GreyBox(small_vehicle())
+    first, windows = fitted(model, make_log(model, duration=20.0, rate=5.0, noise=0.3))
+    answered = np.array([1e6, 0.0, 0.0, 0.0, 0.0, 0.0])
+    monkeypatch.setattr(uncertain_commands, "noise_answered", lambda *_: answered)
+    held = Holding(name, 0.5, 0.0 if name == "held" else 9.0, 9.0, 4)
+    found = uncertain_wrench(first, windows, held)
+    assert found.white[0] == 1e6
+    # Averages leave white uncertainty of their own, in the other degrees of freedom too; lines a smooth one.
+    assert (found.white[1:] > 0.0).any() == (name == "averaged")
+    assert found.smooth.any() == (name == "linear")
 
 
 def test_fins_in_the_flow_count_too():
