@@ -97,7 +97,7 @@ def _candidate_words(candidate: Mapping[str, Any]) -> str:
     fall, _ = improvement(candidate)
     if fall is not None:
         direction = "lowers" if fall > 0 else "raises"
-        words += f" and {direction} the error on runs that it was not fitted on by {percent(abs(fall))}"
+        words += f" and {direction} the error over windows left out, noise included, by {percent(abs(fall))}"
     return f"{words}; p = {p_value(candidate.get('p_value'))}.".replace("p = <", "p <")
 
 
