@@ -27,6 +27,9 @@ from auvnn.models import GreyBox
 Array = NDArray[np.float64]
 # The difference of white noise from the mean of its neighbours has so many times its variance.
 NEIGHBOURS = 1.5
+# Share of it that must answer the sensors' noise, and the correlation with the next sample below which it is white: -2/3
+# of white noise, -1/2 of a step now and then, more of what is smooth.
+ANSWERS, WHITE = 0.05, -0.52
 
 
 @dataclass(frozen=True)
@@ -110,7 +113,9 @@ def noise_answered(end: FittedHypothesis, windows: Windows) -> Array:
     """Return the rms of the wrench with which the commands answer the sensors' noise, (6,), N and N m.
 
     What differs from the mean of both neighbours is taken for fast, in commands and fins as in the errors of the
-    measurements, and the one is regressed on the other.
+    measurements, and the one is regressed on the other. Where that explains a part of a command, and what is fast of it
+    goes from sample to sample as white noise does, all of that counts: the rest answers noise that the log does not have,
+    of the measurements between its samples.
 
     Args:
         end: the explanation whose errors stand for the noise.
@@ -141,8 +146,10 @@ def noise_answered(end: FittedHypothesis, windows: Windows) -> Array:
         whole, share = (target**2).sum(0), regressors.shape[1] / len(regressors)
         own = np.maximum((fitted_rows**2).sum(0) - share * whole, 0.0)
         kept = np.sqrt(own / np.maximum((fitted_rows**2).sum(0), 1e-300) / NEIGHBOURS)
+        # A controller that answers this noise answers that of the measurements between samples too.
+        all_noise = (own > ANSWERS * whole) & (_next_to_one_another(_fast(rows), usable) < WHITE)
         less = torch.zeros_like(rows)
-        less[usable] = torch.as_tensor(fitted_rows * kept)
+        less[usable] = torch.as_tensor(np.where(all_noise, target / np.sqrt(NEIGHBOURS), fitted_rows * kept))
         return torch.cat([values[:, : windows.warmup], rows - less], dim=1)
 
     calm = replace(
@@ -162,6 +169,13 @@ def _fast(values: Tensor) -> Tensor:
     out = torch.zeros_like(values)
     out[:, 1:-1] = values[:, 1:-1] - 0.5 * (values[:, :-2] + values[:, 2:])
     return out
+
+
+def _next_to_one_another(fast: Tensor, usable: Tensor) -> Array:
+    """Return the correlation of what is fast with what is at the next sample, (n,)."""
+    pairs = usable[:, :-1] & usable[:, 1:]
+    one, other = fast[:, :-1][pairs].numpy(), fast[:, 1:][pairs].numpy()
+    return (one * other).sum(0) / np.maximum(0.5 * (one**2 + other**2).sum(0), 1e-300)
 
 
 def _inner(known: Tensor, windows: Windows) -> Tensor:

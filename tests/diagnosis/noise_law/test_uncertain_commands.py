@@ -22,7 +22,7 @@ from auvnn.diagnosis.noise_law.uncertain_commands import (
     uncertain_wrench,
 )
 from auvnn.models import GreyBox, load
-from tests.small_logs import make_log, small_vehicle
+from tests.small_logs import make_log, sines, small_vehicle
 
 
 def fitted(model, log):
@@ -117,6 +117,36 @@ def test_what_is_held_is_uncertain_only_as_far_as_it_answers_noise():
     assert not held.smooth.any() and held.step == pytest.approx(0.2)
     straight = uncertain_wrench(first, windows, Holding("linear", 0.5, 9.0, 9.0))
     assert straight.smooth.any() and straight.white == pytest.approx(held.white)
+
+
+@pytest.mark.parametrize(
+    ("answers", "dwell", "counts"),
+    [
+        # A controller faster than the log: noise of its own between samples, as large as that of the samples.
+        (True, 1, True),
+        # A command that is white, of itself: nothing answers.
+        (False, 1, False),
+        # Steps that are held for some samples, with a share that answers: only the share counts.
+        (True, 8, False),
+    ],
+)
+def test_all_of_a_noisy_command_counts_where_it_answers_noise_and_is_white(answers, dwell, counts):
+    """Heave's command has -30 N s/m of the velocity's noise, 0.12 N, and as much again of noise between the samples."""
+    model, random = GreyBox(small_vehicle(), actuation="wrench"), np.random.default_rng(5)
+    command = 8.0 * sines(np.arange(401) / 10.0, 6, 2, high=0.08)
+    if not counts:
+        command[:, 2] += random.normal(size=401)[np.arange(401) // dwell * dwell]
+    first, windows = fitted(model, make_log(model, duration=40.0, rate=10.0, noise=0.3, command=command))
+    noise, between = torch.as_tensor(random.normal(size=(2, *windows.nu.shape[:2])))
+    nu, given = windows.nu.clone(), windows.inputs.command.clone()
+    nu[..., 2] += 0.004 * noise
+    if answers:
+        given[:, windows.warmup :, 2] -= 0.12 * (noise + between if counts else noise)
+    found = noise_answered(first, replace(windows, nu=nu, inputs=replace(windows.inputs, command=given)))
+    if counts:
+        assert found[2] == pytest.approx(np.hypot(0.12, 0.12), rel=0.1)
+    else:
+        assert found[2] < 0.14
 
 
 @pytest.mark.parametrize("name", ["held", "linear", "averaged"])
