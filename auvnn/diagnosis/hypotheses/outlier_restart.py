@@ -26,6 +26,8 @@ DIVERGED, NEAR = 3.0, 2.0
 WILD = 1e3
 # How often at most a fit is begun again, and steps of a window's initial state on its own.
 TRIES, ALONE = 3, 30
+# Share of the errors, or of the squared error by fixed weights, below which another start has brought no window back.
+WORTH = 0.01
 # Each is fitted on its own where they are no larger a share of all.
 FEW = 0.15
 
@@ -73,10 +75,14 @@ def fit_with_outlier_restart(
             again = _begun_again(best, model, windows, names, priors, near, sigma, iterations)
         except FitError:
             break
-        worse = _errors(again) >= _errors(best) if sigma is None else again.cost >= best.cost
-        if worse:
+        gain = _errors(best) - _errors(again) if sigma is None else best.cost - again.cost
+        if not gain > 0.0:
             break
+        little = gain < (WORTH * best.statistics.count.sum() if sigma is None else WORTH * best.cost)
         best = again
+        if little:
+            # A model that is wrong has windows of large errors wherever it begins.
+            break
     return best
 
 
