@@ -38,8 +38,9 @@ def doubts(model: GreyBox, log: Log) -> list[str]:
     if float(np.hypot(north, east)) < _SLOWEST or chi < _CLEAR or share < _SHARE:
         return []
     return [
-        f"velocities are over ground, and what is left looks like a current of about {north:.2f} m/s north and "
-        f"{east:.2f} m/s east (standard errors {north_std:.1g} and {east_std:.1g}): consider the effect ocean_current"
+        "velocities are over ground, and what the model as given leaves looks like a current of about "
+        f"{north:.2f} m/s north and {east:.2f} m/s east (standard errors {north_std:.1g} and {east_std:.1g}): "
+        "consider the effect ocean_current"
     ]
 
 

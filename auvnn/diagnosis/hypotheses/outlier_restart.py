@@ -26,7 +26,8 @@ DIVERGED, NEAR = 3.0, 2.0
 WILD = 1e3
 # How often at most a fit is begun again, and steps of a window's initial state on its own.
 TRIES, ALONE = 3, 30
-# Share of the errors, or of the squared error by fixed weights, below which another start has brought no window back.
+# Mean fall of the logarithm of the errors, or share of the squared error by fixed weights, below which another start has
+# brought no window back.
 WORTH = 0.01
 # Each is fitted on its own where they are no larger a share of all.
 FEW = 0.15

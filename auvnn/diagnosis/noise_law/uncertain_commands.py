@@ -27,8 +27,8 @@ from auvnn.models import GreyBox
 Array = NDArray[np.float64]
 # The difference of white noise from the mean of its neighbours has so many times its variance.
 NEIGHBOURS = 1.5
-# Share of it that must answer the sensors' noise, and the correlation with the next sample below which it is white: -2/3
-# of white noise, -1/2 of a step now and then, more of what is smooth.
+# Share of that difference which must answer the sensors' noise, and its lag-one correlation below which it is white: of
+# white noise that is -2/3, of single steps -1/2, and more of what is smooth.
 ANSWERS, WHITE = 0.05, -0.52
 
 
@@ -147,7 +147,7 @@ def noise_answered(end: FittedHypothesis, windows: Windows) -> Array:
         own = np.maximum((fitted_rows**2).sum(0) - share * whole, 0.0)
         kept = np.sqrt(own / np.maximum((fitted_rows**2).sum(0), 1e-300) / NEIGHBOURS)
         # A controller that answers this noise answers that of the measurements between samples too.
-        all_noise = (own > ANSWERS * whole) & (_next_to_one_another(_fast(rows), usable) < WHITE)
+        all_noise = (own > ANSWERS * whole) & (_lag_one_correlation(_fast(rows), usable) < WHITE)
         less = torch.zeros_like(rows)
         less[usable] = torch.as_tensor(np.where(all_noise, target / np.sqrt(NEIGHBOURS), fitted_rows * kept))
         return torch.cat([values[:, : windows.warmup], rows - less], dim=1)
@@ -171,7 +171,7 @@ def _fast(values: Tensor) -> Tensor:
     return out
 
 
-def _next_to_one_another(fast: Tensor, usable: Tensor) -> Array:
+def _lag_one_correlation(fast: Tensor, usable: Tensor) -> Array:
     """Return the correlation of what is fast with what is at the next sample, (n,)."""
     pairs = usable[:, :-1] & usable[:, 1:]
     one, other = fast[:, :-1][pairs].numpy(), fast[:, 1:][pairs].numpy()
