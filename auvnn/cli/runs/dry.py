@@ -20,7 +20,8 @@ def check_inputs(job: Job, several: bool = False) -> None:
     kinds = _beginnings(job)
     model = _model(job, kinds, several)
     for key in ("effect", "effects", "hidden"):
-        if options.get(key) is not None:
+        # Nothing may be hidden; a list of effects to look for must not be empty.
+        if options.get(key) is not None and not (key == "hidden" and options[key] == []):
             _names(job, key, model)
     if "window" in options:
         from auvnn.diagnosis.hypotheses.candidates import check_window_length

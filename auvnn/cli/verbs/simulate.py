@@ -47,7 +47,7 @@ def _run(job: Job) -> Answering:
 
 def _named(job: Job) -> dict[str, dict[str, float] | None]:
     hidden = job["hidden"]
-    if hidden is None:
+    if hidden is None or hidden == []:
         return {}
     if isinstance(hidden, dict):
         return hidden
