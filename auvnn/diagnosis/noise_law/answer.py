@@ -32,12 +32,11 @@ from auvnn.diagnosis.stages.what_is_left import settled
 from auvnn.metrics.force_law import ForceLaw
 
 Array = NDArray[np.float64]
-# Share of a degree of freedom's force that measured inputs may predict (lower 95 % limit) before it is no noise.
-PREDICTABLE = 0.1
 # Share of the force beyond which a name has left most of it.
 MOST = 0.5
-# A stochastic force beyond this share of the actuators' is no disturbance: the model lacks what moves the vehicle.
-LARGEST, SECOND = 0.5, 1.0
+# A stochastic force beyond this share of the actuators' is no disturbance: the model lacks what moves the vehicle. A name
+# that leaves less than this share of what there was has explained that.
+LARGEST, SECOND, EXPLAINED = 0.5, 1.0, 0.25
 UNDECIDED = (
     "names were not compared together with a stochastic force: with one, free running grows without bound; "
     "choose shorter windows with window="
@@ -138,12 +137,27 @@ def _with_force(
     predicted = _predictable(asked, result)
     if predicted is not None and not asked.tolerance.strict:
         # What inputs predict has a cause: one that costs little is taken where nothing is predicted beside it.
-        beside.ignores_cost = True
+        beside.ignores_cost = beside.looks_further = True
         again = beside.run(null, alone, asked.most)
-        if _predictable(asked, again) is None:
-            result, predicted = again, None
+        left = _predictable(asked, again)
+        if left is None or goes_further(again, result):
+            result, predicted = again, left
     ended = _state(asked, state, result, uncertain, chance=predicted is None)
     return ended, result.estimate.law, predicted
+
+
+def goes_further(again: WithForce, before: WithForce) -> bool:
+    """Whether further names after the same ones leave less than half of a force of which those leave more.
+
+    Names that leave most of a force that measured inputs predict are withheld: with several causes at once the first of
+    them leaves most, however right it is.
+
+    Args:
+        again: the search that also looks at names that cost little or bring little.
+        before: the search that does not.
+    """
+    same = [s["effects"] for s in again.steps[: len(before.steps)]] == [s["effects"] for s in before.steps]
+    return bool(before.steps) and same and _share_left(before) > MOST >= _share_left(again)
 
 
 def _leaves_force(asked: Setting, state: State, end: FittedHypothesis) -> bool:
@@ -155,7 +169,7 @@ def _predictable(asked: Setting, result: WithForce) -> InputPrediction | None:
     """Return what measured inputs predict of the force, None where that is little."""
     asked.say("asking how much of the force measured inputs predict")
     predicted = predicted_by_inputs(under_its_law(result.last), result.windows)
-    return None if predicted is None or predicted.least <= PREDICTABLE else predicted
+    return predicted if predicted is not None and predicted.matters else None
 
 
 def _state(
@@ -168,9 +182,7 @@ def _state(
     for explanation in result.tried:
         table = fill_candidate(asked.layout, table, explanation, state.first)
     share = _share_left(result)
-    # A force that follows from what is measured is no noise: a name beside which most of it stays is not its cause.
-    refuted = (not chance and share > MOST) or exceeds_actuators(asked, state, law)
-    named = [] if refuted else list(result.steps)
+    named = [] if refuted(asked, state, law, share, chance=chance) else list(result.steps)
     tried = [e for s in result.steps for e in s["effects"]]
     end: SearchStep = {
         "verdict": "adequate" if small else "unknown",
@@ -197,6 +209,24 @@ def _state(
         refuted=None,
         unexplained=share if named else state.unexplained,
     )
+
+
+def refuted(asked: Setting, state: State, law: ForceLaw | None, share: float, *, chance: bool) -> bool:
+    """Whether what is left says that names are not the cause.
+
+    A force that follows from what is measured is no noise: names beside which most of it stays are not its cause. Nor
+    are names beside which a force stays that is too large for a disturbance, unless they have explained most of it.
+
+    Args:
+        asked: layout.
+        state: windows over which the force was sought.
+        law: of the stochastic force that is left; None where none was found.
+        share: of the force, before any name, that is left.
+        chance: whether nothing that is measured predicts it.
+    """
+    if not chance and share > MOST:
+        return True
+    return share > EXPLAINED and exceeds_actuators(asked, state, law)
 
 
 def exceeds_actuators(asked: Setting, state: State, law: ForceLaw | None) -> bool:

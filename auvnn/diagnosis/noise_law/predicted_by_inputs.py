@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out
 from auvnn.diagnosis.residuals.additive_force_test import _by_part
 from auvnn.diagnosis.residuals.input_forces import ANGLES, AXES, InputForces, _euler, _raw
-from auvnn.estimation.window_normal_equations import Statistics
+from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
+# Share of a degree of freedom's force that measured inputs may predict (lower 95 % limit) before it is no noise.
+PREDICTABLE = 0.1
 # Standard errors of a gain on runs left out, below which it may be chance; many inputs are asked.
 SURE = 3.0
 # One-sided 95 per cent.
@@ -43,6 +45,11 @@ class InputPrediction:
     share: float
     least: float
     gain: float = 0.0
+
+    @property
+    def matters(self) -> bool:
+        """Whether surely more is predicted than a stochastic force leaves room for."""
+        return self.least > PREDICTABLE
 
 
 def predicted_by_inputs(explanation: FittedHypothesis, windows: Windows) -> InputPrediction | None:

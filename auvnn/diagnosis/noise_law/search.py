@@ -26,6 +26,7 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     GROUP,
     Hypothesis,
     WithForce,
+    confused,
     free_running_cost,
     judged,
     p_value_of,
@@ -33,6 +34,7 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     tied,
 )
 from auvnn.diagnosis.noise_law.leaders import rivals_of
+from auvnn.diagnosis.noise_law.predicted_by_inputs import predicted_by_inputs
 from auvnn.diagnosis.noise_law.relinearise import UNSOLVED, relinearised
 from auvnn.diagnosis.noise_law.sums import CELL, force_sums
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
@@ -78,7 +80,7 @@ class ForceSearch:
         self.log, self.scale = asked.log, scale_of(asked.log)
         self.sigma = self.weights = np.full(18, np.inf)
         self.cell = CELL
-        self.ignores_cost = asked.tolerance.strict
+        self.ignores_cost, self.looks_further = asked.tolerance.strict, False
         self._first_look: tuple[Hypothesis, Tested, list[Hypothesis]] | None = None
 
     def begin(self, first: FittedHypothesis, sigma: Array) -> Hypothesis | None:
@@ -143,7 +145,8 @@ class ForceSearch:
             # Beside what was found the variance is no longer inflated by it: the tests say whether to go on.
             if chosen and tested.p_value >= ALPHA:
                 break
-            odds = max(ODDS, FURTHER_SHARE * (current.evidence - null.evidence))
+            share = 0.0 if self.looks_further else FURTHER_SHARE
+            odds = max(ODDS, share * (current.evidence - null.evidence))
             found = known[1] if known else self._fitted(tested, current, base, chosen, fitted, odds)
             if not chosen:
                 self._first_look = null, tested, found
@@ -152,19 +155,15 @@ class ForceSearch:
                 tried = found
                 whole = min([tested.p_value, *sure.values()], default=1.0)
             level, least = (ALPHA_FURTHER, GAIN_FURTHER) if chosen else (ALPHA_NAME, GAIN)
-            cost = FURTHER_COST if chosen else FIRST_COST
-            good = [
+            likely = [
                 h
                 for h in found
                 if h.evidence > current.evidence + odds
                 and sure[h.name] < level
                 and predicts_better(h, current, least)
-                and (
-                    self.ignores_cost
-                    or free_running_cost(h, current, self.log, self.scale) > cost * self.tolerance.cost
-                )
             ]
-            if not good:
+            good = self._paying(likely, current, FURTHER_COST if chosen else FIRST_COST)
+            if not good or (chosen and self._takes_up(good[0], chosen)):
                 break
             group = tied(self.layout, good, current)
             if len(group) > GROUP:
@@ -188,6 +187,38 @@ class ForceSearch:
             whole,
             null.estimate.law,
         )
+
+    def _paying(self, likely: Sequence[Hypothesis], current: Hypothesis, share: float) -> list[Hypothesis]:
+        """Return those explanations that cost enough, none where a likelier one makes free running worse.
+
+        What the data prefer at odds of a hundred, and what free running contradicts, says that neither can be trusted.
+
+        Args:
+            likely: explanations, the most evident first.
+            current: that without them.
+            share: of the tolerated cost that is enough.
+        """
+        if self.ignores_cost:
+            return list(likely)
+        enough = share * self.tolerance.cost
+        costs = [free_running_cost(h, current, self.log, self.scale) for h in likely]
+        good = [h for h, cost in zip(likely, costs, strict=True) if cost > enough]
+        worse = [h for h, cost in zip(likely, costs, strict=True) if cost < -enough]
+        contradicted = good and any(h.evidence > good[0].evidence + ODDS for h in worse)
+        return [] if contradicted else good
+
+    def _takes_up(self, further: Hypothesis, chosen: Sequence[str]) -> bool:
+        """Whether a further effect only takes up what the shape of an earlier one gets wrong.
+
+        Where thrust ahead and astern follow curves of another shape, a mean force is left beside the asymmetry that is
+        named: an effect that the catalogue knows to be confused with an earlier one, and beside which measured inputs
+        still predict the force, is no further cause.
+        """
+        law = further.estimate.law
+        if law is None or not any(confused(further.name, name) for name in chosen):
+            return False
+        predicted = predicted_by_inputs(further.weighed, replace(self.windows, law=law))
+        return predicted is not None and predicted.matters
 
     def _fitted(
         self, tested: Tested, current: Hypothesis, base: list[str], chosen: list[str],

@@ -10,7 +10,7 @@ import pytest
 
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.diagnosis.noise_law.answer import exceeds_actuators, negligible
+from auvnn.diagnosis.noise_law.answer import exceeds_actuators, goes_further, negligible, refuted
 from auvnn.diagnosis.noise_law.uncertain_commands import UncertainWrench
 from auvnn.diagnosis.residuals.forces import actuators_of
 from auvnn.metrics.force_law import ForceLaw
@@ -32,6 +32,14 @@ def test_the_mean_over_a_second_is_held_against_the_actuators(share, time, expec
     law = ForceLaw(rms, np.full(6, time), 0.5, 5.0)
     assert exceeds_actuators(asked, state, law) is expected
     assert not exceeds_actuators(asked, state, None)
+    # Names that have explained three quarters of it are not withheld for that; names that leave more are.
+    assert refuted(asked, state, law, 0.3, chance=True) is expected
+    assert not refuted(asked, state, law, 0.2, chance=True)
+    # What measured inputs predict withholds names that leave more than half, however small it is.
+    assert refuted(asked, state, None, 0.6, chance=False) and not refuted(
+        asked, state, None, 0.4, chance=False
+    )
+    assert not refuted(asked, state, None, 0.6, chance=True)
 
 
 @pytest.mark.parametrize(
@@ -57,3 +65,28 @@ def test_what_commands_leave_uncertain_is_no_reason_against_adequate(share, unce
     # White over 0.1 s, a force of 0.4 s has the same power at low frequencies at sqrt(1 / 8) of its rms.
     white = UncertainWrench(np.zeros(6), unknown * np.sqrt(8.0), 0.1)
     assert negligible(asked, state, law, white) is expected
+
+
+@pytest.mark.parametrize(
+    ("names", "left", "before", "expected"),
+    [
+        (["a", "b"], 0.4, ["a"], True),
+        (["a", "b"], 0.6, ["a"], False),
+        (["b", "a"], 0.4, ["a"], False),
+        (["a", "b"], 0.4, [], False),
+    ],
+)
+def test_further_names_after_the_same_ones_stand_where_they_leave_less_than_half(
+    names, left, before, expected
+):
+    def found(effects, share):
+        known = np.full(6, 2.0)
+        return SimpleNamespace(
+            steps=[{"effects": [n]} for n in effects],
+            estimate=SimpleNamespace(law=SimpleNamespace(rms=known * np.sqrt(share))),
+            first_law=SimpleNamespace(rms=known),
+        )
+
+    again: Any = found(names, left)
+    assert goes_further(again, found(before, 0.55)) is expected
+    assert not goes_further(again, found(before, 0.45))

@@ -9,7 +9,11 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.answers.tolerance import Tolerance
+from auvnn.diagnosis.noise_law import search
 from auvnn.diagnosis.noise_law.hypothesis import tied
+from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
+from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.models import GreyBox
 from tests.diagnosis.noise_law.wandering import wandering_log
 from tests.small_logs import small_vehicle
@@ -85,3 +89,49 @@ def test_the_nearly_as_good_do_not_make_a_group_too_large():
         "net_buoyancy",
         "trapped_water",
     ]
+
+
+class Search(ForceSearch):
+    """As much of a search as decides which of the likely explanations cost enough."""
+
+    def __init__(self, **given: Any) -> None:
+        """Look at the cost unless told otherwise."""
+        vars(self).update(
+            {"ignores_cost": False, "tolerance": Tolerance(), "log": None, "scale": None, **given}
+        )
+
+
+def paying(costs, monkeypatch, **given):
+    """Return which of some explanations, each ten in evidence after the one before it, are taken at these costs."""
+    likely = [hypothesis(name, 100.0 + 20.0 * k) for k, name in enumerate(costs)]
+    monkeypatch.setattr(search, "free_running_cost", lambda h, *_: costs[h.name])
+    return [h.name for h in Search(**given)._paying(likely, hypothesis("", 1e4), 0.5)]
+
+
+def test_nothing_is_named_where_the_likeliest_makes_free_running_worse(monkeypatch):
+    assert paying({"tether": 0.2, "waves": 0.01}, monkeypatch) == ["tether"]
+    # One that costs too little to be given does not stand in the way of another one; nor does one that is less likely.
+    assert paying({"waves": 0.01, "tether": 0.2}, monkeypatch) == ["tether"]
+    assert paying({"tether": 0.2, "waves": -0.2}, monkeypatch) == ["tether"]
+    assert paying({"waves": -0.2, "tether": 0.2}, monkeypatch) == []
+    assert paying({"waves": -0.2, "tether": 0.2}, monkeypatch, ignores_cost=True) == ["waves", "tether"]
+
+
+@pytest.mark.parametrize(
+    ("further", "predicted", "expected"),
+    [
+        ("constant_force", 0.3, True),
+        ("constant_force", 0.05, False),
+        ("constant_force", None, False),
+        # Not known to be confused with what was named before it.
+        ("gyro_bias", 0.3, False),
+    ],
+)
+def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_ends_the_search(
+    further, predicted, expected, monkeypatch
+):
+    told = None if predicted is None else InputPrediction("X", "u", 0.5, predicted)
+    monkeypatch.setattr(search, "predicted_by_inputs", lambda *_: told)
+    monkeypatch.setattr(search, "replace", lambda *_, **__: None)
+    law = SimpleNamespace(estimate=SimpleNamespace(law=object()), weighed=None, name=further)
+    assert Search(windows=None)._takes_up(law, ["thrust_asymmetry"]) is expected  # type: ignore[arg-type]
