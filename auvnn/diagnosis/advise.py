@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from auvnn.answer_types import NextExperiment
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, priors
-from auvnn.estimation.window_normal_equations import Statistics, linearise, normal_equations
+from auvnn.estimation.window_normal_equations import linearise, normal_equations
+from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.logs import Log, Run
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import cut_windows

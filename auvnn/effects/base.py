@@ -51,6 +51,8 @@ class Effect(nn.Module):
     excludes: ClassVar[tuple[str, ...]] = ()
     # Parameters of shape in which what the effect does is linear while it is small: the place of a load.
     levers: ClassVar[tuple[str, ...]] = ()
+    # Parameters that act on these levers; what the others do is the same whatever the levers are.
+    carried: ClassVar[tuple[str, ...]] = ()
     # For people: effects that leave a similar trace, and the manoeuvre (configs/excitation) that tells them apart.
     confused_with: ClassVar[tuple[str, ...]] = ()
     manoeuvre: ClassVar[str] = ""

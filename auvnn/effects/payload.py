@@ -40,6 +40,7 @@ class Payload(Effect):
     manoeuvre = "multisine"
     told_apart_by = "the same motion before and after the load is taken, turning included"
     levers = PLACES
+    carried = ("mass", "buoyancy")
     plainer = ("net_buoyancy",)
     time_varying = True
 

@@ -83,6 +83,10 @@ class NormalEquations:
         scale = 1.0 / np.where(unit > 0.0, unit, 1.0)
         return bounded_step(even, self.right * unit, low * scale, high * scale) * unit
 
+    def gain(self, step: Array) -> float:
+        """Return by how much a step, (P,), lowers the squared error: 2 r^T x - x^T S x."""
+        return float(2.0 * self.right @ step - step @ self.square @ step)
+
     def covariance(self) -> Array:
         """Return the inverse of S, (P, P); zero where S says nothing."""
         even, unit = self.scaled

@@ -22,7 +22,7 @@ from auvnn.errors import InputError
 from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.prediction_error import FitError, Fitted
 from auvnn.estimation.priors import Priors, parameters_of, set_parameters
-from auvnn.estimation.window_normal_equations import Statistics
+from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.logs import Log
 from auvnn.metrics.derivative import Derivative
 from auvnn.metrics.one_step import RunComparison

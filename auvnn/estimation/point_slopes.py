@@ -61,10 +61,10 @@ class OperatingPoint(nn.Module):
         # First order in `turn` is all that a derivative at zero needs.
         rotation = rotation + rotation @ skew(turn)
         if what == "rate":
-            return self.model.nu_dot(position, rotation, nu, thrust, inputs, time)
+            return self.model.nu_dot(position, rotation, nu, thrust, inputs, time, first_order=True)
         rate = None
         if what == "sense and rate":
-            rate = self.model.nu_dot(position, rotation, nu, thrust, inputs, time)
+            rate = self.model.nu_dot(position, rotation, nu, thrust, inputs, time, first_order=True)
         turned = quat_multiply(quaternion, rotvec_to_quat(turn))
         seen = self.model.sense(Sensed(position, turned, nu, rate))
         angle = quat_to_rotvec(quat_multiply(quat_conjugate(quaternion), seen.quaternion))
@@ -82,8 +82,10 @@ def flat(inputs: Inputs) -> tuple[Inputs, Inputs]:
 
 def differentiate(
     module: OperatingPoint, what: str, points: tuple, thetas: dict[str, Tensor], chunk: int
-) -> list[Tensor]:
-    """Return derivatives of a function of a point by position, turn, velocity, thrust and each theta, (N, out, in).
+) -> Tensor:
+    """Return derivatives of a function of a point, (N, out, 12 + n + P).
+
+    The columns are those of position, turn and velocity, of the n thrusts, and of each theta in turn.
 
     Args:
         module: the model's functions of a point.
@@ -119,16 +121,20 @@ def differentiate(
     inputs, axes = flat(points[5])
     slope = jacrev(one, argnums=(0, 1, 2, 3, 4, 5))
     many = vmap(slope, in_dims=(0, None, 0, 0, None, None, 0, 0, axes))
-    found: list[list[Tensor]] = []
+    size = 12 + thrust.shape[-1] + sum(theta.numel() for theta in thetas.values())
+    # The largest of all arrays: made once, and not joined from pieces.
+    found = nu.new_empty(0)
     for begin in range(0, len(nu), chunk):
         p, q, v, f, t = (x[begin : begin + chunk] for x in (position, quaternion, nu, thrust, time))
         extra = inputs.rows(begin, begin + chunk)
         of = vmap(note, in_dims=(0, 0, 0, 0, 0, axes))(p, q, v, f, t, extra) if effects else []
         by = many(p, turn, v, f, others, zero_slopes(of), q, t, extra)
         through = {key: concatenate_slopes(by[5][k], of[k]) for k, key in enumerate(replayed)}
-        by_theta = (through[key] if key in through else by[4][key].flatten(2) for key in thetas)
-        found.append([x.detach() for x in (*by[:4], *by_theta)])
-    return [torch.cat(parts) for parts in zip(*found, strict=True)]
+        by_theta = [through[key] if key in through else by[4][key].flatten(2) for key in thetas]
+        if not len(found):
+            found = nu.new_empty(len(nu), by[0].shape[1], size)
+        torch.cat([x.detach() for x in (*by[:4], *by_theta)], dim=-1, out=found[begin : begin + chunk])
+    return found
 
 
 def _flatten_inputs(i: Inputs) -> tuple[list, None]:

@@ -25,7 +25,6 @@ from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameter
 from auvnn.estimation.sensitivity import Response
 from auvnn.estimation.window_normal_equations import (
     TRUST,
-    Statistics,
     cost_of,
     linearise,
     motion,
@@ -34,6 +33,7 @@ from auvnn.estimation.window_normal_equations import (
     weights_of,
 )
 from auvnn.estimation.window_simulation import runs_by_block
+from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
@@ -43,6 +43,10 @@ Array = NDArray[np.float64]
 SINGULAR = torch.linalg.LinAlgError  # pyright: ignore[reportPrivateImportUsage]
 # A fit goes on beyond its steps while each takes this share off the squared error, up to so many times as many steps.
 FALLING, PATIENCE = 0.01, 5
+# A fit has settled where a step lowers the squared error by no more than this, and by this share of it, while the
+# logarithms of the weights change by less than this.
+LITTLE, TINY, DRIFT = 0.05, 1e-6, 0.02
+AS_PROMISED = 0.25
 
 
 class FitError(InputError):
@@ -140,6 +144,8 @@ def fit(
         for _ in range(2):
             sigma = residual_std(normal_equations(windows, here, sigma)[0], floor, 0)
     converged, taken, allowed, damping = False, 0, iterations, 0.0
+    drift = 0.0 if fixed else np.inf
+    settled: tuple[Statistics, Array, Array] | None = None
 
     def penalty(at: Array) -> float:
         return priors.penalty(at)
@@ -166,8 +172,18 @@ def fit(
         slope = statistics.slope.sum(0)
         known = NormalEquations.with_priors(statistics.total, slope, priors.square, theta - priors.mean)
         now = cost_of(here, sigma) + penalty(theta)
-        for _attempt in range(8):
-            step = known.bounded(low - theta, high - theta, damping=damping)
+        step = known.bounded(low - theta, high - theta, damping=damping)
+        promised = now - penalty(theta) - float(statistics.cost.sum()) + known.gain(step)
+        if promised < LITTLE + TINY * now and drift < DRIFT and damping == 0.0 and windows.law is None:
+            # So short a step is taken as the equations have it: what it does need not be worked out again.
+            set_parameters(model, names, theta + step)
+            short = parameters_of(model, names) - theta
+            settled = statistics.after(short), a - np.einsum("bij,j->bi", slopes, short), slopes
+            theta, converged, taken = theta + short, True, taken - 1
+            break
+        for attempt in range(8):
+            if attempt:
+                step = known.bounded(low - theta, high - theta, damping=damping)
             set_parameters(model, names, theta + step)
             reached = parameters_of(model, names)
             change = a - np.einsum("bij,j->bi", slopes, reached - theta)
@@ -189,7 +205,10 @@ def fit(
         else:
             set_parameters(model, names, theta)
             break
-        gain, damping = now - then, damping / 8 if damping > 1e-4 else 0.0
+        gain = now - then
+        # Where a step did much less than the equations have it, a longer one would do worse.
+        if gain > AS_PROMISED * (now - penalty(theta) - float(statistics.cost.sum()) + known.gain(step)):
+            damping = damping / 8 if damping > 1e-4 else 0.0
         before = theta, initial, sigma
         theta, initial, here = reached, trial, there
         renewed = (
@@ -200,12 +219,12 @@ def fit(
         if progress is not None:
             progress(f"step {taken}: error {then:.4g}")
         sigma = renewed
-        if gain < 0.05 + 1e-6 * now and drift < 0.02:
+        if gain < LITTLE + TINY * now and drift < DRIFT:
             converged = True
             break
         if taken == allowed and gain > FALLING * now:
             allowed = min(taken + 1, PATIENCE * iterations)
-    statistics, a, slopes = normal_equations(windows, here, sigma)
+    statistics, a, slopes = settled or normal_equations(windows, here, sigma)
     if before is not None and not _sound(statistics, a, slopes):
         here = back(before)
         theta, initial, sigma = before

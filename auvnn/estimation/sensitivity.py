@@ -129,22 +129,21 @@ def respond_by(
         inputs.rows(0, length - 1),
     )
     rate = differentiate(OperatingPoint(model), "rate", points, thetas, chunk)
-    jac_state = torch.cat(rate[:3], dim=-1)
-    jac_theta = torch.cat(rate[4:], dim=-1) if total else jac_state.new_zeros(*jac_state.shape[:-1], 0)
+    jac_state, jac_thrust, jac_theta = _split(rate, ran)
     if len(ran.columns):
-        jac_theta[..., ran.columns] += rate[3] @ ran.mean_slope[:, :-1].flatten(0, 1)
+        jac_theta[..., ran.columns] += jac_thrust @ ran.mean_slope[:, :-1].flatten(0, 1)
     along = [x.unflatten(0, (count, length - 1)) for x in (jac_state, jac_theta)]
     seen = _reports(model, windows, ran, times, inputs, thetas, chunk)
     if cells is not None:
         # The last columns are those of a unit wrench: each cell of the force has its share of them.
         along[1] = cells.spread(along[1])
-        seen = replace(seen, parts=[cells.part(at, slope, 12 + total) for at, slope in seen.parts])
+        seen = replace(seen, parts=[cells.part(at, slope, total) for at, slope in seen.parts])
     for begin in range(0, count, size):
         part = slice(begin, begin + size)
-        sensitivity = _propagate(
+        by_state, by_theta = _propagate(
             along[0][part], along[1][part], points[1][part], points[2][part], steps[part]
         )
-        state, parameters = _outputs(seen, part, sensitivity)
+        state, parameters = _outputs(seen, part, by_state, by_theta)
         mask = windows.mask[part, :, : state.shape[-2]].unsqueeze(-1)
         if windows.noise is not None:
             some = windows.pick(part)
@@ -155,8 +154,10 @@ def respond_by(
         yield Response(ran.error[part], state, parameters, force)
 
 
-def _propagate(jac_state: Tensor, jac_theta: Tensor, quaternion: Tensor, nu: Tensor, steps: Tensor) -> Tensor:
-    """Return the change of the state with initial state and parameters, (B, L, 12, 12 + P).
+def _propagate(
+    jac_state: Tensor, jac_theta: Tensor, quaternion: Tensor, nu: Tensor, steps: Tensor
+) -> tuple[Tensor, Tensor]:
+    """Return the change of the state with initial state, (B, L, 12, 12), and parameters, (B, L, 12, P).
 
     Args:
         jac_state: of the acceleration, (B, L - 1, 6, 12).
@@ -182,13 +183,16 @@ def _propagate(jac_state: Tensor, jac_theta: Tensor, quaternion: Tensor, nu: Ten
         phi = eye + (ha / k) @ phi
     forward = eye + ha @ phi
     forcing = (phi * steps[..., None, None])[..., 6:] @ jac_theta
-    now = torch.cat([eye.expand(count, 12, 12), a.new_zeros(count, 12, size)], dim=-1)
-    rows = [now]
+    # Time comes first, so that each step reads and writes what lies together.
+    forward = forward.transpose(0, 1).contiguous()
+    by_state = a.new_empty(intervals + 1, count, 12, 12)
+    by_theta = a.new_empty(intervals + 1, count, 12, size)
+    by_state[0], by_theta[0] = eye, 0.0
+    by_theta[1:] = forcing.transpose(0, 1)
     for k in range(intervals):
-        now = forward[:, k] @ now
-        now[..., 12:] += forcing[:, k]
-        rows.append(now)
-    return torch.stack(rows, dim=1)
+        torch.bmm(forward[k], by_state[k], out=by_state[k + 1])
+        by_theta[k + 1].baddbmm_(forward[k], by_theta[k])
+    return by_state.transpose(0, 1), by_theta.transpose(0, 1)
 
 
 def _terms(norm: float) -> int:
@@ -206,7 +210,7 @@ class _Reports:
 
     Attributes:
         state: (B, L, out, 12), out being 12, or 18 where accelerations are measured.
-        parts: begin of an effect's columns, and (B, L, out, p): what its sensors report changes with them.
+        parts: begin of an effect's columns among the P, and (B, L, out, p): what its sensors report changes with them.
         thrust: columns on which the thrust depends, and (B, L, out, Q).
     """
 
@@ -234,27 +238,33 @@ def _reports(
         reporting = {id(e) for e in model.using("sense")}
         acting = {k: t for k, t in thetas.items() if id(model.members[int(k.split(".")[2])]) in reporting}
     points = (ran.eta[..., :3], ran.eta[..., 3:], ran.nu, ran.start, times, inputs)
-    by = [
-        x.unflatten(0, ran.nu.shape[:2])
-        for x in differentiate(OperatingPoint(model), what, points, acting, chunk)
-    ]
-    found = dict(zip(acting, by[4:], strict=True))
-    parts, at = [], 12
+    by = differentiate(OperatingPoint(model), what, points, acting, chunk).unflatten(0, ran.nu.shape[:2])
+    state, by_thrust, by_theta = _split(by, ran)
+    found = dict(zip(acting, by_theta.split([theta.numel() for theta in acting.values()], -1), strict=True))
+    parts, at = [], 0
     for key, theta in thetas.items():
         if key in found:
             parts.append((at, found[key]))
         at += theta.numel()
-    thrust = ([12 + c for c in ran.columns], by[3] @ ran.start_slope) if len(ran.columns) else None
-    return _Reports(torch.cat(by[:3], dim=-1), parts, thrust)
+    thrust = (ran.columns, by_thrust @ ran.start_slope) if len(ran.columns) else None
+    return _Reports(state, parts, thrust)
 
 
-def _outputs(seen: _Reports, part: slice, sensitivity: Tensor) -> tuple[Tensor, Tensor]:
+def _split(slopes: Tensor, ran: SimulatedWindows) -> tuple[Tensor, Tensor, Tensor]:
+    """Return what `differentiate` returns by state, thrust and parameters."""
+    thrusts = ran.mean.shape[-1]
+    state, thrust, theta = slopes.split([12, thrusts, slopes.shape[-1] - 12 - thrusts], -1)
+    return state, thrust, theta
+
+
+def _outputs(seen: _Reports, part: slice, by_state: Tensor, by_theta: Tensor) -> tuple[Tensor, Tensor]:
     """Return the change of the first C outputs with initial state, (B, L, C, 12), and parameters, (B, L, C, P)."""
     if seen.state is None:
-        return sensitivity[..., :12].clone(), sensitivity[..., 12:].contiguous()
-    outputs = seen.state[part] @ sensitivity
+        return by_state.contiguous(), by_theta.contiguous()
+    reported = seen.state[part]
+    state, parameters = reported @ by_state, reported @ by_theta
     for at, slope in seen.parts:
-        outputs[..., at : at + slope.shape[-1]] += slope[part]
+        parameters[..., at : at + slope.shape[-1]] += slope[part]
     if seen.thrust is not None:
-        outputs[..., seen.thrust[0]] += seen.thrust[1][part]
-    return outputs[..., :12], outputs[..., 12:]
+        parameters[..., seen.thrust[0]] += seen.thrust[1][part]
+    return state, parameters

@@ -7,8 +7,6 @@ without another pass.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 import torch
@@ -19,6 +17,8 @@ from auvnn.estimation.force_marginalisation.columns import pushed
 from auvnn.estimation.force_marginalisation.sums import LOOSE, cost_with_force, sums_with_force
 from auvnn.estimation.sensitivity import Response, respond_by
 from auvnn.estimation.window_simulation import BLOCK, simulate_windows
+from auvnn.estimation.window_sums.kept_products import Collecting, Wanted
+from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.coloured_noise import previous
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
@@ -28,69 +28,10 @@ Array = NDArray[np.float64]
 # A channel is never trusted beyond this share of its own motion: the integrator's error and the logging's last
 # digits must not pass for information.
 TRUST = 1e-4
-# Sums beyond this are those of windows whose sensitivities have grown without bound.
-HUGE = 1e60
 # Windows worked out at a time, as long as there are no more parameters than columns: this bounds the memory.
 CHUNK, COLUMNS = BLOCK, 80
 # Numbers of an answer that stay near the processor.
 NEAR = 2_500_000
-
-
-@dataclass(frozen=True)
-class Statistics:
-    """Sums of weighted windows after the initial state is projected out, one entry per window.
-
-    Attributes:
-        hessian: (B, P, P), J^T J.
-        slope: (B, P), J^T e.
-        cost: (B,), e^T e.
-        channel: (B, 18) sum of squared errors in SI units.
-        count: (B, 18) samples.
-        rough: (B, 18) sum of squared differences of successive errors: noise without the slow part.
-        pairs: (B, 18) differences.
-        run: (B,) run numbers.
-        first: (B,) index of the first sample.
-        spent: (B, 18) degrees of freedom that initial state and stochastic force have taken; None without a force.
-        volume: (B,) logarithm of the determinant of what the data say about both; None without a force.
-    """
-
-    hessian: Array
-    slope: Array
-    cost: Array
-    channel: Array
-    count: Array
-    rough: Array
-    pairs: Array
-    run: NDArray[np.int64]
-    first: NDArray[np.int64]
-    spent: Array | None = None
-    volume: Array | None = None
-
-    @cached_property
-    def total(self) -> Array:
-        """J^T J of all windows, (P, P)."""
-        return self.hessian.sum(0)
-
-    def columns(self, chosen: Sequence[int]) -> Statistics:
-        """Return the same statistics for some of the parameters."""
-        index = np.asarray(chosen, dtype=int)
-        return replace(self, hessian=self.hessian[:, index[:, None], index], slope=self.slope[:, index])
-
-    def finite(self) -> Statistics:
-        """Return the same with nothing said of parameters whose sums are not finite: no test finds them."""
-        whole, slope = self.hessian.sum(0), self.slope.sum(0)
-        with np.errstate(invalid="ignore"):
-            bad = ~np.isfinite(np.diag(whole)) | ~np.isfinite(slope) | (np.abs(np.diag(whole)) > HUGE)
-        if not bad.any():
-            return self
-        hessian, slopes = self.hessian.copy(), self.slope.copy()
-        hessian[:, bad], hessian[:, :, bad], slopes[:, bad] = 0.0, 0.0, 0.0
-        return replace(self, hessian=np.nan_to_num(hessian), slope=slopes)
-
-    def noise(self) -> Array:
-        """Return each channel's white noise, (18,), from successive differences of the errors; NaN unmeasured."""
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return np.sqrt(self.rough.sum(0) / (2 * self.pairs.sum(0)))
 
 
 def motion(windows: Windows) -> Array:
@@ -147,7 +88,12 @@ def linearise(
 
 
 def normal_equations(
-    windows: Windows, responses: Iterable[Response], sigma: Array, *, leverage: bool = False
+    windows: Windows,
+    responses: Iterable[Response],
+    sigma: Array,
+    *,
+    leverage: bool = False,
+    wanted: Wanted | None = None,
 ) -> tuple[Statistics, Array, Array]:
     """Return the statistics of windows, and how their best initial states follow the parameters.
 
@@ -156,6 +102,7 @@ def normal_equations(
         responses: their answers, in chunks.
         sigma: (18,), infinite where a channel does not count.
         leverage: also work out the degrees of freedom that a stochastic force takes of each channel.
+        wanted: products of columns to keep of each window, by default all.
 
     Returns:
         statistics; a (B, 12); A (B, 12, P): the best change of the initial state is a - A dtheta.
@@ -168,6 +115,7 @@ def normal_equations(
     adjacent = (windows.mask[:, 1:] * windows.mask[:, :-1]).sum((0, 1))
     rare = adjacent < 0.5 * windows.mask.sum((0, 1))
     begin, hessian = 0, np.zeros((len(windows), 0, 0))
+    products = None if wanted is None else Collecting(wanted, len(windows))
     spent: list[Array] = []
     volume: list[Array] = []
     for answer in responses:
@@ -178,13 +126,15 @@ def normal_equations(
         mask = windows.mask[here] * (weight > 0)
         begin += count
         # The largest of all arrays: made once, and not joined from pieces.
-        if hessian.shape[-1] != size:
+        if products is None and hessian.shape[-1] != size:
             hessian = np.empty((len(windows), size, size))
         if answer.force is not None:
             sums, solved, grown = sums_with_force(answer, weight, live, leverage=leverage)
             volume.append(grown[0])
             spent.append(grown[1])
-            hessian[here] = sums[:, 1:, 1:].numpy()
+            if products is None:
+                hessian[here] = sums[:, 1:, 1:].numpy()
+            first = sums[:, 0] if products is None else products.add_whole(here, sums)
             remaining = answer.left(solved[:, :12, 0])
             remaining[..., live] -= (answer.force[:, :, live] @ solved[:, None, 12:, :1]).squeeze(-1)
         else:
@@ -197,8 +147,11 @@ def normal_equations(
             q = q[:, :-12]
             along = q.mT @ both
             # With the loose rows left out, this difference is the sum of squares after the best initial state.
-            sums = (both.mT @ both).sub_(along.mT @ along)
-            hessian[here] = sums[:, 1:, 1:].numpy()
+            if products is None:
+                sums = (both.mT @ both).sub_(along.mT @ along)
+                hessian[here], first = sums[:, 1:, 1:].numpy(), sums[:, 0]
+            else:
+                first = products.add(here, both, along)
             solved = torch.linalg.solve_triangular(r, along, upper=True)
             remaining = answer.left(solved[..., 0])
         remaining = torch.where(mask > 0, remaining, torch.zeros_like(remaining))
@@ -211,8 +164,8 @@ def normal_equations(
             [
                 x.numpy()
                 for x in (
-                    sums[:, 1:, 0].clone(),
-                    sums[:, 0, 0].clone(),
+                    first[:, 1:].clone(),
+                    first[:, 0].clone(),
                     (remaining**2).sum(1),
                     mask.sum(1),
                     (step**2).sum(1),
@@ -224,10 +177,11 @@ def normal_equations(
         )
     joined = [np.concatenate(p) for p in zip(*parts, strict=True)]
     slope, cost, channel, count, rough, pairs, change, follow = joined
-    run, first = windows.run.astype(np.int64), windows.first.astype(np.int64)
+    run, begins = windows.run.astype(np.int64), windows.first.astype(np.int64)
     of_force = (np.concatenate(spent), np.concatenate(volume)) if volume else (None, None)
     of_force = of_force if leverage else (None, of_force[1])
-    found = Statistics(hessian, slope, cost, channel, count, rough, pairs, run, first, *of_force)
+    kept = None if products is None else products.kept()
+    found = Statistics(hessian, slope, cost, channel, count, rough, pairs, run, begins, *of_force, kept)
     return found, change, follow
 
 

@@ -20,7 +20,7 @@ from auvnn.physics.current import water_velocity
 from auvnn.physics.fins import fin_wrench
 from auvnn.physics.inertia import rigid_body_inertia
 from auvnn.physics.kinematics import eta6_to_eta7
-from auvnn.physics.products import matvec
+from auvnn.physics.products import matvec, solved, solved_to_first_order
 from auvnn.physics.restoring import restoring_force
 from auvnn.vehicle import Vehicle
 
@@ -167,6 +167,8 @@ class EquationsOfMotion(Sensors):
         inputs: Inputs,
         time: Tensor,
         prepared: Prepared | None = None,
+        *,
+        first_order: bool = False,
     ) -> Tensor:
         """Return the acceleration from the thrust that acts now; see `forward` for shapes and units.
 
@@ -179,16 +181,18 @@ class EquationsOfMotion(Sensors):
             inputs: at this moment.
             time: s since the start of the run, (...).
             prepared: body and inertia matrices; worked out here where None.
+            first_order: the same value and first derivatives at less cost; derivatives of these are wrong.
         """
         terms, prepared = self._terms(position, rotation, nu, thrust, inputs, time, prepared)
         first, *others = terms.values()
         for term in others:
             first = first + term
+        solve = solved_to_first_order if first_order else solved
         if self._known("turned") is None:
-            return matvec(prepared.inverse, first)
+            return solve(prepared.total, prepared.inverse, first)
         # The last three of the command are then the accelerations of the measured attitude, not moments.
         turning = self._known("turned") * inputs.command
-        return matvec(prepared.inverse, first - matvec(prepared.total, turning)) + turning
+        return solve(prepared.total, prepared.inverse, first - matvec(prepared.total, turning)) + turning
 
     def wrenches(
         self, position: Tensor, rotation: Tensor, nu: Tensor, thrust: Tensor, inputs: Inputs, time: Tensor

@@ -24,6 +24,26 @@ def matvec(matrix: Tensor, vector: Tensor) -> Tensor:
     return torch.matmul(matrix, vector.unsqueeze(-1)).squeeze(-1)
 
 
+def solved(matrix: Tensor, inverse: Tensor, vector: Tensor) -> Tensor:
+    """Return the solution x of M x = f, whose inverse is known; the matrix itself is not needed."""
+    return matvec(inverse, vector)
+
+
+def solved_to_first_order(matrix: Tensor, inverse: Tensor, vector: Tensor) -> Tensor:
+    """Return the same solution and first derivatives without a derivative of the inverse.
+
+    From M x = f follows dx = M^-1 (df - dM x). Derivatives of these derivatives are wrong.
+
+    Args:
+        matrix: M, (..., n, n).
+        inverse: its inverse, or K (K^T M K)^-1 K^T where x is confined to the columns of K.
+        vector: f, (..., n).
+    """
+    inverse = inverse.detach()
+    settled = matvec(inverse, vector.detach())
+    return settled + matvec(inverse, vector - matvec(matrix, settled))
+
+
 def cross(a: Tensor, b: Tensor) -> Tensor:
     """Return a x b for vectors (..., 3) whose leading shapes broadcast, also with unequal numbers of them."""
     if a.dim() != b.dim():  # torch.linalg.cross broadcasts sizes, but not ranks

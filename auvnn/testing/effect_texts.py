@@ -62,6 +62,11 @@ def describes_itself(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "t
     for start in kind.starts(described, Extent(0.0, 60.0, 60.0, (3.0, 8.0))):
         require(set(start) <= shapes, f"{name}: starts name {sorted(start)}, shapes are {sorted(shapes)}")
     require(set(kind.levers) <= shapes, f"{name}: levers are {kind.levers}, shapes are {sorted(shapes)}")
+    amounts = {p.name for p in described if not p.shape}
+    require(
+        set(kind.carried) <= amounts and bool(kind.carried) == bool(kind.levers),
+        f"{name}: {kind.carried} act on the levers {kind.levers}, amounts are {sorted(amounts)}",
+    )
     _looks_around(kind, described)
     built = kind.build(vehicle, actuation)
     require(built.values() == {p.name: p.null for p in described}, f"{name} does not start at its null")

@@ -10,7 +10,7 @@ import numpy as np
 
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, has_stated_uncertainty, lay_out, priors, scales
 from auvnn.estimation.priors import set_parameters
-from auvnn.estimation.window_normal_equations import Statistics
+from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.models import GreyBox
 from tests.small_logs import small_vehicle
 

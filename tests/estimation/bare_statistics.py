@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from auvnn.estimation.window_normal_equations import Statistics
+from auvnn.estimation.window_sums.statistics import Statistics
 
 
 def bare_statistics(channel, count, rough, pairs, hessian=None) -> Statistics:

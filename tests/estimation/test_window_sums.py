@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 import torch
 
+from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.sensitivity import Response
 from auvnn.estimation.window_normal_equations import LOOSE, normal_equations, residual_std
+from auvnn.estimation.window_sums.kept_products import Wanted
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
 from tests.estimation.bare_statistics import bare_statistics
@@ -123,3 +125,51 @@ def test_the_spread_allows_for_the_states_and_parameters_that_were_fitted():
     )
     assert np.mean(residual_std(sums, np.zeros(18), 0) ** 2) == pytest.approx(1.0, rel=0.02)
     assert np.mean(np.sum(sums.channel, 0) / sums.count.sum(0)) < 0.96
+
+
+WANTED = (np.array([2, 0]), (np.array([1]), np.array([3])))
+
+
+@pytest.mark.parametrize("pairs", [False, True])
+def test_products_that_are_asked_for_are_those_of_the_whole_matrix(made_up, pairs):
+    windows, _, parts, sigma = made_up
+    base, blocks = WANTED
+    dense, *_ = normal_equations(windows, parts, sigma)
+    kept, *_ = normal_equations(windows, parts, sigma, wanted=Wanted(base, blocks, pairs))
+    for columns in ([1, 2, 0], [3, 0], [0, 2], [3]):
+        np.testing.assert_allclose(kept.block(np.array(columns)), dense.block(np.array(columns)), atol=1e-9)
+    np.testing.assert_allclose(kept.slope, dense.slope, atol=1e-9)
+    np.testing.assert_allclose(kept.cost, dense.cost, atol=1e-9)
+    whole = dense.total.copy()
+    if not pairs:
+        whole[1, 3] = whole[3, 1] = 0.0
+    np.testing.assert_allclose(kept.total, whole, atol=1e-9)
+    with pytest.raises(KeyError, match="not kept"):
+        kept.block(np.array([1, 3]))
+
+
+def test_what_has_no_finite_sums_says_nothing_in_kept_products_either(made_up):
+    windows, _, parts, sigma = made_up
+    parts = [replace(part, parameters=part.parameters.clone()) for part in parts]
+    for part in parts:
+        part.parameters[..., 3] *= np.inf
+    base, blocks = WANTED
+    kept, *_ = normal_equations(windows, parts, sigma, wanted=Wanted(base, blocks))
+    finite = kept.finite()
+    assert np.isfinite(finite.total).all() and np.isfinite(finite.block(np.array([3, 0, 2]))).all()
+    assert not finite.total[3].any() and not finite.block(np.array([3, 0]))[:, 0].any()
+    np.testing.assert_allclose(finite.block(np.array([1, 2])), kept.block(np.array([1, 2])))
+
+
+def test_a_short_step_is_worth_what_the_equations_say(made_up):
+    """Errors that are linear in the parameters: the sums after a step are those of the errors after it."""
+    windows, whole, _, sigma = made_up
+    step = np.array([0.3, -0.2, 0.1, 0.4])
+    before, *_ = normal_equations(windows, [whole], sigma)
+    moved = replace(whole, error=whole.error - (whole.parameters @ torch.as_tensor(step)))
+    after, *_ = normal_equations(windows, [moved], sigma)
+    told = before.after(step)
+    np.testing.assert_allclose(told.slope, after.slope, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(told.cost, after.cost, rtol=1e-9)
+    gain = NormalEquations(before.total, before.slope.sum(0)).gain(step)
+    assert before.cost.sum() - after.cost.sum() == pytest.approx(gain)

@@ -21,7 +21,7 @@ from auvnn.diagnosis.score_tests.variance_inflation import inflation, inverse_ro
 from auvnn.effects import Extent
 from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
-from auvnn.estimation.sufficient_statistics import Combination, InformationShares, WindowSums
+from auvnn.estimation.window_sums.sufficient_statistics import Combination, InformationShares, WindowSums
 from auvnn.log_chunks.scan import WindowCut
 
 Array = NDArray[np.float64]

@@ -21,7 +21,7 @@ from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.prediction_error import Fitted
 from auvnn.estimation.priors import Priors
-from auvnn.estimation.window_normal_equations import Statistics
+from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]

@@ -26,6 +26,8 @@ DIVERGED, NEAR = 3.0, 2.0
 WILD = 1e3
 # How often at most a fit is begun again, and steps of a window's initial state on its own.
 TRIES, ALONE = 3, 30
+# Steps after which a fit that was begun again must have smaller errors.
+LOOK = 4
 # Mean fall of the logarithm of the errors, or share of the squared error by fixed weights, below which another start has
 # brought no window back.
 WORTH = 0.01
@@ -76,12 +78,10 @@ def fit_with_outlier_restart(
             again = _begun_again(best, model, windows, names, priors, near, sigma, iterations)
         except FitError:
             break
-        gain = _errors(best) - _errors(again) if sigma is None else best.cost - again.cost
-        if not gain > 0.0:
+        if not _gain(best, again, sigma) > 0.0:
             break
-        little = gain < (WORTH * best.statistics.count.sum() if sigma is None else WORTH * best.cost)
-        best = again
-        if little:
+        pays, best = _pays(best, again, sigma), again
+        if not pays:
             # A model that is wrong has windows of large errors wherever it begins.
             break
     return best
@@ -103,7 +103,7 @@ def _begun_again(
         windows.pick(near),
         names,
         priors,
-        initial=None if sigma is None else best.initial[torch.as_tensor(near)],
+        initial=best.initial[torch.as_tensor(near)],
         sigma=sigma,
         iterations=iterations,
     )
@@ -113,7 +113,25 @@ def _begun_again(
     # One that needs short steps would hold up the others.
     for few in np.array_split(outliers, len(outliers) if len(outliers) <= FEW * len(windows) else 1):
         initial[torch.as_tensor(few)] = _restarted(others, windows.pick(few))
-    return fit(others.model, windows, names, priors, initial=initial, sigma=sigma, iterations=iterations)
+    # Windows that were brought back show it at once; where none was, the steps to come lead where the fit has been.
+    steps = min(LOOK, iterations)
+    again = fit(others.model, windows, names, priors, initial=initial, sigma=sigma, iterations=steps)
+    if again.converged or steps == iterations or not _pays(best, again, sigma):
+        return again
+    return fit(
+        again.model, windows, names, priors, initial=again.initial, sigma=sigma, iterations=iterations - steps
+    )
+
+
+def _gain(best: Fitted, again: Fitted, sigma: NDArray[np.float64] | None) -> float:
+    return _errors(best) - _errors(again) if sigma is None else best.cost - again.cost
+
+
+def _pays(best: Fitted, again: Fitted, sigma: NDArray[np.float64] | None) -> bool:
+    """Whether another fit has brought windows back: its errors are smaller by more than a little."""
+    return _gain(best, again, sigma) >= (
+        WORTH * best.statistics.count.sum() if sigma is None else WORTH * best.cost
+    )
 
 
 def _restarted(others: Fitted, outliers: Windows) -> Tensor:

@@ -55,10 +55,10 @@ class Layout:
 
     def described(self, name: str) -> tuple[Parameter, ...]:
         """Return the parameters of an effect, or of one of its stand-ins, `name@number`."""
-        effect, _, number = name.partition("@")
-        whole = self.model.effect(effect).parameters_of
-        size = len(self.columns[name])
-        return whole[size * int(number) : size * (int(number) + 1)] if number else whole
+        if "@" not in name:
+            return self.model.effect(name).parameters_of
+        every = [p for effect in self.model.members for p in effect.parameters_of]
+        return tuple(every[column] for column in self.columns[name])
 
     def of(self, names: Sequence[str]) -> NDArray[np.int64]:
         """Return the columns of several effects, joined."""

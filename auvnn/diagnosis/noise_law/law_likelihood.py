@@ -22,7 +22,7 @@ from scipy.optimize import minimize
 from torch import Tensor
 
 from auvnn.diagnosis.noise_law.sums import ForceSums
-from auvnn.estimation.window_normal_equations import Statistics
+from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.force_law import ForceLaw, correlation
 
 Array = NDArray[np.float64]

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.estimation.priors import Priors
 from auvnn.estimation.sensitivity import Response
-from auvnn.estimation.window_normal_equations import Statistics, linearise, normal_equations
+from auvnn.estimation.window_normal_equations import linearise, normal_equations
+from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.windows import Windows
 

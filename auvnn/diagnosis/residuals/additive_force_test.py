@@ -22,7 +22,8 @@ from auvnn.diagnosis.residuals.input_forces import AXES, InputForces
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.sensitivity import Response
-from auvnn.estimation.window_normal_equations import Statistics, linearise, normal_equations
+from auvnn.estimation.window_normal_equations import linearise, normal_equations
+from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]

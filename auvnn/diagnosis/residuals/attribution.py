@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out
 from auvnn.diagnosis.residuals.autocorrelation import excess_variance
 from auvnn.diagnosis.residuals.input_forces import AXES, InputForces
-from auvnn.estimation.window_normal_equations import Statistics, linearise, normal_equations
+from auvnn.estimation.window_normal_equations import linearise, normal_equations
+from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]

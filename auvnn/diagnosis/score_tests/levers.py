@@ -20,7 +20,7 @@ from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.score_tests.probes import Probed
 from auvnn.diagnosis.score_tests.score import Score, projection, score
 from auvnn.effects import Parameter, effect_class
-from auvnn.estimation.window_normal_equations import Statistics
+from auvnn.estimation.window_sums.statistics import Statistics
 
 Array = NDArray[np.float64]
 ARM = 0.5
@@ -28,20 +28,23 @@ ARM = 0.5
 RIDGE = 1e-9
 
 
-def with_levers(
+def at_nulls(described: Sequence[Parameter], levers: Sequence[str]) -> dict[str, float]:
+    """Return the levers at their nulls."""
+    return {p.name: p.null for p in described if p.name in levers}
+
+
+def arms(
     described: Sequence[Parameter], levers: Sequence[str], starts: Sequence[Mapping[str, float]]
 ) -> list[dict[str, float]]:
-    """Return each start with the levers at their nulls, and with each of them at one other value.
+    """Return each start with each of the levers in turn at one other value than its null.
 
     Args:
         described: parameters of the effect.
         levers: names of those in which it is linear.
         starts: shapes, their levers left out.
     """
-    at = {p.name: p for p in described}
-    null = {n: at[n].null for n in levers}
-    arms = [{}, *({n: at[n].null + ARM * at[n].scale} for n in levers)]
-    return [{**start, **null, **arm} for start in starts for arm in arms]
+    null, at = at_nulls(described, levers), {p.name: p for p in described}
+    return [{**start, **null, n: at[n].null + ARM * at[n].scale} for start in starts for n in levers]
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,7 @@ def seen_on_levers(
     """Return the joint test at each start; see the module's text.
 
     Args:
-        asked: the layout with stand-ins at the shapes that `with_levers` gives.
+        asked: the layout with stand-ins with their levers at their nulls, and those of `arms`.
         sums: of the windows, at the null.
         base: effects that are free anyway.
         name: the effect.
@@ -71,28 +74,24 @@ def seen_on_levers(
     """
     kind, model = effect_class(name), asked.layout.model
     described = kind.describe(model.vehicle, model.actuation)
-    levers = kind.levers
-    labels, size = asked.labels(name), 1 + len(levers)
-    joint = _joined(asked.layout, name, labels, size)
-    out = []
-    for k in range(len(labels) // size):
-        label = f"{name}@{k}"
-        start = asked.starts[name][labels[size * k]]
+    joint, out = _joined(asked, name), []
+    for label, start in asked.starts[name].items():
         found = score(sums, joint, base, label, free)
-        place = _place(joint, sums, base, label, free, described, levers)
+        place = _place(joint, sums, base, label, free, described)
         out.append(OnLevers(found, {**start, **place}))
     return out
 
 
-def _joined(layout: Layout, name: str, labels: Sequence[str], size: int) -> Layout:
-    """Return a layout that knows `size` stand-ins after one another as one."""
-    columns = {n: c for n, c in layout.columns.items() if n not in labels}
-    means = {n: m for n, m in layout.means.items() if n not in labels}
-    for k in range(len(labels) // size):
-        mine = labels[size * k : size * (k + 1)]
-        columns[f"{name}@{k}"] = np.concatenate([layout.columns[n] for n in mine])
-        means[f"{name}@{k}"] = np.concatenate([layout.means[n] for n in mine])
-    return replace(layout, names=tuple(columns), columns=columns, means=means)
+def _joined(asked: Probed, name: str) -> Layout:
+    """Return a layout that knows each stand-in and what acts on its levers as one."""
+    layout = asked.layout
+    columns, means = dict(layout.columns), dict(layout.means)
+    for label in asked.labels(name):
+        more = asked.turned[label]
+        columns[label] = np.concatenate([columns[label], more])
+        # An amount is nought where the effect is absent.
+        means[label] = np.concatenate([means[label], np.zeros(len(more))])
+    return replace(layout, columns=columns, means=means)
 
 
 def _place(
@@ -102,22 +101,26 @@ def _place(
     label: str,
     free: Sequence[str],
     described: Sequence[Parameter],
-    levers: Sequence[str],
 ) -> dict[str, float]:
     """Return the levers at which an effect takes away most, by what is linear in them.
 
     The slopes towards the amounts at the place r are those at the null plus, of each lever, the share r / arm of how
     much they change over the arm.
     """
+    kind = effect_class(label.partition("@")[0])
     seen = projection(sums.total, sums.slope.sum(0), layout, base, label, free)
     live = [p for p in described if not p.shape]
     scale = np.array([p.scale for p in live])
-    arms = [p for n in levers for p in described if p.name == n]
-    whole = seen.information + RIDGE * np.diag(np.tile(scale**-2, 1 + len(arms)))
+    carried = np.array([p.name in kind.carried for p in live])
+    arms = [p for n in kind.levers for p in described if p.name == n]
+    each = np.concatenate([scale, np.tile(scale[carried], len(arms))])
+    whole = seen.information + RIDGE * np.diag(each**-2)
+    only = np.diag(scale)[carried]
 
     def lost(place: Array) -> float:
         share = place / ARM  # in plausible scales
-        turn = np.kron(np.append(1.0 - share.sum(), share)[:, None], np.diag(scale))
+        own = np.diag(np.where(carried, (1.0 - share.sum()) * scale, scale))
+        turn = np.concatenate([own, np.kron(share[:, None], only)])
         right = turn.T @ seen.gradient
         return -float(right @ np.linalg.lstsq(turn.T @ whole @ turn, right, rcond=1e-12)[0])
 

@@ -16,7 +16,9 @@ from auvnn.diagnosis.score_tests.score import Score, similarity
 from auvnn.diagnosis.score_tests.shape_search import ShapeSearch, best_of
 from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.estimation.priors import set_parameters
-from auvnn.estimation.window_normal_equations import Statistics, linearise, normal_equations
+from auvnn.estimation.window_normal_equations import linearise, normal_equations
+from auvnn.estimation.window_sums.kept_products import Wanted
+from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
@@ -76,7 +78,7 @@ class NullTests:
             chosen: those of the base that were asked for, and found, before.
             alike: also say how much they look like one another.
         """
-        sums, at, asked = self._statistics(current, remaining)
+        sums, at, asked = self._statistics(current, remaining, base, pairs=alike)
         asked_at = {n: asked.score(sums, base, n, chosen) for n in remaining}
         scores = {n: found for n, (found, _) in asked_at.items()}
         labels = [k for _, k in asked_at.values()] if alike else []
@@ -85,19 +87,21 @@ class NullTests:
         return Tested(scores | self._closer(current, at, base, chosen, scores), at, matrix)
 
     def _statistics(
-        self, found: FittedHypothesis, remaining: Sequence[str]
+        self, found: FittedHypothesis, remaining: Sequence[str], base: Sequence[str], *, pairs: bool
     ) -> tuple[Statistics, Layout, Probed]:
         """Linearise towards every parameter at a fit, those of the remaining effects at several shapes."""
         model = self.layout.model.rebuilt(self.layout.model.copied_effects())
         set_parameters(model, found.names, found.fitted.theta)
         at = replace(self.layout, model=model)
         asked = probed(at, remaining, self.extent)
+        tested = [asked.layout.columns[label] for n in remaining for label in asked.labels(n)]
         sums, _, _ = normal_equations(
             self.windows,
             linearise(
                 asked.layout.model, self.windows, found.fitted.initial, asked.layout.model.effect_names
             ),
             found.fitted.sigma,
+            wanted=Wanted(asked.layout.of(base), tested, pairs),
         )
         return sums.finite(), at, asked
 

@@ -10,22 +10,20 @@ the correction here is Bonferroni's, which holds whatever the dependence.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from scipy.special import logsumexp
-from torch import Tensor, nn
-from torch.func import functional_call
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, one_sided, shapes
 from auvnn.diagnosis.score_tests.score import Score, score
-from auvnn.effects import Body, Effect, Extent, Moment, Sensed, effect_class
-from auvnn.estimation.linear_effects import LinearEffect
-from auvnn.estimation.window_normal_equations import Statistics, linearise, normal_equations
+from auvnn.diagnosis.score_tests.stand_ins import StandIns
+from auvnn.effects import Effect, Extent, Parameter, effect_class
+from auvnn.estimation.window_normal_equations import linearise, normal_equations
+from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.windows import POSITION, Windows
 from auvnn.models import GreyBox
 
@@ -50,107 +48,6 @@ def extent_of(windows: Windows) -> Extent:
     return Extent(float(first.min()), float(last.max() - first.min()), longest, distance, runs)
 
 
-class _One(nn.Module):
-    """An effect as a function of its parameters."""
-
-    def __init__(self, effect: Effect) -> None:
-        super().__init__()
-        self.effect = effect
-
-    def forward(self, hook: str, *args: Any) -> Any:
-        return getattr(self.effect, hook)(*args)
-
-
-class StandIns(LinearEffect):
-    """An effect at its null in several shapes at once, each with free parameters of its own.
-
-    What the shapes do is added up, which is exact to first order at the null, and all that is asked for there.
-
-    Args:
-        kind: the effect's class.
-        model: for which.
-        shapes: values of the shape parameters, one mapping per stand-in.
-        name: under which the model holds them.
-    """
-
-    HOOKS = ("thrust", "water", "body", "wrench", "sense")
-
-    def __init__(
-        self, kind: type[Effect], model: GreyBox, shapes: Sequence[Mapping[str, float]], name: str
-    ) -> None:
-        """Make the starting parameters, (S, live)."""
-        nn.Module.__init__(self)
-        every = [kind.build(model.vehicle, model.actuation, s) for s in shapes]
-        self.one, described = _One(every[0]), every[0].parameters_of
-        live = [i for i, p in enumerate(described) if not p.shape]
-        self.name = name  # pyright: ignore[reportAttributeAccessIssue]
-        self.excludes, self.time_varying = (), kind.time_varying  # pyright: ignore[reportAttributeAccessIssue]
-        self.parameters_of = tuple(
-            replace(described[i], name=f"{described[i].name}_{k}") for k in range(len(shapes)) for i in live
-        )
-        self._index = {p.name: i for i, p in enumerate(self.parameters_of)}
-        start = torch.stack([e.theta.detach() for e in every])
-        held = start.clone()
-        held[:, live] = 0.0
-        self.register_buffer("held", held, persistent=False)
-        self.register_buffer("place", torch.eye(len(described), dtype=torch.float64)[live], persistent=False)
-        self.register_buffer("start", start[:, live], persistent=False)
-        self.theta = nn.Parameter(start[:, live].flatten())
-        # The hooks that are not touched must cost nothing here either.
-        self._touched = tuple(h for h in kind.hooks() if h in self.HOOKS)
-        hooks = {h: getattr(StandIns, f"_{h}") for h in self._touched}
-        made = type(f"{kind.__name__}StandIns", (StandIns,), hooks)
-        self.__class__ = made  # pyright: ignore[reportAttributeAccessIssue]
-
-    def _change(self, hook: str, args: Sequence[Any], pick: Callable[[Any], list[Tensor]]) -> list[Tensor]:
-        """Return what all shapes together change of a hook's answer, to first order in the parameters.
-
-        At the null an effect does nothing whatever the state, so that the state needs no derivative here; and
-        the slopes by the few live parameters cost far less than those of all of an answer backwards.
-        """
-        start, place, args = self.get_buffer("start"), self.get_buffer("place"), list(map(_held, args))
-
-        def one(values: Tensor, shape: Tensor) -> list[Tensor]:
-            theta = shape + values @ place
-            return pick(functional_call(self.one, {"effect.theta": theta}, (hook, *args)))
-
-        return self.added(one, start, self.get_buffer("held"))
-
-    def _thrust(self, thrust: Tensor, moment: Moment) -> Tensor:
-        return thrust + self._change("thrust", (thrust, moment), lambda new: [new])[0]
-
-    def _water(self, moment: Moment) -> tuple[Tensor, Tensor]:
-        velocity, acceleration = self._change("water", (moment,), list)
-        return velocity, acceleration
-
-    def _wrench(self, moment: Moment, body: Body) -> Tensor:
-        return self._change("wrench", (moment, body), lambda new: [new])[0]
-
-    def _body(self, body: Body, moment: Moment | None) -> Body:
-        # Where the weight acts must be said, for a change of it to be added.
-        body = replace(body, weight_centre=body.hangs)
-        # What the effect hands on untouched has no slope, and need not be asked for it.
-        new = self.one("body", body, moment)
-        names = [f.name for f in fields(body) if getattr(new, f.name) is not getattr(body, f.name)]
-        more = self._change("body", (body, moment), lambda new: [getattr(new, n) for n in names])
-        return replace(body, **{n: getattr(body, n) + m for n, m in zip(names, more, strict=True)})
-
-    def _sense(self, sensed: Sensed) -> Sensed:
-        names = [n for n in ("position", "quaternion", "nu", "nu_dot") if getattr(sensed, n) is not None]
-        more = self._change("sense", (sensed,), lambda new: [getattr(new, n) for n in names])
-        return replace(sensed, **{n: getattr(sensed, n) + m for n, m in zip(names, more, strict=True)})
-
-
-def _held(value: Any) -> Any:
-    """Return an argument of a hook through which nothing is differentiated."""
-    if isinstance(value, Tensor):
-        return value.detach()
-    if is_dataclass(value) and not isinstance(value, type):
-        held = {f.name: _held(getattr(value, f.name)) for f in fields(value) if f.init}
-        return replace(value, **held)
-    return value
-
-
 @dataclass(frozen=True)
 class Probed:
     """A layout in which stand-ins have taken the place of effects that have a shape.
@@ -159,11 +56,13 @@ class Probed:
         layout: to be differentiated.
         starts: effect to its stand-ins' names and shapes.
         counts: effect to the number of shapes from which the best was chosen, where that is not that of `starts`.
+        turned: stand-in's name to the columns of what acts on its levers, lever by lever, each at another value.
     """
 
     layout: Layout
     starts: dict[str, dict[str, dict[str, float]]]
     counts: dict[str, int] = field(default_factory=dict)
+    turned: dict[str, NDArray[np.int64]] = field(default_factory=dict)
 
     def score(
         self, statistics: Statistics, base: Sequence[str], name: str, free: Sequence[str]
@@ -251,11 +150,18 @@ def narrowed(layout: Layout, model: GreyBox) -> Layout:
     )
 
 
+def _within(described: Sequence[Parameter], shape: Mapping[str, float]) -> dict[str, float]:
+    """Return a shape within its bounds: a clock that jitters begins a little before zero, where no time may be."""
+    bounds = {p.name: (p.low, p.high) for p in described}
+    return {n: min(max(v, bounds[n][0]), bounds[n][1]) for n, v in shape.items()}
+
+
 def probed(
     layout: Layout,
     names: Sequence[str],
     extent: Extent,
     shapes_of: Mapping[str, list[dict[str, float]]] | None = None,
+    arms_of: Mapping[str, list[dict[str, float]]] | None = None,
 ) -> Probed:
     """Put stand-ins in the place of those of the named effects whose shape has to be asked for.
 
@@ -264,11 +170,13 @@ def probed(
         names: effects that are asked for.
         extent: of the log.
         shapes_of: effect to the shapes to ask for; the effect's own starts by default.
+        arms_of: effect to further shapes, as many for each of the former, at which what acts on its levers is asked for.
     """
     model = layout.model
     starts: dict[str, dict[str, dict[str, float]]] = {}
     effects: list[Effect] = []
     columns: dict[str, NDArray[np.int64]] = {}
+    turned: dict[str, NDArray[np.int64]] = {}
     means = dict(layout.means)
     at = 0
     for effect in model.members:
@@ -280,9 +188,7 @@ def probed(
             continue
         kind = effect_class(name)
         shapes = (shapes_of or {}).get(name) or kind.starts(described, extent)
-        # A clock that jitters begins a little before zero, where no time of an effect may be.
-        bounds = {p.name: (p.low, p.high) for p in described}
-        shapes = [{n: min(max(v, bounds[n][0]), bounds[n][1]) for n, v in shape.items()} for shape in shapes]
+        shapes = [_within(described, shape) for shape in shapes]
         effects.append(StandIns(kind, model, shapes, name))
         size = sum(not p.shape for p in described)
         starts[name] = {f"{name}@{k}": shape for k, shape in enumerate(shapes)}
@@ -290,7 +196,14 @@ def probed(
             columns[label] = np.arange(at, at + size)
             means[label] = np.array([p.null for p in described if not p.shape])
             at += size
+        if arms := (arms_of or {}).get(name):
+            arms = [_within(described, arm) for arm in arms]
+            effects.append(StandIns(kind, model, arms, f"{name} on its levers", kind.carried))
+            own = np.split(at + np.arange(len(arms) * len(kind.carried)), len(shapes))
+            turned |= dict(zip(starts[name], own, strict=True))
+            at += len(arms) * len(kind.carried)
     if not starts:
         return Probed(layout, {})
     whole = model.sharing(effects)
-    return Probed(replace(layout, model=whole, names=tuple(columns), columns=columns, means=means), starts)
+    asked = replace(layout, model=whole, names=tuple(columns), columns=columns, means=means)
+    return Probed(asked, starts, turned=turned)

@@ -22,8 +22,8 @@ from auvnn.diagnosis.score_tests.few_windows import are_few, freedom
 from auvnn.diagnosis.score_tests.variance_inflation import TINY, inverse_root, share_left, variance_inflation
 from auvnn.estimation.nuisance_elimination import NormalEquations, carry_of
 from auvnn.estimation.priors import parameters_of
-from auvnn.estimation.sufficient_statistics import InformationShares, ScoreMoments
-from auvnn.estimation.window_normal_equations import Statistics
+from auvnn.estimation.window_sums.statistics import Statistics
+from auvnn.estimation.window_sums.sufficient_statistics import InformationShares, ScoreMoments
 
 Array = NDArray[np.float64]
 # Information on a parameter in units of its plausible scale that leaves it no better known than its prior does.
@@ -128,7 +128,7 @@ def _information_by_window(
     """Return what each window says of an effect's parameters, (B, p, p), the base following."""
     c, f, carry = following(statistics.total, layout, base, effect, free)
     both, turn = np.concatenate([c, f]), np.hstack([np.eye(len(c)), -carry])
-    return turn @ statistics.hessian[:, both[:, None], both] @ turn.T
+    return turn @ statistics.block(both) @ turn.T
 
 
 def following(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess
-from auvnn.diagnosis.score_tests.levers import OnLevers, seen_on_levers, with_levers
+from auvnn.diagnosis.score_tests.levers import OnLevers, arms, at_nulls, seen_on_levers
 from auvnn.diagnosis.score_tests.probes import Probed, extent_of, narrowed, null_is_no_start, probed
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.effects import Extent, effect_class
@@ -18,8 +18,6 @@ from auvnn.estimation.priors import set_parameters
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
-# Starts around which that is done at a time: this bounds the memory.
-NEARER = 2
 
 
 @dataclass(frozen=True)
@@ -57,13 +55,10 @@ class ShapeSearch:
         if not kind.levers:
             return []
         starts = kind.starts(described, self.extent) if starts is None else starts
-        at, out = self._beside(name), []
-        for k in range(0, len(starts), NEARER):
-            asked = probed(
-                at, [name], self.extent, {name: with_levers(described, kind.levers, starts[k : k + NEARER])}
-            )
-            out += seen_on_levers(asked, asked.sums(self.windows, self.found), self.base, name, self.free)
-        return out
+        null = at_nulls(described, kind.levers)
+        plain, turned = [{**start, **null} for start in starts], arms(described, kind.levers, starts)
+        asked = probed(self._beside(name), [name], self.extent, {name: plain}, {name: turned})
+        return seen_on_levers(asked, asked.sums(self.windows, self.found), self.base, name, self.free)
 
     def look(self, name: str, seen: Sequence[OnLevers] = ()) -> Score | None:
         """Return an effect's score by a closer look, the place from what it turns, then the time; None if there is none.

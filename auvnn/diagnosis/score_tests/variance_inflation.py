@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.estimation.sufficient_statistics import ScoreMoments
+from auvnn.estimation.window_sums.sufficient_statistics import ScoreMoments
 
 Array = NDArray[np.float64]
 # Shares of a parameter's information below this are rounding.

@@ -16,6 +16,8 @@ from auvnn.estimation.prediction_error import FitError
 # Share of the error's excess over the noise floor that names must remove together; and standard errors that each must
 # gain in addition to the others.
 JOINTLY, EACH = 0.2, 2.0
+# Of the fit without a name, which says what that costs: a model that is wrong has no minimum worth waiting for.
+STEPS = 6
 
 
 def kept(asked: Setting, state: State, names: Sequence[str]) -> FittedHypothesis | None:
@@ -78,7 +80,7 @@ def without(asked: Setting, state: State, found: FittedHypothesis, name: str) ->
         and state.first.fitted.initial.shape == found.fitted.initial.shape
     ):
         return state.first
-    return chooser.without(found, asked.base, [name])
+    return chooser.without(found, asked.base, [name], steps=STEPS)
 
 
 def _errors(found: FittedHypothesis, other: FittedHypothesis) -> float:

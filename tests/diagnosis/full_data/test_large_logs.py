@@ -24,7 +24,7 @@ from auvnn.diagnosis.score_tests.probes import probed
 from auvnn.diagnosis.score_tests.score import score
 from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.initial_states import fit_initial_states
-from auvnn.estimation.sufficient_statistics import ScoreMoments, add_parts, reduce_windows
+from auvnn.estimation.window_sums.sufficient_statistics import ScoreMoments, add_parts, reduce_windows
 from auvnn.executors import executor_for
 from auvnn.log_chunks import scan as parts_
 from auvnn.log_chunks.scan import Plan, WindowCut

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
+import torch
 
 import auvnn
 from auvnn.diagnosis.hypotheses import outlier_restart as outliers
@@ -113,3 +115,27 @@ def test_a_wrong_model_is_not_begun_again_for_next_to_nothing(monkeypatch, sigma
     found = fit_with_outlier_restart(nothing, nothing, (), nothing, iterations=1)
     assert found.sigma[0] == min(sigmas[: begun + 1])
     assert len(list(following)) == len(sigmas) - 1 - begun
+
+
+@pytest.mark.parametrize(("errors", "steps"), [(0.999, [15, 4]), (0.9, [15, 4, 11])])
+def test_a_fit_begun_again_goes_on_where_its_first_steps_brought_windows_back(monkeypatch, errors, steps):
+    sums = SimpleNamespace(cost=np.array([1.0, 1.0, 1.0, 10.0]), count=np.full((4, 18), 100.0))
+    initial, asked = torch.zeros(4, 13), []
+
+    def fitted(sigma, count=4):
+        return SimpleNamespace(
+            statistics=sums, sigma=np.full(18, sigma), converged=False, model=None, initial=initial[:count]
+        )
+
+    def fit_of(*_, iterations, **__):
+        asked.append(iterations)
+        return fitted(1.0, 3) if len(asked) == 1 else fitted(errors)
+
+    monkeypatch.setattr(outliers, "fit", fit_of)
+    monkeypatch.setattr(outliers, "initial_states", lambda *_: initial.clone())
+    monkeypatch.setattr(outliers, "_restarted", lambda *_: initial[:1])
+    windows: Any = MagicMock(__len__=lambda _: 4)
+    nothing: Any = None
+    near = np.array([True, True, True, False])
+    outliers._begun_again(fitted(1.0), nothing, windows, (), nothing, near, None, 15)
+    assert asked == steps

@@ -10,7 +10,7 @@ import pytest
 from auvnn.diagnosis.noise_law.estimate_law import boundary_p_value, estimate
 from auvnn.diagnosis.noise_law.law_likelihood import Likelihood
 from auvnn.diagnosis.noise_law.sums import ForceSums
-from auvnn.estimation.window_normal_equations import Statistics
+from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.force_law import correlation
 
 CELL = 0.5

@@ -11,7 +11,7 @@ from auvnn.diagnosis.hypotheses.stated_priors import priors
 from auvnn.diagnosis.score_tests.few_windows import freedom
 from auvnn.diagnosis.score_tests.score import project, score, similarity
 from auvnn.diagnosis.score_tests.variance_inflation import inverse_root, share_left, variance_inflation
-from auvnn.estimation.sufficient_statistics import InformationShares, ScoreMoments
+from auvnn.estimation.window_sums.sufficient_statistics import InformationShares, ScoreMoments
 from tests.diagnosis.linear_world import STATED, World, layout
 
 DRAWS = 300

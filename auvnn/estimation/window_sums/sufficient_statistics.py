@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor, as_tensor
 
-from auvnn.estimation.window_normal_equations import Statistics, linearise, normal_equations
+from auvnn.estimation.window_normal_equations import linearise, normal_equations
+from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.free_run import moved
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
