@@ -20,7 +20,7 @@ from auvnn.physics.current import water_velocity
 from auvnn.physics.fins import fin_wrench
 from auvnn.physics.inertia import rigid_body_inertia
 from auvnn.physics.kinematics import eta6_to_eta7
-from auvnn.physics.products import matvec, solved, solved_to_first_order
+from auvnn.physics.products import matvec, solved_to_first_order
 from auvnn.physics.restoring import restoring_force
 from auvnn.vehicle import Vehicle
 
@@ -185,14 +185,14 @@ class EquationsOfMotion(Sensors):
         """
         terms, prepared = self._terms(position, rotation, nu, thrust, inputs, time, prepared)
         first, *others = terms.values()
-        for term in others:
-            first = first + term
-        solve = solved_to_first_order if first_order else solved
-        if self._known("turned") is None:
-            return solve(prepared.total, prepared.inverse, first)
-        # The last three of the command are then the accelerations of the measured attitude, not moments.
-        turning = self._known("turned") * inputs.command
-        return solve(prepared.total, prepared.inverse, first - matvec(prepared.total, turning)) + turning
+        first = sum(others, first)
+        # The last three of the command may be the accelerations of the measured attitude, not moments.
+        turning = None if self._known("turned") is None else self._known("turned") * inputs.command
+        if turning is not None:
+            first = first - matvec(prepared.total, turning)
+        total, inverse = prepared.total, prepared.inverse
+        found = solved_to_first_order(total, inverse, first) if first_order else matvec(inverse, first)
+        return found if turning is None else found + turning
 
     def wrenches(
         self, position: Tensor, rotation: Tensor, nu: Tensor, thrust: Tensor, inputs: Inputs, time: Tensor

@@ -24,13 +24,8 @@ def matvec(matrix: Tensor, vector: Tensor) -> Tensor:
     return torch.matmul(matrix, vector.unsqueeze(-1)).squeeze(-1)
 
 
-def solved(matrix: Tensor, inverse: Tensor, vector: Tensor) -> Tensor:
-    """Return the solution x of M x = f, whose inverse is known; the matrix itself is not needed."""
-    return matvec(inverse, vector)
-
-
 def solved_to_first_order(matrix: Tensor, inverse: Tensor, vector: Tensor) -> Tensor:
-    """Return the same solution and first derivatives without a derivative of the inverse.
+    """Return the solution x of M x = f with its first derivatives, without a derivative of the known inverse.
 
     From M x = f follows dx = M^-1 (df - dM x). Derivatives of these derivatives are wrong.
 
