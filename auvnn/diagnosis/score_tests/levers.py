@@ -19,7 +19,7 @@ from scipy.optimize import minimize
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.score_tests.probes import Probed
 from auvnn.diagnosis.score_tests.score import Score, projection, score
-from auvnn.effects import Parameter, effect_class
+from auvnn.effects import Extent, Parameter, effect_class
 from auvnn.estimation.window_sums.statistics import Statistics
 
 Array = NDArray[np.float64]
@@ -28,23 +28,37 @@ ARM = 0.5
 RIDGE = 1e-9
 
 
-def at_nulls(described: Sequence[Parameter], levers: Sequence[str]) -> dict[str, float]:
-    """Return the levers at their nulls."""
-    return {p.name: p.null for p in described if p.name in levers}
+Shapes = dict[str, list[dict[str, float]]]
 
 
-def arms(
-    described: Sequence[Parameter], levers: Sequence[str], starts: Sequence[Mapping[str, float]]
-) -> list[dict[str, float]]:
-    """Return each start with each of the levers in turn at one other value than its null.
+def lever_shapes(
+    layout: Layout,
+    names: Sequence[str],
+    extent: Extent,
+    starts_of: Mapping[str, Sequence[Mapping[str, float]]] | None = None,
+) -> tuple[Shapes, Shapes]:
+    """Return for each effect on levers its starts with the levers at their nulls, and with each in turn at another value.
 
     Args:
-        described: parameters of the effect.
-        levers: names of those in which it is linear.
-        starts: shapes, their levers left out.
+        layout: holds the effects.
+        names: effects; those without levers are passed over.
+        extent: of the log.
+        starts_of: effect to shapes, the levers left out; by default the starts of the effect.
     """
-    null, at = at_nulls(described, levers), {p.name: p for p in described}
-    return [{**start, **null, n: at[n].null + ARM * at[n].scale} for start in starts for n in levers]
+    plain: Shapes = {}
+    arms: Shapes = {}
+    for name in names:
+        kind, described = effect_class(name), layout.model.effect(name).parameters_of
+        if not kind.levers:
+            continue
+        starts = (starts_of or {}).get(name) or kind.starts(described, extent)
+        at = {p.name: p for p in described}
+        null = {n: at[n].null for n in kind.levers}
+        plain[name] = [{**start, **null} for start in starts]
+        arms[name] = [
+            {**start, **null, n: at[n].null + ARM * at[n].scale} for start in starts for n in kind.levers
+        ]
+    return plain, arms
 
 
 @dataclass(frozen=True)
@@ -66,7 +80,7 @@ def seen_on_levers(
     """Return the joint test at each start; see the module's text.
 
     Args:
-        asked: the layout with stand-ins with their levers at their nulls, and those of `arms`.
+        asked: the layout with stand-ins at the shapes of `lever_shapes`.
         sums: of the windows, at the null.
         base: effects that are free anyway.
         name: the effect.
@@ -87,10 +101,9 @@ def _joined(asked: Probed, name: str) -> Layout:
     layout = asked.layout
     columns, means = dict(layout.columns), dict(layout.means)
     for label in asked.labels(name):
-        more = asked.turned[label]
-        columns[label] = np.concatenate([columns[label], more])
+        columns[label] = asked.joint_columns(label)
         # An amount is nought where the effect is absent.
-        means[label] = np.concatenate([means[label], np.zeros(len(more))])
+        means[label] = np.concatenate([means[label], np.zeros(len(columns[label]) - len(means[label]))])
     return replace(layout, columns=columns, means=means)
 
 

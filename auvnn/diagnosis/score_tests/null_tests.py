@@ -11,10 +11,12 @@ from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
+from auvnn.diagnosis.score_tests.levers import OnLevers, lever_shapes, seen_on_levers
 from auvnn.diagnosis.score_tests.probes import Probed, extent_of, probed
 from auvnn.diagnosis.score_tests.score import Score, similarity
 from auvnn.diagnosis.score_tests.shape_search import ShapeSearch, best_of
 from auvnn.diagnosis.selection.choose import ALPHA
+from auvnn.effects import effect_class
 from auvnn.estimation.priors import set_parameters
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.estimation.window_sums.kept_products import Wanted
@@ -83,18 +85,21 @@ class NullTests:
         scores = {n: found for n, (found, _) in asked_at.items()}
         labels = [k for _, k in asked_at.values()] if alike else []
         matrix = similarity(sums, asked.layout, base, labels)
+        # A stated coefficient that is set free takes what was stated of it away too: its gain is another matter.
+        told = {n: s for n, s in scores.items() if s.degrees and n not in self.layout.nuisance}
+        seen = {n: seen_on_levers(asked, sums, base, n, chosen) for n in told if effect_class(n).levers}
         del sums
-        return Tested(scores | self._closer(current, at, base, chosen, scores), at, matrix)
+        return Tested(scores | self._closer(current, at, base, chosen, told, seen), at, matrix)
 
     def _statistics(
         self, found: FittedHypothesis, remaining: Sequence[str], base: Sequence[str], *, pairs: bool
     ) -> tuple[Statistics, Layout, Probed]:
-        """Linearise towards every parameter at a fit, those of the remaining effects at several shapes."""
+        """Linearise towards every parameter at a fit, those of the remaining effects at several shapes and levers."""
         model = self.layout.model.rebuilt(self.layout.model.copied_effects())
         set_parameters(model, found.names, found.fitted.theta)
         at = replace(self.layout, model=model)
-        asked = probed(at, remaining, self.extent)
-        tested = [asked.layout.columns[label] for n in remaining for label in asked.labels(n)]
+        asked = probed(at, remaining, self.extent, *lever_shapes(at, remaining, self.extent))
+        tested = [asked.joint_columns(label) for n in remaining for label in asked.labels(n)]
         sums, _, _ = normal_equations(
             self.windows,
             linearise(
@@ -111,20 +116,26 @@ class NullTests:
         at: Layout,
         base: Sequence[str],
         chosen: Sequence[str],
-        scores: dict[str, Score],
+        told: dict[str, Score],
+        seen: dict[str, list[OnLevers]],
     ) -> dict[str, Score]:
         """Return the scores of effects that were looked at more closely, by name.
 
         At its null place an effect on a lever shows what it lifts alone. Amounts and moments are asked for together,
         and where that takes away more of the errors than any other effect does, or than chance does where no effect is
         significant, place and time are worth finding: the errors that wrong ones leave count as noise in the test.
+
+        Args:
+            current: the fit.
+            at: the layout there.
+            base: effects that are free anyway.
+            chosen: those of the base that were asked for, and found, before.
+            told: tests of the effects that count.
+            seen: of those on levers, the joint tests at each of their starts.
         """
-        # A stated coefficient that is set free takes what was stated of it away too: its gain is another matter.
-        told = {n: s for n, s in scores.items() if s.degrees and n not in self.layout.nuisance}
-        closer = ShapeSearch(at, self.windows, current, base, chosen, self.extent)
-        seen = {n: on for n in told if closer.due(n) and (on := closer.on_levers(n))}
         if not seen:
             return {}
+        closer = ShapeSearch(at, self.windows, current, base, chosen, self.extent)
         joint = {n: best_of(on).score for n, on in seen.items()}
         by = {**told, **joint}
         promises = max(by, key=lambda n: by[n].gain - by[n].degrees)

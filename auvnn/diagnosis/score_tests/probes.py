@@ -112,6 +112,11 @@ class Probed:
         sums, _, _ = normal_equations(windows, answered, at.fitted.sigma)
         return sums.finite()
 
+    def joint_columns(self, label: str) -> NDArray[np.int64]:
+        """Return the columns of an effect or of one of its stand-ins, and of what acts on its levers."""
+        own = self.layout.columns[label]
+        return np.concatenate([own, self.turned[label]]) if label in self.turned else own
+
     def labels(self, name: str) -> list[str]:
         """Return under which names the layout knows an effect: its own, or those of its stand-ins."""
         return list(self.starts.get(name, [name]))

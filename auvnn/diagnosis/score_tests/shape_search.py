@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess
-from auvnn.diagnosis.score_tests.levers import OnLevers, arms, at_nulls, seen_on_levers
+from auvnn.diagnosis.score_tests.levers import OnLevers, lever_shapes, seen_on_levers
 from auvnn.diagnosis.score_tests.probes import Probed, extent_of, narrowed, null_is_no_start, probed
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.effects import Extent, effect_class
@@ -40,10 +40,6 @@ class ShapeSearch:
     free: Sequence[str]
     extent: Extent
 
-    def due(self, name: str) -> bool:
-        """Return whether there is a closer look at an effect."""
-        return bool(effect_class(name).levers)
-
     def on_levers(self, name: str, starts: Sequence[Mapping[str, float]] | None = None) -> list[OnLevers]:
         """Return the joint tests of an effect's amounts and of what they turn, at each of its starts, see `levers`.
 
@@ -51,13 +47,11 @@ class ShapeSearch:
             name: the effect.
             starts: shapes, the levers left out; those of the effect where None.
         """
-        kind, described = effect_class(name), self.layout.model.effect(name).parameters_of
-        if not kind.levers:
+        if not effect_class(name).levers:
             return []
-        starts = kind.starts(described, self.extent) if starts is None else starts
-        null = at_nulls(described, kind.levers)
-        plain, turned = [{**start, **null} for start in starts], arms(described, kind.levers, starts)
-        asked = probed(self._beside(name), [name], self.extent, {name: plain}, {name: turned})
+        beside = self._beside(name)
+        given = None if starts is None else {name: starts}
+        asked = probed(beside, [name], self.extent, *lever_shapes(beside, [name], self.extent, given))
         return seen_on_levers(asked, asked.sums(self.windows, self.found), self.base, name, self.free)
 
     def look(self, name: str, seen: Sequence[OnLevers] = ()) -> Score | None:

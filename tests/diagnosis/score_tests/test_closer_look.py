@@ -28,13 +28,6 @@ def test_the_starts_are_counted(monkeypatch, share, looked):
         def __init__(self, *_: Any) -> None:
             pass
 
-        def due(self, name):
-            return name == "payload"
-
-        def on_levers(self, _):
-            others = [SimpleNamespace(score=of(3.0)) for _ in range(STARTS - 1)]
-            return [*others, SimpleNamespace(score=of(gain))]
-
         def look(self, name, _):
             asked.append(name)
             return of(gain, p_value=0.01)
@@ -44,5 +37,6 @@ def test_the_starts_are_counted(monkeypatch, share, looked):
     tests: Any = object.__new__(NullTests)
     tests.layout, tests.windows, tests.extent = SimpleNamespace(nuisance=()), None, None
     tests.say = lambda _: None
-    found = tests._closer(None, None, [], [], {"payload": of(3.0), "waves": of(4.0)})
+    seen: Any = [SimpleNamespace(score=of(g)) for g in (*[3.0] * (STARTS - 1), gain)]
+    found = tests._closer(None, None, [], [], {"payload": of(3.0), "waves": of(4.0)}, {"payload": seen})
     assert asked == list(found) == (["payload"] if looked else [])

@@ -186,22 +186,25 @@ def test_what_acts_on_a_lever_is_looked_at_where_it_promises_most_or_leads(model
         return Score(effect, p_value, gain, 8, 1.0, np.zeros(8), np.ones(8), evidence, gain)
 
     looked, joint = [], [score_of("payload", 1e-9, 200.0, 50.0)]
-    monkeypatch.setattr(ShapeSearch, "on_levers", lambda self, name: [OnLevers(joint[0], {})])
     monkeypatch.setattr(ShapeSearch, "look", lambda self, name, seen: looked.append(name))
+
+    def closer():
+        return tests._closer(None, layout, [], [], scores, {"payload": [OnLevers(joint[0], {})]})
+
     scores = {
         "payload": score_of("payload", 0.5, 9.0, -5.0),
         "constant_force": score_of("constant_force", 1e-6, 240.0, 5.0),
     }
-    assert tests._closer(None, layout, [], [], scores) == {} and looked == ["payload"]
+    assert closer() == {} and looked == ["payload"]
     # Where it neither promises most nor leads, it is not; nor where chance does as much.
     looked.clear()
     joint[0] = score_of("payload", 1e-9, 200.0, 4.0)
-    assert tests._closer(None, layout, [], [], scores) == {} and looked == []
+    assert closer() == {} and looked == []
     scores["constant_force"] = score_of("constant_force", 0.5, 5.0, -3.0)
-    assert tests._closer(None, layout, [], [], scores) == {} and looked == ["payload"]
+    assert closer() == {} and looked == ["payload"]
     looked.clear()
     joint[0] = score_of("payload", 0.1, 12.0, -3.0)
-    assert tests._closer(None, layout, [], [], scores) == {} and looked == []
+    assert closer() == {} and looked == []
 
 
 def test_an_onset_is_looked_for_until_a_fit_would_find_it(model):
