@@ -73,14 +73,13 @@ def without(asked: Setting, state: State, found: FittedHypothesis, name: str) ->
         found: the fit with all names.
         name: of the effect to do without.
     """
-    chooser = asked.chooser(state.windows)
-    if (
-        found.effects == (name,)
-        and name not in asked.base
-        and state.first.fitted.initial.shape == found.fitted.initial.shape
-    ):
-        return state.first
-    return chooser.without(found, asked.base, [name], steps=STEPS)
+    if name not in asked.base:
+        # The search has passed there where the name came last.
+        left = {*found.effects} - {name}
+        for known in (state.first, *reversed(state.path)):
+            if {*known.effects} == left and known.fitted.initial.shape == found.fitted.initial.shape:
+                return known
+    return asked.chooser(state.windows).without(found, asked.base, [name], steps=STEPS)
 
 
 def _errors(found: FittedHypothesis, other: FittedHypothesis) -> float:

@@ -73,7 +73,8 @@ def search_round(asked: Setting, state: State) -> State:
     chosen = current.effects
     current, windows = _finer(asked, current, state.windows)
     tried = (*state.tried, current)
-    return state.but(current=current, windows=windows, chosen=tuple(chosen), tried=tried)
+    path = (*state.path, current)
+    return state.but(current=current, windows=windows, chosen=tuple(chosen), tried=tried, path=path)
 
 
 def regroup(asked: Setting, state: State) -> State:

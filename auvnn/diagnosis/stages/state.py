@@ -87,6 +87,7 @@ class State:
         steps: what was found one after the other, as the answer has it.
         table: the candidates, by effect.
         tried: every explanation that was fitted in full, in the order of the search.
+        path: the fits with what had been found at the end of each round.
         failed: effects whose fit failed, and why.
         p_value: that nothing is missing at all.
         similar: effects, and how much they look like one another at the first look.
@@ -112,6 +113,7 @@ class State:
     steps: tuple[SearchStep, ...] = ()
     table: Mapping[str, CandidateRow] = field(default_factory=dict)
     tried: tuple[FittedHypothesis, ...] = ()
+    path: tuple[FittedHypothesis, ...] = ()
     failed: Mapping[str, str] = field(default_factory=dict)
     p_value: float = 1.0
     similar: tuple[list[str], Array] = field(default_factory=lambda: ([], np.eye(0)))
