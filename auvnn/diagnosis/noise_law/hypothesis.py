@@ -15,7 +15,7 @@ from auvnn.diagnosis.noise_law.estimate_law import Estimate, estimate
 from auvnn.diagnosis.noise_law.law_likelihood import Likelihood
 from auvnn.diagnosis.noise_law.sums import ForceSums
 from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS
-from auvnn.diagnosis.selection.predictive_density import cross_validated_log_density
+from auvnn.diagnosis.selection.predictive_density import gain_by_window
 from auvnn.effects import effect_class
 from auvnn.estimation.priors import limits
 from auvnn.logs import Log
@@ -194,7 +194,7 @@ def predicts_better(after: Hypothesis, before: Hypothesis, least: float) -> bool
         before: hypothesis that it is compared with.
         least: standard errors that the gain must exceed.
     """
-    gain = cross_validated_log_density(before.weighed) - cross_validated_log_density(after.weighed)
+    gain = gain_by_window(after.weighed, before.weighed)
     return float(gain.sum()) > least * float(np.sqrt(len(gain)) * gain.std(ddof=1))
 
 

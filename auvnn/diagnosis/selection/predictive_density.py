@@ -14,8 +14,14 @@ Array = NDArray[np.float64]
 
 def improves_predictive_density(after: FittedHypothesis, before: FittedHypothesis) -> bool:
     """Whether what was left out is predicted better by more than the gain's own uncertainty."""
-    gain = cross_validated_log_density(before) - cross_validated_log_density(after)
+    gain = gain_by_window(after, before)
     return float(gain.sum()) > float(np.sqrt(len(gain)) * gain.std(ddof=1))
+
+
+def gain_by_window(after: FittedHypothesis, before: FittedHypothesis) -> Array:
+    """Return by how much each window that was left out is predicted better, (B,); not a number where neither can."""
+    with np.errstate(invalid="ignore"):
+        return cross_validated_log_density(before) - cross_validated_log_density(after)
 
 
 def cross_validated_log_density(explanation: FittedHypothesis) -> Array:

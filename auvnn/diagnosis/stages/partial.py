@@ -9,7 +9,7 @@ import numpy as np
 from auvnn.diagnosis.answers.bounds import at_bound
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.residuals.autocorrelation import excess_variance
-from auvnn.diagnosis.selection.predictive_density import cross_validated_log_density
+from auvnn.diagnosis.selection.predictive_density import gain_by_window
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.estimation.prediction_error import FitError
 
@@ -84,6 +84,6 @@ def without(asked: Setting, state: State, found: FittedHypothesis, name: str) ->
 
 def _errors(found: FittedHypothesis, other: FittedHypothesis) -> float:
     """Return by how many of its standard errors a fit predicts what is left out better than another one."""
-    gain = cross_validated_log_density(other) - cross_validated_log_density(found)
+    gain = gain_by_window(found, other)
     spread = float(np.sqrt(len(gain)) * gain.std(ddof=1))
     return float(gain.sum()) / spread if spread > 0 else 0.0
