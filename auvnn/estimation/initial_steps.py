@@ -54,7 +54,7 @@ def better_of(
     """
     if not bool(torch.isfinite(new).all()):
         return old
-    return torch.where((_costs(model, windows, names, sigma, new) <= before)[:, None], new, old)
+    return torch.where((costs_from(model, windows, names, sigma, new) <= before)[:, None], new, old)
 
 
 def shorter_steps(
@@ -76,7 +76,7 @@ def shorter_steps(
     trial = moved(initial, torch.as_tensor(follows + own))
     if not bool(torch.isfinite(trial).all()):
         return None
-    lowest = _costs(model, windows, names, sigma, trial)
+    lowest = costs_from(model, windows, names, sigma, trial)
     raised = lowest > before
     if not bool(raised.any()) or float(raised.double().mean()) > MOST:
         return None
@@ -85,7 +85,7 @@ def shorter_steps(
     best, least = trial[raised], lowest[raised]
     for share in SHARES:
         at = moved(initial[raised], torch.as_tensor(follows + share * own))
-        cost = _costs(model, some, names, sigma, at)
+        cost = costs_from(model, some, names, sigma, at)
         best = torch.where((cost < least)[:, None], at, best)
         least = torch.minimum(cost, least)
     out = trial.clone()
@@ -93,5 +93,16 @@ def shorter_steps(
     return out
 
 
-def _costs(model: GreyBox, windows: Windows, names: Sequence[str], sigma: Array, initial: Tensor) -> Tensor:
+def costs_from(
+    model: GreyBox, windows: Windows, names: Sequence[str], sigma: Array, initial: Tensor
+) -> Tensor:
+    """Return each window's weighted squared error of a free run, (B,); infinite where it left what is finite.
+
+    Args:
+        model: that runs.
+        windows: B windows.
+        names: effects whose parameters are fitted.
+        sigma: weights of the errors, (18,).
+        initial: where the runs begin, (B, 13).
+    """
     return window_costs([error for _, _, error in runs_by_block(model, windows, initial, names)], sigma)

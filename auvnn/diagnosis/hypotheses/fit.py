@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.diagnosis.hypotheses.measured_start import better_from_measured
 from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
 from auvnn.diagnosis.hypotheses.stated_priors import (
     DETERMINED,
@@ -166,6 +167,10 @@ def fit_hypothesis(
     fitted = fit_with_outlier_restart(
         model, windows, names, held, iterations=iterations, initial=initial, sigma=sigma
     )
+    if initial is not None:
+        fitted = better_from_measured(
+            fitted, model, windows, names, held, initial=initial, sigma=sigma, iterations=iterations
+        )
     judged = plausible(layout, names, effects, held, fitted.theta)
     cost = left_out(fitted.statistics, fitted.theta, judged, folds(windows.run))
     count = fitted.statistics.count[:, np.isfinite(fitted.sigma)].sum(1)

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.measured_start import GROSS, noise_share
 from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.errors import InputError
@@ -24,9 +24,8 @@ from auvnn.metrics.windows import Windows
 
 # Length of the shorter windows, s, and samples that they must have.
 SHORTER, SAMPLES = 2.0, 8
-# Shorter windows are asked where the noise is less than this share of the squared error that is left, and taken where it
-# is more than the other.
-GROSS, EXPLAINED = 0.5, 0.8
+# Shorter windows are asked where most of the error is left, and taken where the noise is more than this share of it.
+EXPLAINED = 0.8
 
 
 def search_over_shorter(
@@ -43,27 +42,17 @@ def search_over_shorter(
     length = step * state.windows.mask.shape[1]
     if not state.leaves_something or length < 1.5 * SHORTER or SHORTER / step < SAMPLES:
         return asked, state
-    if noise_share(state.current) >= GROSS:
+    if noise_share(state.current.fitted) >= GROSS:
         return asked, state
     asked.say(f"most of the error is left: searching over windows of {SHORTER:g} s")
     try:
         windows, notes = windows_that_hold(asked.layout.model, asked.log, SHORTER)
         shorter = replace(asked, floor=TRUST * motion(windows) + 1e-9)
         # Names that leave most of the error here too are no reason to go on.
-        other = search(shorter, windows, lambda found: noise_share(found.current) >= GROSS)
+        other = search(shorter, windows, lambda found: noise_share(found.current.fitted) >= GROSS)
     except (InputError, FitError, np.linalg.LinAlgError, SINGULAR):
         return asked, state
-    if not other.chosen or noise_share(other.current) < EXPLAINED:
+    if not other.chosen or noise_share(other.current.fitted) < EXPLAINED:
         return asked, state
     said = f"windows of {SHORTER:g} s were taken: over {length:.3g} s no fit came near the measurements"
     return replace(shorter, notes=(*asked.notes, said, *notes)), other
-
-
-def noise_share(explanation: FittedHypothesis) -> float:
-    """Return the share of the sensors' white noise in the squared error that is left, mean of the channels."""
-    found = explanation.fitted
-    seen = np.isfinite(found.sigma)
-    sums = found.statistics
-    left = sums.channel.sum(0)[seen]
-    noise = sums.count.sum(0)[seen] * sums.noise()[seen] ** 2
-    return float(np.mean(np.minimum(noise / np.maximum(left, 1e-300), 1.0)))

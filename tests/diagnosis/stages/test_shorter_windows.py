@@ -9,8 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from auvnn.diagnosis.hypotheses.measured_start import noise_share
 from auvnn.diagnosis.stages import shorter_windows
-from auvnn.diagnosis.stages.shorter_windows import noise_share, search_over_shorter
+from auvnn.diagnosis.stages.shorter_windows import search_over_shorter
 from auvnn.errors import InputError
 from auvnn.models import load
 from auvnn.simulation import simulate
@@ -58,10 +59,10 @@ def asked():
 
 
 def test_the_share_of_the_noise_is_the_ratio_of_the_squares():
-    assert noise_share(explanation(1.0)) == pytest.approx(1.0)
-    assert noise_share(explanation(4.0)) == pytest.approx(0.25)
+    assert noise_share(explanation(1.0).fitted) == pytest.approx(1.0)
+    assert noise_share(explanation(4.0).fitted) == pytest.approx(0.25)
     # Less than the noise is as good as the noise.
-    assert noise_share(explanation(0.8)) == 1.0
+    assert noise_share(explanation(0.8).fitted) == 1.0
 
 
 def test_names_that_leave_the_noise_alone_are_taken_and_said(asked):
@@ -119,5 +120,5 @@ def test_a_search_is_given_up_after_the_first_round_that_is_not_worth_it(monkeyp
     monkeypatch.setattr(
         module, "search_round", lambda *_: SimpleNamespace(ended=False, current=explanation(next(rounds)))
     )
-    left = module.search(None, None, lambda found: noise_share(found.current) >= 0.5)
-    assert noise_share(left.current) == pytest.approx(0.2) and next(rounds) == 1.0
+    left = module.search(None, None, lambda found: noise_share(found.current.fitted) >= 0.5)
+    assert noise_share(left.current.fitted) == pytest.approx(0.2) and next(rounds) == 1.0
