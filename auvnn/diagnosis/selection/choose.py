@@ -16,7 +16,7 @@ from scipy.stats import chi2
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, log_evidence
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, scales, shapes
 from auvnn.diagnosis.score_tests.score import Score
-from auvnn.diagnosis.selection.model_comparison import ALPHA_NEEDED, ODDS, ModelComparison
+from auvnn.diagnosis.selection.model_comparison import ALPHA_NEEDED, ODDS, ModelComparison, confused
 from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
 from auvnn.diagnosis.selection.prune import Pruning
 from auvnn.effects import effect_class
@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 ALPHA = 0.05
 # Explanations are refitted in full, nonlinearly, as long as their one-step evidence is within reach of the best.
 LEADERS, REACH, REACH_SHARE = 5, 30.0, 0.5
+# Where the errors fall by so many times what the slopes at the null promised, or by so small a share of it, these do not
+# rank the effects; so many of those that are known to be confused with the best one are fitted too.
+BENT, RIVALS = 1.5, 2
 # Parts of what a test estimates from which a fit is begun, the next where the one before diverged: near the
 # bottom the force grows faster than any slope says.
 SHARES = (1.0, 0.1)
@@ -99,6 +102,9 @@ class Chooser(Pruning):
                 tried.append(self._refitted(candidate, at, base, chosen, current))
             except (FitError, np.linalg.LinAlgError) as problem:
                 failed[candidate.effect] = f"its fit failed: {problem}"
+        for candidate in self._beyond_slopes(tried, significant, current):
+            with suppress(FitError, np.linalg.LinAlgError):
+                tried.append(self._refitted(candidate, at, base, chosen, current))
         found = self._among(tried, clear, at, base, current)
         return replace(found, failed=failed)
 
@@ -159,6 +165,27 @@ class Chooser(Pruning):
             s for s in significant if s not in leading and s.gain - most > chi2.isf(ALPHA_NEEDED, s.degrees)
         ]
         return sorted(more, key=lambda s: s.degrees - s.gain)[:1]
+
+    @staticmethod
+    def _beyond_slopes(
+        tried: Sequence[FittedHypothesis], significant: Sequence[Score], current: FittedHypothesis
+    ) -> list[Score]:
+        """Return tests of effects confused with the best one, where the slopes at the null say little of either.
+
+        A large effect is not where its slope at the null points. A lag of seconds has a hundredth of the evidence there
+        that an overshoot has, of which it is a special case, and explains as much once both are fitted.
+        """
+        if not tried:
+            return []
+        promised = {s.effect: s.gain for s in significant}
+        best = min(tried, key=lambda e: e.fitted.cost)
+        name = best.effects[-1]
+        fell = current.fitted.cost - best.fitted.cost
+        if promised[name] / BENT <= fell <= promised[name] * BENT:
+            return []
+        known = {e.effects[-1] for e in tried}
+        more = [s for s in significant if s.effect not in known and confused(name, s.effect)]
+        return sorted(more, key=lambda s: -s.evidence)[:RIVALS]
 
     def _instead(
         self, taken: FittedHypothesis, base: Sequence[str], name: str, other: FittedHypothesis

@@ -118,3 +118,8 @@ class ModelComparison:
             sigma=best.fitted.sigma,
             iterations=6,
         )
+
+
+def confused(one: str, other: str) -> bool:
+    """Whether the catalogue knows that one effect is confused with the other."""
+    return other in effect_class(one).confused_with or one in effect_class(other).confused_with

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -161,3 +163,32 @@ def test_an_effect_that_its_fit_takes_back_to_its_null_is_not_named(model, monke
 
     monkeypatch.setattr(Chooser, "_settled", nothing)
     assert "net_buoyancy" not in diagnose(model, log, NAMES, stochastic=False).missing
+
+
+@pytest.mark.parametrize(
+    ("fell", "fitted"),
+    [
+        # The slopes at the null say what a fit takes away, within a factor of 1.5: they rank the effects.
+        (100.0, []),
+        (140.0, []),
+        (70.0, []),
+        # They say little of it: the lag is a special case of the overshoot, and is fitted too.
+        (160.0, ["thruster_lag", "added_mass"]),
+        (60.0, ["thruster_lag", "added_mass"]),
+    ],
+)
+def test_where_slopes_say_little_what_is_confused_with_the_best_is_fitted_too(fell, fitted):
+    def fit(effect, cost):
+        return SimpleNamespace(effects=(effect,), fitted=SimpleNamespace(cost=cost))
+
+    def score(effect, gain, evidence):
+        return SimpleNamespace(effect=effect, gain=gain, evidence=evidence)
+
+    significant: Any = [
+        score("thrust_overshoot", 100.0, 90.0), score("payload", 80.0, 50.0), score("waves", 30.0, 20.0),
+        score("added_mass", 30.0, 8.0), score("thruster_lag", 20.0, 9.0),
+    ]  # fmt: skip
+    tried: Any = [fit("payload", 950.0), fit("thrust_overshoot", 1000.0 - fell)]
+    current: Any = fit("", 1000.0)
+    assert [s.effect for s in Chooser._beyond_slopes(tried, significant, current)] == fitted
+    assert Chooser._beyond_slopes([], significant, current) == []
