@@ -18,7 +18,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 Array = NDArray[np.float64]
 # Cells are half as long as the shortest correlation time, within these, s: shorter ones cost time, longer ones let
@@ -79,19 +81,30 @@ def cell_for(time: Array) -> float:
 def correlation(count: int, cell: float, time: float) -> Array:
     """Return the covariance of a unit process's means over successive cells, (count, count).
 
+    Args:
+        count: of cells.
+        cell: their length, s.
+        time: correlation time, s.
+    """
+    return covariance_of_means(count, cell, torch.tensor(float(time), dtype=torch.float64)).numpy()
+
+
+def covariance_of_means(count: int, cell: float, time: Tensor) -> Tensor:
+    """Return the same, differentiable in the correlation time.
+
     With a = cell / time it is 2 (a - 1 + exp(-a)) / a^2 within a cell, and between cells that are k apart
     exp(-k a) (exp(a) - 2 + exp(-a)) / a^2, the integral of exp(-|t - s| / time) over both, divided by cell^2.
 
     Args:
         count: of cells.
         cell: their length, s.
-        time: correlation time, s.
+        time: correlation time, s, a scalar.
     """
     a = cell / time
-    apart = np.abs(np.arange(count)[:, None] - np.arange(count))
-    if a < 1e-4:
-        return np.exp(-a * apart) + 1e-9 * np.eye(count)
-    own = 2.0 * (a + np.expm1(-a)) / a**2
+    apart = (torch.arange(count)[:, None] - torch.arange(count)).abs().to(torch.float64)
+    if float(a.detach()) < 1e-4:
+        return torch.exp(-a * apart) + 1e-9 * torch.eye(count, dtype=torch.float64)
+    own = 2.0 * (a + torch.expm1(-a)) / a**2
     # exp(-k a) (exp(a) - 2 + exp(-a)) = exp(-(k - 1) a) (1 - exp(-a))^2.
-    across = np.exp(-np.maximum(apart - 1, 0) * a) * np.expm1(-a) ** 2 / a**2
-    return np.where(apart == 0, own * (1.0 + 1e-9), across)
+    across = torch.exp(-torch.clamp(apart - 1.0, min=0.0) * a) * torch.expm1(-a) ** 2 / a**2
+    return torch.where(apart == 0, own * (1.0 + 1e-9), across)

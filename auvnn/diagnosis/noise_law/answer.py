@@ -14,15 +14,16 @@ from numpy.typing import NDArray
 from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.noise_law.command_holding import Holding, cost_at_best, holding
+from auvnn.diagnosis.noise_law.commands.holding import Holding, cost_at_best, holding
+from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncertain_wrench
 from auvnn.diagnosis.noise_law.estimate_law import ALPHA_BOUNDARY
 from auvnn.diagnosis.noise_law.hypothesis import WithForce, under_its_law
+from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
 from auvnn.diagnosis.noise_law.noise_colour import Colour, noise_colour
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction, predicted_by_inputs
-from auvnn.diagnosis.noise_law.relinearise import UNSOLVED
 from auvnn.diagnosis.noise_law.search import ForceSearch
-from auvnn.diagnosis.noise_law.uncertain_commands import UncertainWrench, uncertain_wrench
+from auvnn.diagnosis.noise_law.split_windows import fitted_over_parts
 from auvnn.diagnosis.noise_law.words import left
 from auvnn.diagnosis.residuals.forces import actuators_of, share_of
 from auvnn.diagnosis.residuals.variance_component_test import variance_component_test, white
@@ -128,11 +129,12 @@ def _with_force(
     windows, floor, first = state.windows, asked.floor, state.first
     if not _leaves_force(asked, state, state.refuted or state.current):
         return None
+    alone = fitted_alone(asked, state)
+    first, windows = fitted_over_parts(asked, first, windows)
     beside = ForceSearch(asked, windows)
     null = beside.begin(first, white(first, floor))
     if null is None:
         return None
-    alone = fitted_alone(asked, state)
     result = beside.run(null, alone, asked.most)
     predicted = _predictable(asked, result)
     if predicted is not None and not asked.tolerance.strict:
@@ -142,7 +144,8 @@ def _with_force(
         left = _predictable(asked, again)
         if left is None or goes_further(again, result):
             result, predicted = again, left
-    ended = _state(asked, state, result, uncertain, chance=predicted is None)
+    over_parts = state.but(first=first, windows=windows)
+    ended = _state(asked, state, over_parts, result, uncertain, chance=predicted is None)
     return ended, result.estimate.law, predicted
 
 
@@ -173,14 +176,23 @@ def _predictable(asked: Setting, result: WithForce) -> InputPrediction | None:
 
 
 def _state(
-    asked: Setting, state: State, result: WithForce, uncertain: UncertainWrench, *, chance: bool
+    asked: Setting, state: State, over: State, result: WithForce, uncertain: UncertainWrench, *, chance: bool
 ) -> State:
-    """Return the state with what was found together with the force in the place of what the first search found."""
-    law, windows = result.estimate.law, state.windows
+    """Return the state with what was found together with the force in the place of what the first search found.
+
+    Args:
+        asked: what is asked.
+        state: where the first search ended.
+        over: the same with the windows over which the force was sought, and the fit without a name over these.
+        result: what was found.
+        uncertain: what commands between samples leave uncertain.
+        chance: whether nothing that is measured predicts the force that is left.
+    """
+    law = result.estimate.law
     small = chance and negligible(asked, state, law, uncertain)
     table = state.table
     for explanation in result.tried:
-        table = fill_candidate(asked.layout, table, explanation, state.first)
+        table = fill_candidate(asked.layout, table, explanation, over.first)
     share = _share_left(result)
     named = [] if refuted(asked, state, law, share, chance=chance) else list(result.steps)
     tried = [e for s in result.steps for e in s["effects"]]
@@ -192,8 +204,7 @@ def _state(
     # What is left beside the names is stochastic, and reported as such; or it has no name, and is unknown.
     steps = [*named, end] if small or not (chance and named) else named
     before = [e for s in state.steps for e in s["effects"]]
-    return state.but(
-        windows=windows,
+    return (over if named else state).but(
         current=result.last if named else state.first,
         chosen=result.last.effects if named else (),
         groups=tuple(tuple(group) for group in result.groups) if named else (),

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from auvnn.diagnosis.noise_law.law_likelihood import Likelihood
+from auvnn.diagnosis.noise_law.law_likelihood import STEPS, Likelihood
 from auvnn.diagnosis.noise_law.sums import ForceSums
 from auvnn.metrics.force_law import ForceLaw
 
@@ -36,7 +36,7 @@ class Estimate:
         step: (P,) how the parameters move with the law.
         information: (P, P) of the parameters under the law, their priors left out.
         p_values: (6,) of there being no force, each degree of freedom in addition to the others.
-        forces: (B, 6, K) the forces expected, N and N m.
+        gain: what of `value` the step takes away, as far as the windows are linear.
     """
 
     law: ForceLaw | None
@@ -44,16 +44,19 @@ class Estimate:
     step: Array
     information: Array
     p_values: Array
-    forces: Array
+    gain: float = 0.0
 
 
-def estimate(sums: ForceSums, start: ForceLaw | None = None, only: Sequence[int] | None = None) -> Estimate:
+def estimate(
+    sums: ForceSums, start: ForceLaw | None = None, only: Sequence[int] | None = None, most: int = STEPS
+) -> Estimate:
     """Return the law that is most likely, without the degrees of freedom whose variance may be zero.
 
     Args:
         sums: of an explanation's windows.
         start: a law from which to begin.
         only: degrees of freedom to look at, by default all that show; given, none of them is left out.
+        most: steps of each search for the likeliest law; with none the law is that of the start.
     """
     likelihood = Likelihood(sums)
     axes = likelihood.shown() if only is None else list(only)
@@ -62,7 +65,7 @@ def estimate(sums: ForceSums, start: ForceLaw | None = None, only: Sequence[int]
         begin = None
         if start is not None and all(start.rms[i] > 0 for i in axes):
             begin = np.log(np.concatenate([start.rms[axes], start.time[axes]]))
-        value, x = likelihood.best(axes, begin)
+        value, x = likelihood.best(axes, begin, most)
         count = len(axes)
         plain = likelihood.of(likelihood.law(axes, np.exp(x[:count]), np.exp(x[count:])))[0]
         if only is not None:
@@ -81,14 +84,12 @@ def estimate(sums: ForceSums, start: ForceLaw | None = None, only: Sequence[int]
         start = likelihood.law(axes, np.exp(x[:count]), np.exp(x[count:]))
         axes.pop(weakest)
     law = likelihood.law(axes, np.exp(x[:count]), np.exp(x[count:])) if axes else None
-    value, step, information, forces, _ = likelihood.of(law)
-    full = np.zeros((len(forces), 6, sums.cells))
-    if axes:
-        full[:, axes] = forces.reshape(len(forces), len(axes), sums.cells)
-    whole, moved = likelihood.whole.copy(), np.zeros(sums.known)
+    value, step, information, gain = likelihood.of(law)
+    n = sums.known
+    whole, moved = sums.statistics.total[:n, :n].copy(), np.zeros(n)
     whole[np.ix_(likelihood.keep, likelihood.keep)] = information
     moved[likelihood.keep] = step
-    return Estimate(law, value, moved, whole, p_values, full)
+    return Estimate(law, value, moved, whole, p_values, gain)
 
 
 def boundary_p_value(gain: float) -> float:

@@ -12,25 +12,25 @@ from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, correlation_root, scales, shapes
 from auvnn.diagnosis.noise_law.estimate_law import Estimate, estimate
-from auvnn.diagnosis.noise_law.law_likelihood import Likelihood
+from auvnn.diagnosis.noise_law.law_likelihood import STEPS, Likelihood
 from auvnn.diagnosis.noise_law.sums import ForceSums
-from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS
+from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS, confused
 from auvnn.diagnosis.selection.predictive_density import gain_by_window
 from auvnn.effects import effect_class
 from auvnn.estimation.priors import limits
 from auvnn.logs import Log
 from auvnn.metrics.force_law import ForceLaw
-from auvnn.metrics.rollouts import Scale, roll
-from auvnn.metrics.windows import Windows
+from auvnn.metrics.rollouts import Rolled, Scale, roll
+from auvnn.metrics.windows import VELOCITY, Windows
 
 Array = NDArray[np.float64]
 # How often parameters that would leave their bounds are held there.
-ROUNDS = 3
+ROUNDS = 6
 HORIZON = "5"
 # Members of a group that the log cannot tell apart, at most.
 GROUP = 3
 # Share of the gain by which an effect that is known to be confused with the best may fall short of it.
-CLOSE = 0.05
+CLOSE = 0.1
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,12 @@ def under_its_law(explanation: FittedHypothesis) -> FittedHypothesis:
 
 
 def judged(
-    layout: Layout, explanation: FittedHypothesis, sums: ForceSums, sigma: Array, law: ForceLaw
+    layout: Layout,
+    explanation: FittedHypothesis,
+    sums: ForceSums,
+    sigma: Array,
+    law: ForceLaw,
+    most: int = STEPS,
 ) -> Hypothesis:
     """Return an explanation with the law that is most likely with it, and what they are worth.
 
@@ -103,8 +108,9 @@ def judged(
         sums: of its windows.
         sigma: (18,) the sensors' white noise that they were weighed by.
         law: to begin from; a degree of freedom without a force in it has none here.
+        most: steps of the search for the likeliest law; with none the law is the one given.
     """
-    found = estimate(sums, law, law.axes)
+    found = estimate(sums, law, law.axes, most)
     # What the law would move beyond a bound stays at it, and the others are asked again.
     low, high = limits(explanation.fitted.model, explanation.names, explanation.fitted.priors)
     for _ in range(ROUNDS):
@@ -114,7 +120,7 @@ def judged(
         if not beyond.any():
             break
         sums = replace(sums, inside=sums.inside & ~beyond)
-        found = estimate(sums, found.law or law, law.axes)
+        found = estimate(sums, found.law or law, law.axes, most)
     size, mean, shape = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=bool)]
     for name in explanation.names:
         stated = name in layout.spreads and name not in explanation.effects
@@ -181,11 +187,6 @@ def tied(layout: Layout, good: list[Hypothesis], before: Hypothesis) -> list[Hyp
     return sorted([best, *rest], key=lambda h: h.name not in plainer)
 
 
-def confused(one: str, other: str) -> bool:
-    """Whether the catalogue knows that one effect is confused with the other."""
-    return other in effect_class(one).confused_with or one in effect_class(other).confused_with
-
-
 def predicts_better(after: Hypothesis, before: Hypothesis, least: float) -> bool:
     """Whether runs left out are predicted better, by so many standard errors of the gain.
 
@@ -198,8 +199,13 @@ def predicts_better(after: Hypothesis, before: Hypothesis, least: float) -> bool
     return float(gain.sum()) > least * float(np.sqrt(len(gain)) * gain.std(ddof=1))
 
 
-def free_running_cost(after: Hypothesis, before: Hypothesis, log: Log, scale: Scale) -> float:
-    """Return by what share the error of free running over 5 s is larger before than after.
+def free_running_cost(after: Hypothesis, before: Hypothesis, log: Log, scale: Scale) -> tuple[float, float]:
+    """Return what a name costs in free running over 5 s: by the errors, and by how far predictions move.
+
+    The first is by what share the error is larger before than after. Under a controller the commands answer the force, so
+    that the error of free running is least at wrong values, and a right name may make it larger. The second is what the
+    first would be if the force were independent of the commands: sqrt(1 + d^2) - 1, with d the change of the predictions
+    over the error that is left.
 
     Args:
         after: hypothesis with a name more.
@@ -211,7 +217,18 @@ def free_running_cost(after: Hypothesis, before: Hypothesis, log: Log, scale: Sc
         roll(h.explanation.fitted.model.without_absent(h.explanation.effects), log, HORIZON, scale)
         for h in (before, after)
     ]
-    if rolled[0] is None or rolled[1] is None:
-        return float("inf")
-    errors = [r.total(scale) for r in rolled if r is not None]
-    return errors[0] / errors[1] - 1.0 if np.isfinite(errors[1]) and errors[1] > 0.0 else -1.0
+    first, last = rolled
+    if first is None or last is None:
+        return float("inf"), float("inf")
+    errors = [r.total(scale) for r in (first, last)]
+    cost = errors[0] / errors[1] - 1.0 if np.isfinite(errors[1]) and errors[1] > 0.0 else -1.0
+    change = replace(last, squared=_moved(first.predicted, last)).total(scale)
+    away = change / errors[1] if errors[1] > 0.0 else float("inf")
+    return cost, float(np.sqrt(1.0 + away**2) - 1.0) if np.isfinite(away) else 0.0
+
+
+def _moved(before: Array, last: Rolled) -> Array:
+    """Return the sum of squared changes of what was predicted, (B, 6), zero where a window diverged."""
+    mask = last.windows.mask[..., VELOCITY].numpy().copy()
+    mask[:, 0] = 0.0
+    return (np.nan_to_num(last.predicted - before) ** 2 * mask).sum(1)

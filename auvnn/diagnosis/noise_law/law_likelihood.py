@@ -3,16 +3,26 @@
 In every window the force is a Gaussian vector of cells (`ForceLaw`), the initial state is free, and the sensors' noise
 is white. With the windows linear about a fit, the forces can be integrated out exactly: of each window only J^T e and
 J^T J are needed, and a law costs a Cholesky factor of a small matrix per window. Parameters that are free follow each
-law (their profile, with their priors), so that the law need not be found again by fits. Minus twice the log likelihood is
+law (their profile, with their priors), so that the law need not be found again by fits.
 
-    sum_w [c_w - b_w^T (I + L^T H_w L)^-1 b_w + log |I + L^T H_w L|],    b_w = L^T g_w,    L L^T = covariance of cells.
+Windows that follow one another are filtered: the force of a window is expected from its last cell in the window before,
+as far as that is known from there (mean m and covariance P of that cell, C_0 its variance, G the regression on it),
 
-Reference: Rasmussen and Williams (2006), Gaussian Processes for Machine Learning, chapter 5, for the gradient.
+    f ~ N(G m, C + G (P - C_0) G^T),
+
+so that windows count as conditional on their past: a slow force is not taken for as many independent ones as there are
+windows, and commands that answer it are conditional on it. With L L^T the covariance and mu the mean, minus twice the
+log likelihood of a window is
+
+    c - 2 g^T mu + mu^T H mu - b^T (I + L^T H L)^-1 b + log |I + L^T H L|,    b = L^T (g - H mu).
+
+References: Rasmussen and Williams (2006), Gaussian Processes for Machine Learning, chapter 5; Kristensen, Madsen and
+Joergensen (2004), Automatica 40(2) 225-237, for likelihoods conditional on the past.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,13 +33,16 @@ from torch import Tensor
 
 from auvnn.diagnosis.noise_law.sums import ForceSums
 from auvnn.estimation.window_sums.statistics import Statistics
-from auvnn.metrics.force_law import ForceLaw, correlation
+from auvnn.metrics.force_law import ForceLaw, covariance_of_means
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 # Shares of the plausible force that are tried to begin with, and the correlation time, s.
 STARTS, FIRST_TIME = np.logspace(-3.0, 1.0, 9), 1.0
 # Standard deviations of the law's parameters as they are likely to be, in logarithms: a proper, weak prior.
 VAGUE = 3.0
+# Steps of the search for the likeliest law.
+STEPS = 40
 
 
 class Likelihood:
@@ -43,18 +56,21 @@ class Likelihood:
         """Take the parts apart."""
         self.sums, n = sums, sums.known
         statistics = sums.statistics
-        keep = np.flatnonzero(sums.inside)
-        self.keep = keep
+        self.keep = np.flatnonzero(sums.inside)
         self.force = torch.as_tensor(statistics.hessian[:, n:, n:])
-        self._asked: tuple[NDArray[np.int64], Tensor] | None = None
-        right = np.concatenate([statistics.slope[:, n:, None], statistics.hessian[:, n:, keep]], axis=2)
-        self.right = torch.as_tensor(right)
-        self.theta_square = statistics.total[np.ix_(keep, keep)]
-        self.theta_slope = statistics.slope[:, keep].sum(0)
-        self.whole = statistics.total[:n, :n]
-        self.cost = float(statistics.cost.sum())
-        self.precision = sums.priors.square[np.ix_(keep, keep)]
-        self.pull = sums.priors.pull(sums.theta)[keep]
+        # Columns of the errors, then of the parameters with their sign turned: error - J theta.
+        own = np.concatenate([statistics.slope[:, n:, None], statistics.hessian[:, n:, :n]], axis=2)
+        self.columns = torch.as_tensor(own)
+        plain = np.empty((len(own), 1 + n, 1 + n))
+        plain[:, 0, 0], plain[:, 1:, 1:] = statistics.cost, statistics.hessian[:, :n, :n]
+        plain[:, 0, 1:] = plain[:, 1:, 0] = statistics.slope[:, :n]
+        self.plain = torch.as_tensor(plain)
+        self._asked: tuple[tuple[int, ...], Tensor] | None = None
+        before = np.full(len(own), -1) if sums.before is None else sums.before
+        self.waves = _waves(before)
+        self.gap = torch.as_tensor(np.zeros(len(own)) if sums.gap is None else sums.gap)
+        self.precision = sums.priors.square[np.ix_(self.keep, self.keep)]
+        self.pull = sums.priors.pull(sums.theta)[self.keep]
         self.prior = sums.priors.penalty(sums.theta) if len(sums.theta) else 0.0
 
     def shown(self) -> list[int]:
@@ -77,120 +93,133 @@ class Likelihood:
         full[list(axes)], times[list(axes)] = rms, time
         return ForceLaw(full, times, self.sums.cell, self.sums.span)
 
-    def of(self, law: ForceLaw | None) -> tuple[float, Array, Array, Array, Array]:
-        """Return minus twice the log likelihood, step, information, expected forces, and their second moments.
+    def of(self, law: ForceLaw | None) -> tuple[float, Array, Array, float]:
+        """Return minus twice the log likelihood, step, information, and what the step takes away of the value.
 
         Returns:
-            value; step (k,) of the parameters that can move; information (k, k) of those; forces (B, A K);
-            second moments summed over windows, (A, K, K).
+            value; step (k,) of the parameters that can move; information (k, k) of those; gain.
         """
-        size = self.sums.cells
-        axes = [] if law is None else law.axes
-        own = np.concatenate([np.arange(size) + i * size for i in axes]) if axes else np.zeros(0, dtype=int)
-        square, slope = self.theta_square, self.theta_slope
-        value, count = self.cost, len(self.right)
-        if law is not None and axes:
-            factors = torch.as_tensor(law.factors.copy())
-            right, root = self._root(own, factors, self.right)
-            half = torch.linalg.solve_triangular(root, right, upper=False)
-            value += float(
-                2.0 * torch.log(torch.diagonal(root, dim1=-2, dim2=-1)).sum() - (half[..., 0] ** 2).sum()
-            )
-            along = (half[..., 1:].mT @ half).sum(0).numpy()
-            square, slope = square - along[:, 1:], slope - along[:, 0]
-        pull = slope - self.pull
-        inverse = _inverse(square + self.precision)
-        step = inverse @ pull
-        value += self.prior - float(pull @ step)
-        if not axes:
-            return value, step, square, np.zeros((count, 0)), np.zeros((0, size, size))
-        follow = torch.as_tensor(np.concatenate([[1.0], -step]))
-        white = torch.cholesky_solve((right @ follow).unsqueeze(-1), root)
-        mean = (factors @ white.unflatten(1, (len(axes), size))).flatten(1, 2).squeeze(-1)
-        spread, blocks = torch.cholesky_inverse(root).sum(0), []
-        for k in range(len(axes)):
-            part = slice(k * size, (k + 1) * size)
-            own_mean = mean[:, part]
-            blocks.append((factors[k] @ spread[part, part] @ factors[k].mT + own_mean.mT @ own_mean).numpy())
-        return value, step, square, mean.numpy(), np.stack(blocks)
-
-    def _root(self, own: NDArray[np.int64], factors: Tensor, right: Tensor) -> tuple[Tensor, Tensor]:
-        """Return L^T times some columns, (B, A K, M), and the Cholesky factor of 1 + L^T F L, (B, A K, A K).
-
-        L L^T is the law's covariance, which holds no product of two degrees of freedom.
-
-        Args:
-            own: rows of the force's variables in the degrees of freedom that have one, (A K,).
-            factors: blocks of L, (A, K, K).
-            right: columns of all variables, (B, 6 K, M).
-        """
-        if self._asked is None or not np.array_equal(self._asked[0], own):
-            index = torch.as_tensor(own)
-            self._asked = own, self.force[:, index][:, :, index]
-        shape = factors.shape[:2]
-        right = (factors.mT @ right[:, torch.as_tensor(own)].unflatten(1, shape)).flatten(1, 2)
-        inner = (factors.mT @ self._asked[1].unflatten(1, shape)).flatten(1, 2)
-        # Symmetric: the blocks of the columns as those of the rows.
-        inner = (factors.mT @ inner.mT.unflatten(1, shape)).flatten(1, 2)
-        torch.diagonal(inner, dim1=-2, dim2=-1).add_(1.0)
-        return right, torch.linalg.cholesky(inner)
+        value, whole = self._whole(law)
+        step, square, pull = self._followed(whole)
+        gain = float(pull @ step)
+        return value + float(whole[0, 0]) + self.prior - gain, step, square, gain
 
     def by_window(self, law: ForceLaw | None) -> Statistics:
         """Return the windows' sums towards the parameters, the forces of a law integrated out.
 
-        The cost of a window is minus twice the logarithm of its likelihood, so that sums under different laws compare.
+        The cost of a window is minus twice the logarithm of its likelihood, conditional on the windows before it, so that
+        sums under different laws compare.
         """
-        size, statistics = self.sums.cells, self.sums.statistics
         known = self.sums.known
-        plain = statistics.columns(list(range(known)))
-        axes = [] if law is None else law.axes
-        if law is None or not axes:
+        plain = self.sums.statistics.columns(list(range(known)))
+        if law is None or not law.axes:
             return plain
-        own = np.concatenate([np.arange(size) + i * size for i in axes])
-        columns = np.concatenate(
-            [statistics.slope[:, known:, None], statistics.hessian[:, known:, :known]], axis=2
-        )
-        right, root = self._root(own, torch.as_tensor(law.factors.copy()), torch.as_tensor(columns))
-        half = torch.linalg.solve_triangular(root, right, upper=False)
-        along = (half.mT @ half).numpy()
-        volume = 2.0 * torch.log(torch.diagonal(root, dim1=-2, dim2=-1)).sum(-1).numpy()
-        return replace(
-            plain,
-            hessian=plain.hessian - along[:, 1:, 1:],
-            slope=plain.slope - along[:, 1:, 0],
-            cost=plain.cost - along[:, 0, 0] + volume,
-        )
+        hessian, slope, cost = plain.hessian.copy(), plain.slope.copy(), plain.cost.copy()
+        for where, square, volume in self._windows(law.axes, *_of(law), self.columns, self.plain):
+            hessian[where], slope[where] = square[:, 1:, 1:].numpy(), square[:, 0, 1:].numpy()
+            cost[where] = (square[:, 0, 0] + volume).numpy()
+        return replace(plain, hessian=hessian, slope=slope, cost=cost)
+
+    def _whole(self, law: ForceLaw | None) -> tuple[float, Array]:
+        """Return the sum of the log determinants, and that of the squares, (1 + P, 1 + P)."""
+        if law is None or not law.axes:
+            return 0.0, self.plain.sum(0).numpy()
+        whole, value = torch.zeros_like(self.plain[0]), 0.0
+        for _, square, volume in self._windows(law.axes, *_of(law), self.columns, self.plain):
+            whole, value = whole + square.sum(0), value + float(volume.sum())
+        return value, whole.numpy()
+
+    def _followed(self, whole: Array) -> tuple[Array, Array, Array]:
+        """Return how the parameters that can move follow a law, their information, and their slope."""
+        own = 1 + self.keep
+        square, pull = whole[np.ix_(own, own)], whole[own, 0] - self.pull
+        return _inverse(square + self.precision) @ pull, square, pull
+
+    def _windows(
+        self, axes: Sequence[int], rms: Tensor, time: Tensor, columns: Tensor, plain: Tensor
+    ) -> Iterator[tuple[Index, Tensor, Tensor]]:
+        """Yield windows, their squares (n, M, M) with the forces integrated out, and log determinants (n,).
+
+        Args:
+            axes: degrees of freedom with a force.
+            rms: of each of them, (A,).
+            time: of each of them, (A,), s.
+            columns: J^T times errors and the like, of all variables of the force, (B, 6 K, M).
+            plain: their squares without a force, (B, M, M).
+        """
+        size, count = self.sums.cells, len(axes)
+        index = torch.as_tensor(np.concatenate([np.arange(size) + i * size for i in axes]))
+        if self._asked is None or self._asked[0] != tuple(axes):
+            self._asked = tuple(axes), self.force[:, index][:, :, index]
+        force, columns = self._asked[1], columns[:, index]
+        # The last cell of the window before, and the window's own.
+        joint = [rms[k] ** 2 * covariance_of_means(size + 1, self.sums.cell, time[k]) for k in range(count)]
+        own = torch.block_diag(*[c[1:, 1:] for c in joint])
+        onto = torch.block_diag(*[c[1:, :1] / c[0, 0] for c in joint])
+        variance = torch.diag(torch.stack([c[0, 0] for c in joint]))
+        last = torch.as_tensor([k * size + size - 1 for k in range(count)])
+        eye = torch.eye(count * size, dtype=torch.float64)
+        mean = spread = None
+        for where, before in self.waves:
+            here = torch.as_tensor(where)
+            h, g = force[here], columns[here]
+            if before is None or mean is None or spread is None:
+                expected, root = None, torch.linalg.cholesky(own).expand(len(where), -1, -1)
+            else:
+                since = torch.exp(-self.gap[here, None] / time).repeat_interleave(size, dim=1)
+                regression = onto * since[..., None]
+                expected = regression @ mean[before]
+                root = torch.linalg.cholesky(own + regression @ (spread[before] - variance) @ regression.mT)
+            square, ahead = plain[here], g
+            if expected is not None:
+                ahead = g - h @ expected
+                cross = g.mT @ expected
+                square = square - cross - cross.mT + expected.mT @ h @ expected
+            inner = torch.linalg.cholesky(root.mT @ h @ root + eye)
+            half = torch.linalg.solve_triangular(inner, root.mT @ ahead, upper=False)
+            yield (
+                where,
+                square - half.mT @ half,
+                2.0 * torch.log(torch.diagonal(inner, dim1=-2, dim2=-1)).sum(-1),
+            )
+            if len(self.waves) > 1:
+                known = torch.linalg.solve_triangular(inner, root[:, last].mT, upper=False)
+                mean, spread = known.mT @ half, known.mT @ known
+                if expected is not None:
+                    mean = mean + expected[:, last]
 
     def sloped(self, axes: Sequence[int], x: Array) -> tuple[float, Array]:
-        """Return minus twice the log posterior of log rms and log time, (2 A,), and its gradient."""
+        """Return minus twice the log posterior of log rms and log time, (2 A,), and its gradient.
+
+        At the parameters that follow a law the slope in them is zero: they are held while the law's is taken.
+        """
         count = len(axes)
-        rms, time = np.exp(x[:count]), np.exp(x[count:])
-        law = self.law(axes, rms, time)
-        value, _, _, _, second = self.of(law)
-        windows, size = len(self.right), self.sums.cells
-        slope = np.zeros(2 * count)
-        for k in range(count):
-            own = correlation(size, law.cell, float(time[k]))
-            solved = np.linalg.solve(own, second[k]) / rms[k] ** 2
-            step = 1e-4
-            change = correlation(size, law.cell, float(time[k] * np.exp(step))) - correlation(
-                size, law.cell, float(time[k] * np.exp(-step))
-            )
-            moved = np.linalg.solve(own, change / (2 * step))
-            slope[k] = 2.0 * (windows * size - np.trace(solved))
-            slope[count + k] = np.trace(moved @ (windows * np.eye(size) - solved))
+        law = self.law(axes, np.exp(x[:count]), np.exp(x[count:]))
+        value, whole = self._whole(law)
+        step, _, pull = self._followed(whole)
+        follow = np.zeros(len(whole))
+        follow[0], follow[1 + self.keep] = 1.0, -step
+        along = torch.as_tensor(follow)[:, None]
+        free = torch.tensor(x, requires_grad=True)
+        parts = self._windows(
+            axes, free[:count].exp(), free[count:].exp(), self.columns @ along, along.mT @ self.plain @ along
+        )
+        total = torch.stack([square.sum() + volume.sum() for _, square, volume in parts]).sum()
+        (slope,) = torch.autograd.grad(total, free)
         away = x - self._likely(axes)
-        return value + float(away @ away) / VAGUE**2, slope + 2.0 * away / VAGUE**2
+        value += float(whole[0, 0]) + self.prior - float(pull @ step)
+        return value + float(away @ away) / VAGUE**2, slope.numpy() + 2.0 * away / VAGUE**2
 
     def _likely(self, axes: Sequence[int]) -> Array:
         return np.concatenate([np.log(self.sums.sizes[list(axes)]), np.full(len(axes), np.log(FIRST_TIME))])
 
-    def best(self, axes: Sequence[int], start: Array | None = None) -> tuple[float, Array]:
+    def best(self, axes: Sequence[int], start: Array | None = None, most: int = STEPS) -> tuple[float, Array]:
         """Return the smallest value with forces in some degrees of freedom, and where: log rms and log time.
 
         Args:
             axes: degrees of freedom.
             start: to begin from, by default the best of a few sizes.
+            most: steps of the search; with none the value is that of the start.
         """
         axes = list(axes)
         low = np.concatenate(
@@ -201,9 +230,12 @@ class Likelihood:
         )
         if start is None:
             start = self._start(axes)
+        if most == 0:
+            count = len(axes)
+            return self.of(self.law(axes, np.exp(start[:count]), np.exp(start[count:])))[0], start
         found = minimize(
             lambda x: self.sloped(axes, x), np.clip(start, low, high), jac=True, method="L-BFGS-B",
-            bounds=list(zip(low, high, strict=True)), options={"maxiter": 40, "ftol": 1e-7},
+            bounds=list(zip(low, high, strict=True)), options={"maxiter": most, "ftol": 1e-7},
         )  # fmt: skip
         return float(found.fun), np.asarray(found.x)
 
@@ -227,3 +259,24 @@ def _inverse(square: Array) -> Array:
         return square
     unit = 1.0 / np.sqrt(np.maximum(np.diag(square), 1e-300))
     return np.linalg.pinv(square * unit[:, None] * unit, hermitian=True) * unit[:, None] * unit
+
+
+def _of(law: ForceLaw) -> tuple[Tensor, Tensor]:
+    return torch.as_tensor(law.rms[law.axes]), torch.as_tensor(law.time[law.axes])
+
+
+def _waves(before: Index) -> list[tuple[Index, Index | None]]:
+    """Return the windows in waves, and of each the place, in the wave before, of the window that it follows.
+
+    Args:
+        before: the window that each one follows, -1 where none does, (B,).
+    """
+    wave = np.flatnonzero(before < 0)
+    out: list[tuple[Index, Index | None]] = [(wave, None)]
+    after = np.full(len(before), -1)
+    after[before[before >= 0]] = np.flatnonzero(before >= 0)
+    while (after[wave] >= 0).any():
+        place = np.flatnonzero(after[wave] >= 0)
+        wave = after[wave[place]]
+        out.append((wave, place))
+    return out

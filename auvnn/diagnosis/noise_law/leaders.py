@@ -10,8 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
-from auvnn.diagnosis.noise_law.hypothesis import Hypothesis, confused
+from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.score_tests.score import Score
+from auvnn.diagnosis.selection.model_comparison import confused
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
@@ -21,7 +22,9 @@ STEPS = 6
 RIVALS = 2
 
 
-def rivals_of(found: Sequence[Hypothesis], scores: Mapping[str, Score], level: float) -> list[str]:
+def rivals_of(
+    found: Sequence[Hypothesis], scores: Mapping[str, Score], level: float, *, among_all: bool = True
+) -> list[str]:
     """Return effects to fit because the catalogue knows them to be confused with the most evident one.
 
     An effect with many parameters may lead because it imitates one with few, which leads nowhere by itself: a cable of
@@ -30,15 +33,16 @@ def rivals_of(found: Sequence[Hypothesis], scores: Mapping[str, Score], level: f
     Args:
         found: explanations that were judged.
         scores: of the tests, by effect.
-        level: at which chance among all effects is rejected.
+        level: at which chance is rejected.
+        among_all: whether all effects are asked for, or the few that are confused with the leader.
     """
     if not found:
         return []
     best, known = max(found, key=lambda h: h.evidence), {h.name for h in found}
-    sure = level / max(sum(s.degrees > 0 for s in scores.values()), 1)
+    sure = level / max(sum(s.degrees > 0 for s in scores.values()), 1) if among_all else level
     names = [n for n, s in scores.items() if n not in known and s.degrees and confused(best.name, n)]
     names = [n for n in names if scores[n].p_value < sure]
-    return sorted(names, key=lambda n: scores[n].p_value)[:RIVALS]
+    return sorted(names, key=lambda n: -scores[n].evidence)[:RIVALS]
 
 
 def fitted_alone(asked: Setting, state: State) -> list[FittedHypothesis]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.noise_law.command_holding import cost_at_best
+from auvnn.diagnosis.noise_law.commands.holding import cost_at_best
 from auvnn.diagnosis.noise_law.estimate_law import estimate
 from auvnn.diagnosis.noise_law.law_likelihood import Likelihood
 from auvnn.diagnosis.noise_law.sums import force_sums

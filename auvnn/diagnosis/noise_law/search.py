@@ -19,31 +19,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.answer_types import SearchStep
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
-from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, shapes
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
+from auvnn.diagnosis.noise_law.commands.uncertain import in_closed_loop
 from auvnn.diagnosis.noise_law.estimate_law import estimate
 from auvnn.diagnosis.noise_law.hypothesis import (
     GROUP,
     Hypothesis,
     WithForce,
-    confused,
     free_running_cost,
     judged,
     p_value_of,
     predicts_better,
     tied,
 )
-from auvnn.diagnosis.noise_law.leaders import rivals_of
+from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
+from auvnn.diagnosis.noise_law.law_likelihood import STEPS
+from auvnn.diagnosis.noise_law.leader_fits import LeaderFits, Round
 from auvnn.diagnosis.noise_law.predicted_by_inputs import predicted_by_inputs
-from auvnn.diagnosis.noise_law.relinearise import UNSOLVED, relinearised
 from auvnn.diagnosis.noise_law.sums import CELL, force_sums
-from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
-from auvnn.diagnosis.score_tests.score import Score
+from auvnn.diagnosis.score_tests.null_tests import NullTests
 from auvnn.diagnosis.selection.choose import ALPHA
-from auvnn.diagnosis.selection.model_comparison import ODDS
+from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.diagnosis.stages.state import Setting
-from auvnn.estimation.prediction_error import FitError
-from auvnn.estimation.priors import parameters_of, set_parameters
+from auvnn.estimation.priors import parameters_of
 from auvnn.metrics.force_law import ForceLaw, cell_for
 from auvnn.metrics.rollouts import scale_of
 from auvnn.metrics.windows import Windows
@@ -54,15 +53,12 @@ Array = NDArray[np.float64]
 ALPHA_NAME, ALPHA_FURTHER = 0.01, 0.001
 # Standard errors by which runs left out must be predicted better.
 GAIN, GAIN_FURTHER = 1.0, 2.0
-# Fitted in full beside those that the first search has fitted: so many of those that lead under the law.
-LEADERS = 3
-STEPS = 6
-# Share of the odds that a further name needs, which its test must promise before it is fitted.
-WORTH_A_FIT = 0.3
 # What the first name and a further one must cost in free running, as shares of the tolerance: both fits are to all of the
 # log, and a force that is always there makes errors that no name takes away. And the share of the gain of all names
 # that a further one must bring.
 FIRST_COST, FURTHER_COST, FURTHER_SHARE = 0.5, 1.0, 0.1
+# Steps of the fit without any name.
+NULL_STEPS = 25
 
 
 class ForceSearch:
@@ -80,8 +76,9 @@ class ForceSearch:
         self.log, self.scale = asked.log, scale_of(asked.log)
         self.sigma = self.weights = np.full(18, np.inf)
         self.cell = CELL
-        self.ignores_cost, self.looks_further = asked.tolerance.strict, False
-        self._first_look: tuple[Hypothesis, Tested, list[Hypothesis]] | None = None
+        self.ignores_cost = self.looks_further = False
+        self.in_closed_loop = False
+        self._first_look: tuple[Hypothesis, Round, list[Hypothesis]] | None = None
 
     def begin(self, first: FittedHypothesis, sigma: Array) -> Hypothesis | None:
         """Return the explanation without any name under the law of the force; None where no variance is above zero.
@@ -91,6 +88,8 @@ class ForceSearch:
             sigma: (18,) the sensors' white noise.
         """
         self.say("estimating the law of the force that is left")
+        with suppress(*UNSOLVED):
+            self.in_closed_loop = in_closed_loop(first, self.windows)
         # Fits without the force weigh errors as the first one did, the force's among them.
         self.sigma, self.weights = sigma, first.fitted.sigma
         found = estimate(force_sums(first, self.windows, sigma, self.cell))
@@ -103,12 +102,22 @@ class ForceSearch:
                 force_sums(first, self.windows, sigma, cell), replace(found.law, cell=cell), found.law.axes
             )
         assert found.law is not None
-        return self.judged(first, found.law)
+        # All names are compared with it: it must not gain by steps that names take first.
+        return self._fits().settled(self.judged(first, found.law), NULL_STEPS)
 
-    def judged(self, explanation: FittedHypothesis, law: ForceLaw) -> Hypothesis:
-        """Return an explanation with the law that is most likely with it, and what they are worth."""
+    def _fits(self) -> LawFits:
+        return LawFits(self.windows, self.weights, self.judged)
+
+    def judged(self, explanation: FittedHypothesis, law: ForceLaw, held: bool = False) -> Hypothesis:
+        """Return an explanation with the law that is most likely with it, or with the one given, and what they are worth.
+
+        Args:
+            explanation: the explanation.
+            law: to begin from.
+            held: whether the law stays as it is.
+        """
         sums = force_sums(explanation, self.windows, self.sigma, self.cell)
-        return judged(self.layout, explanation, sums, self.sigma, law)
+        return judged(self.layout, explanation, sums, self.sigma, law, 0 if held else STEPS)
 
     def run(self, null: Hypothesis, fitted: Sequence[FittedHypothesis], most: int) -> WithForce:
         """Search for one effect after the other.
@@ -122,7 +131,9 @@ class ForceSearch:
         steps: list[SearchStep] = []
         groups: list[list[FittedHypothesis]] = []
         tried: list[Hypothesis] = []
-        whole = 1.0
+        whole, earlier = 1.0, dict[str, Array]()
+        under_law = self._fits()
+        fits = LeaderFits(self.layout, under_law, self.say)
         while len(chosen) < most:
             law = current.estimate.law
             assert law is not None
@@ -133,36 +144,30 @@ class ForceSearch:
             self.say(f"testing {len(remaining)} effects together with the force")
             base = [*self.base, *[c for c in chosen if c not in self.base]]
             # A second search begins with the same look.
-            seen = self._first_look if not chosen else None
-            known = seen[1:] if seen is not None and seen[0] is null else None
-            tested = (
-                known[0]
-                if known
-                else NullTests(self.layout, replace(self.windows, law=law), self.say)(
+            look = (
+                self._first_look if not chosen and self._first_look and self._first_look[0] is null else None
+            )
+            tests = None if look is None else look[1].tested
+            if tests is None:
+                tests = NullTests(self.layout, replace(self.windows, law=law), self.say)(
                     current.weighed, remaining, base, chosen
                 )
-            )
             # Beside what was found the variance is no longer inflated by it: the tests say whether to go on.
-            if chosen and tested.p_value >= ALPHA:
+            if chosen and tests.p_value >= ALPHA:
                 break
             share = 0.0 if self.looks_further else FURTHER_SHARE
             odds = max(ODDS, share * (current.evidence - null.evidence))
-            found = known[1] if known else self._fitted(tested, current, base, chosen, fitted, odds)
+            at = Round(tests, current, base, chosen, earlier)
+            found = look[2] if look else fits.leading(at, fitted, odds, ALPHA_NAME)
+            good = self._good(found, at, odds, len(remaining))
+            if not good and not chosen and not look:
+                found = fits.wider(at, found, ALPHA_NAME)
+                good = self._good(found, at, odds, len(remaining))
+            sure = {h.name: _sure(self.layout, h, at, len(remaining)) for h in found}
             if not chosen:
-                self._first_look = null, tested, found
-            sure = {h.name: min(1.0, len(remaining) * p_value_of(self.layout, h, current)) for h in found}
-            if not chosen:
-                tried = found
-                whole = min([tested.p_value, *sure.values()], default=1.0)
-            level, least = (ALPHA_FURTHER, GAIN_FURTHER) if chosen else (ALPHA_NAME, GAIN)
-            likely = [
-                h
-                for h in found
-                if h.evidence > current.evidence + odds
-                and sure[h.name] < level
-                and predicts_better(h, current, least)
-            ]
-            good = self._paying(likely, current, FURTHER_COST if chosen else FIRST_COST)
+                self._first_look = null, at, found
+                earlier = {h.name: parameters_of(h.explanation.fitted.model, [h.name]) for h in found}
+                tried, whole = found, min([tests.p_value, *sure.values()], default=1.0)
             if not good or (chosen and self._takes_up(good[0], chosen)):
                 break
             group = tied(self.layout, good, current)
@@ -171,7 +176,7 @@ class ForceSearch:
             names = [h.name for h in group]
             verdict = "ambiguous" if len(group) > 1 else "named"
             steps.append({"verdict": verdict, "effects": names, "p_value": sure[group[0].name]})
-            current = relinearised(group[0], self.windows, self.weights, self.judged)
+            current = under_law.settled(group[0])
             if len(group) > 1:
                 groups.append([current.explanation, *(h.explanation for h in group[1:])])
             chosen.append(group[0].name)
@@ -188,24 +193,56 @@ class ForceSearch:
             null.estimate.law,
         )
 
-    def _paying(self, likely: Sequence[Hypothesis], current: Hypothesis, share: float) -> list[Hypothesis]:
-        """Return those explanations that cost enough, none where a likelier one makes free running worse.
+    def _good(self, found: Sequence[Hypothesis], at: Round, odds: float, among: int) -> list[Hypothesis]:
+        """Return those explanations that may be named, the most evident first.
 
-        What the data prefer at odds of a hundred, and what free running contradicts, says that neither can be trusted.
+        Args:
+            found: explanations that were judged.
+            at: the round.
+            odds: logarithm of the odds that a name needs.
+            among: how many effects were asked for.
+        """
+        level, least = (ALPHA_FURTHER, GAIN_FURTHER) if at.chosen else (ALPHA_NAME, GAIN)
+        likely = [
+            h
+            for h in found
+            if h.evidence > at.current.evidence + odds
+            and _sure(self.layout, h, at, among) < level
+            and predicts_better(h, at.current, least)
+        ]
+        return self._paying(likely, at.current, FURTHER_COST if at.chosen else FIRST_COST)
+
+    def _paying(self, likely: Sequence[Hypothesis], current: Hypothesis, share: float) -> list[Hypothesis]:
+        """Return those explanations that cost enough, and those that the data prefer to the likeliest of them.
+
+        A less likely one must not be named because a likelier one that makes free running better costs little: then
+        that one comes first, and the other is asked for again beside it. Effects that the catalogue knows to be confused
+        with the name are compared with it, too. In open loop none is given where a likelier one makes free running
+        worse: what the data prefer and what free running contradicts says that neither can be trusted. In closed loop
+        a right name may make it worse, and how far it moves the predictions counts.
 
         Args:
             likely: explanations, the most evident first.
             current: that without them.
             share: of the tolerated cost that is enough.
         """
-        if self.ignores_cost:
+        if self.tolerance.strict:
             return list(likely)
-        enough = share * self.tolerance.cost
-        costs = [free_running_cost(h, current, self.log, self.scale) for h in likely]
-        good = [h for h, cost in zip(likely, costs, strict=True) if cost > enough]
-        worse = [h for h, cost in zip(likely, costs, strict=True) if cost < -enough]
-        contradicted = good and any(h.evidence > good[0].evidence + ODDS for h in worse)
-        return [] if contradicted else good
+        enough = 0.0 if self.ignores_cost else share * self.tolerance.cost
+        found = [free_running_cost(h, current, self.log, self.scale) for h in likely]
+        costs = [max(cost) if self.in_closed_loop else cost[0] for cost in found]
+        paying = [k for k, cost in enumerate(costs) if cost > enough]
+        if not paying:
+            return []
+        first = paying[0]
+        if any(
+            c <= 0.0 and h.evidence > likely[first].evidence + ODDS
+            for h, c in zip(likely, costs, strict=True)
+        ):
+            return []
+        good = [k for k in range(len(likely)) if k in paying or (k < first and costs[k] > 0.0)]
+        best = likely[good[0]].name
+        return [h for k, h in enumerate(likely) if k in good or (k > first and confused(h.name, best))]
 
     def _takes_up(self, further: Hypothesis, chosen: Sequence[str]) -> bool:
         """Whether a further effect only takes up what the shape of an earlier one gets wrong.
@@ -220,73 +257,7 @@ class ForceSearch:
         predicted = predicted_by_inputs(further.weighed, replace(self.windows, law=law))
         return predicted is not None and predicted.matters
 
-    def _fitted(
-        self, tested: Tested, current: Hypothesis, base: list[str], chosen: list[str],
-        fitted: Sequence[FittedHypothesis], odds: float,
-    ) -> list[Hypothesis]:  # fmt: skip
-        """Return the leading effects, fitted and judged, the most evident first."""
-        leading = self._leading(tested, current, base, chosen, fitted, WORTH_A_FIT * odds)
-        found = self._all_judged(leading, current)
-        rivals = () if chosen else rivals_of(found, tested.scores, ALPHA_NAME)
-        more = [self._one(n, tested.scores[n], tested.at, current, base, chosen) for n in rivals]
-        return sorted([*found, *self._all_judged([e for e in more if e], current)], key=lambda h: -h.evidence)
 
-    def _all_judged(self, explanations: Sequence[FittedHypothesis], current: Hypothesis) -> list[Hypothesis]:
-        law, found = current.estimate.law, []
-        assert law is not None
-        for explanation in explanations:
-            # One whose free running grows so that nothing can be said of it is passed over.
-            with suppress(*UNSOLVED):
-                found.append(self.judged(explanation, law))
-        return found
-
-    def _leading(
-        self,
-        tested: Tested,
-        current: Hypothesis,
-        base: list[str],
-        chosen: list[str],
-        fitted: Sequence[FittedHypothesis],
-        odds: float,
-    ) -> list[FittedHypothesis]:
-        """Return the leading effects fitted in full beside what was chosen, one explanation for each."""
-        scores = {n: s for n, s in tested.scores.items() if s.degrees}
-        known: dict[str, FittedHypothesis] = {}
-        if not chosen:
-            for e in fitted:
-                name = e.effects[-1]
-                if name in scores and (name not in known or e.fitted.cost < known[name].fitted.cost):
-                    known[name] = e
-        order = sorted(scores, key=lambda n: -scores[n].evidence)[:LEADERS]
-        by_gain = sorted(scores, key=lambda n: scores[n].degrees - scores[n].gain)[:1]
-        for name in dict.fromkeys([*order, *by_gain]):
-            # A further name must bring much: what promises a small part of that is not worth a fit.
-            if name not in known and (not chosen or 0.5 * scores[name].gain > odds):
-                found = self._one(name, scores[name], tested.at, current, base, chosen)
-                if found is not None:
-                    known[name] = found
-        return list(known.values())
-
-    def _one(
-        self, name: str, score: Score, at: Layout, current: Hypothesis, base: list[str], chosen: list[str]
-    ) -> FittedHypothesis | None:
-        """Return an effect fitted from what its test estimates, or from nearer its null; None where every fit fails.
-
-        One that ends with larger errors than there are without it began too far off.
-        """
-        self.say(f"fitting {name} together with the force")
-        known, start = parameters_of(at.model, [name]), initial_guess(self.layout, name, score.estimate)
-        shape, found = shapes(self.layout, name), []
-        for share in (1.0, 0.1):
-            guess = at.model.rebuilt(at.model.copied_effects())
-            set_parameters(guess, [name], np.where(shape, start, known + share * (start - known)))
-            with suppress(FitError):
-                found.append(
-                    fit_hypothesis(
-                        self.layout, self.windows, base, [*chosen, name], start=current.explanation.fitted,
-                        guess=replace(at, model=guess), sigma=self.weights, iterations=STEPS,
-                    )
-                )  # fmt: skip
-                if found[-1].squared_error(self.weights) <= current.explanation.squared_error(self.weights):
-                    break
-        return min(found, key=lambda e: e.squared_error(self.weights), default=None)
+def _sure(layout: Layout, found: Hypothesis, at: Round, among: int) -> float:
+    """Return the p-value of an effect among so many that were asked for, by the likelihood ratio."""
+    return min(1.0, among * p_value_of(layout, found, at.current))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -20,6 +21,8 @@ from auvnn.metrics.windows import Windows
 Array = NDArray[np.float64]
 # Cells of the force while its law is looked for, s.
 CELL = 0.5
+# Windows of a chain.
+CHAIN = 10
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,8 @@ class ForceSums:
         span: longest window, s.
         cell: length of the cells, s.
         joint: (P, P) precision of all parameters together, where some go together.
+        before: (B,) the window that each one follows, -1 where none does; None where none follows any.
+        gap: (B,) time between the cells of that window and its own, s.
     """
 
     statistics: Statistics
@@ -53,6 +58,8 @@ class ForceSums:
     span: float
     cell: float
     joint: Array | None = None
+    before: NDArray[np.int64] | None = None
+    gap: Array | None = None
 
     @property
     def priors(self) -> Priors:
@@ -92,6 +99,31 @@ def force_sums(
     priors = fitted.priors
     return ForceSums(
         statistics, len(fitted.theta), plain.cells, fitted.theta, priors.mean, priors.precision,
-        priors.inside(fitted.theta), np.array([force] * 3 + [0.1 * force * float(vehicle.length)] * 3),
+        np.ones(len(fitted.theta), dtype=bool), np.array([force] * 3 + [0.1 * force * float(vehicle.length)] * 3),
         (shortest, max(0.1 * max(runs), 2.0 * shortest)), span, cell, priors.joint,
+        *followed(windows, plain.cells * cell),
     )  # fmt: skip
+
+
+def followed(windows: Windows, reach: float) -> tuple[NDArray[np.int64], Array]:
+    """Return the window that each one follows in its run, -1 where none does, and the time between them, s, (B,) each.
+
+    A chain begins anew after so many windows: what is known of a force ten windows ago says no more.
+
+    Args:
+        windows: B windows.
+        reach: time from a window's start to the end of its last cell, s.
+    """
+    times = windows.times[:, windows.warmup :].numpy()
+    begin, end = times[:, 0], times[:, -1]
+    before, gap = np.full(len(begin), -1), np.zeros(len(begin))
+    linked = 0
+    order = np.lexsort((begin, windows.run))
+    for one, other in itertools.pairwise(order):
+        whole = end[one] - begin[one] > 0.9 * reach
+        same = windows.run[one] == windows.run[other] and begin[other] >= end[one] - 1e-9
+        linked = linked + 1 if same and whole and linked + 1 < CHAIN else 0
+        if linked:
+            before[other] = one
+            gap[other] = max(begin[other] - begin[one] - reach, 0.0)
+    return before, gap

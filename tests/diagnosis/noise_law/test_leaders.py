@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
@@ -37,7 +38,7 @@ def test_an_effect_that_was_named_second_is_fitted_by_itself():
 
 def test_what_is_known_to_be_confused_with_the_leader_is_fitted_too():
     def score(p_value, degrees=1):
-        return SimpleNamespace(p_value=p_value, degrees=degrees)
+        return SimpleNamespace(p_value=p_value, degrees=degrees, evidence=-np.log(p_value))
 
     found: Any = [
         SimpleNamespace(name="tether", evidence=-10.0),
@@ -50,4 +51,6 @@ def test_what_is_known_to_be_confused_with_the_leader_is_fitted_too():
     # "payload" is not known to be confused with a tether, and of a constant force such a log says nothing.
     assert rivals_of(found, scores, 0.01) == ["ocean_current", "biofouling"]
     assert rivals_of(found, scores, 1e-5) == ["ocean_current"]
+    assert rivals_of(found, scores, 1e-5, among_all=False) == ["ocean_current"]
+    assert rivals_of(found, scores, 2e-5, among_all=False) == ["ocean_current", "biofouling"]
     assert rivals_of([], scores, 0.01) == []

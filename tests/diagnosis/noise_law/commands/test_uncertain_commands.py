@@ -13,10 +13,11 @@ import torch
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.noise_law import uncertain_commands
-from auvnn.diagnosis.noise_law.command_holding import Holding
-from auvnn.diagnosis.noise_law.uncertain_commands import (
+from auvnn.diagnosis.noise_law.commands import uncertain
+from auvnn.diagnosis.noise_law.commands.holding import Holding
+from auvnn.diagnosis.noise_law.commands.uncertain import (
     UncertainWrench,
+    in_closed_loop,
     law_differences,
     noise_answered,
     uncertain_wrench,
@@ -107,6 +108,7 @@ def test_commands_that_answer_the_noise_leave_its_share_uncertain():
     answering = replace(windows, nu=nu, inputs=replace(windows.inputs, command=command))
     found = noise_answered(first, answering)
     # Half of the noise is the log's own, which nothing answers: what is regressed on is noisy itself.
+    assert not in_closed_loop(first, windows) and in_closed_loop(first, answering)
     assert 0.5 * 0.12 < found[2] < 1.1 * 0.12 and (np.delete(found, 2)[:2] < 0.4 * found[2]).all()
 
 
@@ -154,7 +156,7 @@ def test_what_answers_noise_counts_by_every_law_of_the_commands(monkeypatch, nam
     model = GreyBox(small_vehicle())
     first, windows = fitted(model, make_log(model, duration=20.0, rate=5.0, noise=0.3))
     answered = np.array([1e6, 0.0, 0.0, 0.0, 0.0, 0.0])
-    monkeypatch.setattr(uncertain_commands, "noise_answered", lambda *_: answered)
+    monkeypatch.setattr(uncertain, "noise_answered", lambda *_: answered)
     held = Holding(name, 0.5, 0.0 if name == "held" else 9.0, 9.0, 4)
     found = uncertain_wrench(first, windows, held)
     assert found.white[0] == 1e6

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.noise_law.command_holding import LINEAR, Holding, between
+from auvnn.diagnosis.noise_law.commands.holding import LINEAR, Holding, between
 from auvnn.diagnosis.residuals.forces import fins_of
 from auvnn.effects.base import AXES
 from auvnn.estimation.window_normal_equations import linearise
@@ -125,17 +125,10 @@ def noise_answered(end: FittedHypothesis, windows: Windows) -> Array:
         numpy.linalg.LinAlgError: free running with the fit grows without bound.
     """
     fitted, given = end.fitted, windows.inputs
-    error = torch.cat([r.error for r in linearise(fitted.model, windows, fitted.initial, ())])
-    if not torch.isfinite(error[windows.mask[..., : error.shape[-1]] > 0]).all():
-        raise np.linalg.LinAlgError("free running grows without bound")
-    known = windows.mask[..., : error.shape[-1]] > 0
-    fast, usable = _fast(torch.where(known, error, torch.zeros_like(error))), _inner(known, windows)
-    regressors = fast[usable].numpy()
-    size = regressors.std(axis=0) if len(regressors) else np.zeros(fast.shape[-1])
-    moving = size > 0.0
-    if not moving.any() or len(regressors) <= 2 * moving.sum():
+    told = _fast_errors(end, windows)
+    if told is None:
         return np.zeros(6)
-    regressors = regressors[:, moving] / size[moving]
+    usable, regressors = told
 
     def answered(values: Tensor) -> Tensor:
         """Return values without what answers the noise; where chance would do as much, as they are."""
@@ -162,6 +155,50 @@ def noise_answered(end: FittedHypothesis, windows: Windows) -> Array:
     )
     with torch.no_grad():
         return _rms([_wrench(fitted.model, windows) - _wrench(fitted.model, calm)], windows)
+
+
+def in_closed_loop(end: FittedHypothesis, windows: Windows) -> bool:
+    """Whether commands or fin angles answer the sensors' noise at their own sample, as only a controller's do.
+
+    Args:
+        end: the explanation whose errors stand for the noise.
+        windows: those it was fitted to.
+
+    Raises:
+        numpy.linalg.LinAlgError: free running with the fit grows without bound.
+    """
+    told, given = _fast_errors(end, windows), windows.inputs
+    if told is None:
+        return False
+    usable, regressors = told
+    for values in (given.command, given.fins):
+        if values is None:
+            continue
+        target = _fast(values[:, windows.warmup :])[usable].numpy()
+        left = target - regressors @ np.linalg.lstsq(regressors, target, rcond=1e-8)[0]
+        whole, chance = (target**2).sum(0), regressors.shape[1] / len(regressors)
+        if (1.0 - (left**2).sum(0) / np.maximum(whole, 1e-300) - chance > ANSWERS)[whole > 0.0].any():
+            return True
+    return False
+
+
+def _fast_errors(end: FittedHypothesis, windows: Windows) -> tuple[Tensor, Array] | None:
+    """Return the samples (B, L) that have both neighbours, and the fast part of the errors there, (N, c).
+
+    None where there are too few of them.
+    """
+    fitted = end.fitted
+    error = torch.cat([r.error for r in linearise(fitted.model, windows, fitted.initial, ())])
+    if not torch.isfinite(error[windows.mask[..., : error.shape[-1]] > 0]).all():
+        raise np.linalg.LinAlgError("free running grows without bound")
+    known = windows.mask[..., : error.shape[-1]] > 0
+    fast, usable = _fast(torch.where(known, error, torch.zeros_like(error))), _inner(known, windows)
+    regressors = fast[usable].numpy()
+    size = regressors.std(axis=0) if len(regressors) else np.zeros(fast.shape[-1])
+    moving = size > 0.0
+    if not moving.any() or len(regressors) <= 2 * moving.sum():
+        return None
+    return usable, regressors[:, moving] / size[moving]
 
 
 def _fast(values: Tensor) -> Tensor:

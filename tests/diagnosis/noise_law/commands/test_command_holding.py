@@ -15,7 +15,7 @@ from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law import answer
 from auvnn.diagnosis.noise_law.answer import _held
-from auvnn.diagnosis.noise_law.command_holding import (
+from auvnn.diagnosis.noise_law.commands.holding import (
     AVERAGED,
     Holding,
     between,

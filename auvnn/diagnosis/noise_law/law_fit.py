@@ -1,0 +1,169 @@
+"""Fits under a law of the stochastic force: steps of Gauss and Newton on the marginal likelihood.
+
+A fit of output errors takes a large force for something that the parameters should explain: under a controller, whose
+commands answer the force, it drives coefficients to the ends of their ranges, and effects away from their values. A
+name is therefore fitted under the law as well, from where nothing is yet assumed of it. Each step linearises the
+windows, integrates forces and initial states out, and goes where the likelihood that is then expected is largest; it is
+kept only if the likelihood at the new values is larger. Where no step is left, the law is estimated again, and so on
+until that changes little.
+
+Reference: Kristensen, Madsen and Joergensen (2004), Automatica 40(2) 225-237.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out, plausible
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, priors
+from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
+from auvnn.estimation.initial_states import fit_initial_states
+from auvnn.estimation.prediction_error import SINGULAR, FitError, Fitted
+from auvnn.estimation.priors import limits, parameters_of, set_parameters
+from auvnn.estimation.window_normal_equations import linearise, normal_equations
+from auvnn.metrics.force_law import ForceLaw
+from auvnn.metrics.windows import Windows
+from auvnn.models import GreyBox
+
+Array = NDArray[np.float64]
+# From an explanation, a law, and whether the law is held, to the hypothesis.
+Judge = Callable[[FittedHypothesis, ForceLaw, bool], Hypothesis]
+# What is raised where free running grows without bound, and sums of it cannot be solved.
+UNSOLVED = (FitError, np.linalg.LinAlgError, SINGULAR)
+# At most so many steps, the shares of a step that are tried, and the gain of the log likelihood that ends a fit.
+STEPS, SHARES, SETTLED = 8, (1.0, 0.3, 0.1, 0.03), 1.0
+# How often the law is estimated again.
+ROUNDS = 3
+
+
+class LawFits:
+    """Fits under laws of the force, of one log.
+
+    Args:
+        windows: of the log, without a law.
+        weights: (18,) by which errors count in fits without the force.
+        judge: from an explanation and a law to the hypothesis with the law that is most likely with it, or with that law
+            where it is held.
+    """
+
+    def __init__(self, windows: Windows, weights: Array, judge: Judge) -> None:
+        """Keep what all fits share."""
+        self.windows, self.weights, self.judge = windows, weights, judge
+
+    def from_null(
+        self, layout: Layout, model: GreyBox, current: Hypothesis, base: list[str], effects: list[str]
+    ) -> Hypothesis:
+        """Return effects fitted under the law, from the values that a model has.
+
+        Args:
+            layout: stated values.
+            model: with the values to begin from; of what is asked for, its null or near it.
+            current: an explanation without the last effect, whose law and initial states to begin from; the latter are
+                fitted again where the model does not begin at its null.
+            base: effects that are free anyway.
+            effects: effects asked for.
+        """
+        assert current.estimate.law is not None
+        names = tuple(dict.fromkeys([*base, *effects]))
+        held = priors(layout, names, free=effects)
+        begun = replace(current.explanation.fitted, names=names, priors=held, model=model)
+        begun = replace(begun, theta=parameters_of(model, names))
+        explanation = FittedHypothesis(tuple(effects), begun, names, 0.0, np.zeros(0), np.zeros(0))
+        judged = plausible(layout, names, effects, held, begun.theta)
+        absent = effects[-1] not in model.without_absent().effect_names
+        initial = begun.initial if absent else None
+        started = self._at(replace(explanation, judged=judged), begun.theta, initial)
+        return self.settled(self.judge(started, current.estimate.law, True))
+
+    def settled(self, found: Hypothesis, most: int = STEPS) -> Hypothesis:
+        """Return a hypothesis at parameters where its likelihood is largest, as far as steps lead there.
+
+        Its evidence is that of the parameters at which it ends: what a further step only promises does not count.
+
+        Args:
+            found: to begin from.
+            most: steps.
+        """
+        for _ in range(ROUNDS):
+            for _ in range(most):
+                again = self._step(found) if 0.5 * found.estimate.gain >= SETTLED else None
+                if again is None:
+                    break
+                found, little = again, _here(again) - _here(found) < SETTLED
+                if little:
+                    break
+            before, law = found.evidence, found.estimate.law
+            assert law is not None
+            again = self.judge(found.explanation, law, False)
+            # The likeliest law is that of what a step promises: where no step keeps that, the law before may be better.
+            if _here(again) < _here(found):
+                break
+            found = again
+            if found.evidence - before < SETTLED:
+                break
+        gain = found.estimate.gain
+        if 0.5 * gain < SETTLED:
+            return found
+        return replace(found, misfit=found.misfit + gain, evidence=_here(found))
+
+    def _step(self, found: Hypothesis) -> Hypothesis | None:
+        """Return the hypothesis a step on; None where no share of the step makes it likelier."""
+        law, explanation = found.estimate.law, found.explanation
+        fitted = explanation.fitted
+        assert law is not None
+        low, high = limits(fitted.model, explanation.names, fitted.priors)
+        for share in SHARES:
+            theta = np.clip(fitted.theta + share * found.estimate.step, low, high)
+            with suppress(*UNSOLVED):
+                again = self.judge(self._at(explanation, theta), law, True)
+                if _here(again) > _here(found):
+                    return again
+        return None
+
+    def _at(self, found: FittedHypothesis, theta: Array, initial: Tensor | None = None) -> FittedHypothesis:
+        """Return an explanation at other values, its sums without a force computed again there.
+
+        The windows stay linear about the free running without the force, with the initial states that suit it best: a
+        force takes an unstable vehicle too far from the free running for a linearisation about its own initial states.
+
+        Args:
+            found: the explanation.
+            theta: values.
+            initial: initial states (B, 13), fitted again by default.
+        """
+        fitted, judged_by = found.fitted, found.judged or found.fitted.priors
+        model = fitted.model.rebuilt(fitted.model.copied_effects())
+        set_parameters(model, found.names, theta)
+        if initial is None:
+            free = model.without_absent(found.names)
+            initial = fit_initial_states(free, self.windows, self.weights, fitted.initial)
+        sums, _, _ = normal_equations(
+            self.windows, linearise(model, self.windows, initial, found.names), self.weights
+        )
+        cost = float(sums.cost.sum()) + fitted.priors.penalty(theta)
+        moved = Fitted(
+            model,
+            found.names,
+            theta,
+            initial,
+            self.weights,
+            sums,
+            fitted.priors,
+            cost,
+            True,
+            fitted.iterations,
+        )
+        own = left_out(sums, theta, judged_by, folds(self.windows.run))
+        count = sums.count[:, np.isfinite(self.weights)].sum(1)
+        return replace(found, fitted=moved, left_out=own, left_out_count=count)
+
+
+def _here(found: Hypothesis) -> float:
+    """Return the evidence without what a further step promises."""
+    return found.evidence - 0.5 * found.estimate.gain

@@ -1,0 +1,149 @@
+"""The leading effects of a round, fitted in full beside what was found and judged under laws of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, shapes
+from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
+from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
+from auvnn.diagnosis.noise_law.leaders import rivals_of
+from auvnn.diagnosis.score_tests.null_tests import Tested
+from auvnn.estimation.priors import parameters_of, set_parameters
+
+Array = NDArray[np.float64]
+# Fitted in full beside those that the first search has fitted: so many of those that lead under the law, and so many more
+# of those whose tests are significant where none of these stands.
+LEADERS, FURTHER_LEADERS = 3, 5
+# Share of the odds that a further name needs, which its test must promise before it is fitted.
+WORTH_A_FIT = 0.3
+
+
+@dataclass(frozen=True)
+class Round:
+    """Where one round of the search stands.
+
+    Attributes:
+        tested: tests of the effects that remain.
+        current: the explanation without any of them.
+        base: effects that are free whatever is chosen.
+        chosen: effects found before.
+        earlier: values of effects that were fitted when nothing was chosen.
+    """
+
+    tested: Tested
+    current: Hypothesis
+    base: list[str]
+    chosen: list[str]
+    earlier: Mapping[str, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class LeaderFits:
+    """Fits the effects that lead.
+
+    Attributes:
+        layout: stated values.
+        fits: under laws of the force.
+        say: called with what is being done, in words.
+    """
+
+    layout: Layout
+    fits: LawFits
+    say: Callable[[str], None]
+
+    def leading(
+        self, at: Round, fitted: Sequence[FittedHypothesis], odds: float, level: float
+    ) -> list[Hypothesis]:
+        """Return the leading effects, fitted and judged, the most evident first.
+
+        Args:
+            at: the round.
+            fitted: explanations of one effect that the first search has fitted.
+            odds: logarithm of the odds that a name needs.
+            level: at which chance among all effects is rejected.
+        """
+        known = self._known(at, fitted)
+        found = self._each([*known, *self._worth(at, known, WORTH_A_FIT * odds)], at, known)
+        # Beside what was found tests are weaker: a rival of a further name need not be clear among all effects.
+        rivals = rivals_of(found, at.tested.scores, level, among_all=not at.chosen)
+        return _by_evidence([*found, *self._each(rivals, at)])
+
+    def wider(self, at: Round, found: Sequence[Hypothesis], level: float) -> list[Hypothesis]:
+        """Return what was found together with more of the effects whose tests are significant, fitted and judged.
+
+        A large effect may be behind others where its slope at the null says little of it: before nothing is said to have
+        a name, these are fitted too.
+
+        Args:
+            at: the round.
+            found: what has been fitted.
+            level: at which chance among all effects is rejected.
+        """
+        known, scores = {h.name for h in found}, at.tested.scores
+        told = [n for n, s in scores.items() if s.degrees]
+        more = [n for n in told if n not in known and scores[n].p_value * len(told) < level]
+        more = sorted(more, key=lambda n: -scores[n].evidence)[:FURTHER_LEADERS]
+        return _by_evidence([*found, *self._each(more, at)])
+
+    def _known(self, at: Round, fitted: Sequence[FittedHypothesis]) -> dict[str, FittedHypothesis]:
+        """Return the effects that the first search has fitted alone, while nothing is chosen."""
+        known: dict[str, FittedHypothesis] = {}
+        for e in [] if at.chosen else fitted:
+            name = e.effects[-1]
+            told = name in at.tested.scores and at.tested.scores[name].degrees
+            if told and (name not in known or e.fitted.cost < known[name].fitted.cost):
+                known[name] = e
+        return known
+
+    def _worth(self, at: Round, known: Iterable[str], odds: float) -> list[str]:
+        """Return the effects that lead under the law, without those that are known."""
+        scores = {n: s for n, s in at.tested.scores.items() if s.degrees}
+        order = sorted(scores, key=lambda n: -scores[n].evidence)[:LEADERS]
+        by_gain = sorted(scores, key=lambda n: scores[n].degrees - scores[n].gain)[:1]
+        # A further name must bring much: what promises a small part of that is not worth a fit.
+        worth = [n for n in dict.fromkeys([*order, *by_gain]) if not at.chosen or 0.5 * scores[n].gain > odds]
+        return [n for n in worth if n not in {*known}]
+
+    def _each(
+        self, names: Iterable[str], at: Round, known: Mapping[str, FittedHypothesis] | None = None
+    ) -> list[Hypothesis]:
+        found = [self._one(name, at, (known or {}).get(name)) for name in names]
+        return [h for h in found if h is not None]
+
+    def _one(self, name: str, at: Round, known: FittedHypothesis | None) -> Hypothesis | None:
+        """Return an effect fitted under the law; None where nothing can be said of it.
+
+        It is fitted from where it is absent: a fit of output errors may have been driven far off by the force. A large
+        effect is seldom where its slope says: where the first search has fitted it, and as a further name where it was
+        as the first, it is fitted from there too.
+
+        Args:
+            name: the effect.
+            at: the round.
+            known: its fit by the first search.
+        """
+        self.say(f"fitting {name} together with the force")
+        tested, found = at.tested, []
+        null = parameters_of(tested.at.model, [name])
+        # At its null place and time an effect says nothing of them: they are where its test has found them.
+        shape = shapes(self.layout, name)
+        begins = [np.where(shape, initial_guess(self.layout, name, tested.scores[name].estimate), null)]
+        begins += [at.earlier[name]] if name in at.earlier else []
+        begins += [] if known is None else [parameters_of(known.fitted.model, [name])]
+        for begin in begins:
+            model = tested.at.model.rebuilt(tested.at.model.copied_effects())
+            set_parameters(model, [name], begin)
+            with suppress(*UNSOLVED):
+                found.append(self.fits.from_null(self.layout, model, at.current, at.base, [*at.chosen, name]))
+        return max(found, key=lambda h: h.evidence, default=None)
+
+
+def _by_evidence(found: Iterable[Hypothesis]) -> list[Hypothesis]:
+    return sorted(found, key=lambda h: -h.evidence)

@@ -1,0 +1,124 @@
+"""Fits under a law of the stochastic force: where their steps lead, and whether they find values that are known."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.noise_law import law_fit
+from auvnn.diagnosis.noise_law.estimate_law import estimate
+from auvnn.diagnosis.noise_law.hypothesis import Hypothesis, judged
+from auvnn.diagnosis.noise_law.law_fit import LawFits
+from auvnn.diagnosis.noise_law.split_windows import split
+from auvnn.diagnosis.noise_law.sums import force_sums
+from auvnn.diagnosis.residuals.variance_component_test import white
+from auvnn.models import GreyBox
+from tests.diagnosis.noise_law.wandering import wandering_log
+from tests.small_logs import small_vehicle
+
+NAME = "net_buoyancy"
+
+
+class Climb:
+    """A log likelihood of one value whose slope promises another gain than a step brings.
+
+    Args:
+        of: the log likelihood.
+        step: from a value to the step that is expected to lead to its top, and to what it promises.
+    """
+
+    def __init__(self, monkeypatch, of, step):
+        self.of, self.step, self.seen = of, step, []
+        model = GreyBox(small_vehicle()).with_effects({NAME: {"force": 0.0}})
+        self.fitted = SimpleNamespace(theta=np.zeros(1), model=model, priors=None)
+        monkeypatch.setattr(law_fit, "limits", lambda *_: (np.array([-50.0]), np.array([50.0])))
+        monkeypatch.setattr(LawFits, "_at", lambda fits, found, theta: float(theta[0]))
+
+    def judge(self, value, law="law", held=True):
+        assert law == "law"
+        value = value.fitted.theta[0] if isinstance(value, SimpleNamespace) else value
+        self.seen.append(value)
+        if not np.isfinite(self.of(value)):
+            raise np.linalg.LinAlgError("grows without bound")
+        step, promised = self.step(value)
+        estimate: Any = SimpleNamespace(law="law", step=np.array([step]), gain=2.0 * promised)
+        explanation: Any = SimpleNamespace(
+            names=[NAME], fitted=SimpleNamespace(**{**vars(self.fitted), "theta": np.array([value])})
+        )
+        here = self.of(value)
+        return Hypothesis(explanation, estimate, -2.0 * (here + promised), here + promised)
+
+    def settled(self, most=8):
+        nothing: Any = None
+        judge: Any = self.judge
+        found = LawFits(nothing, np.ones(18), judge).settled(self.judge(0.0), most)
+        return float(found.explanation.fitted.theta[0]), found.evidence
+
+
+def test_steps_go_on_to_the_top(monkeypatch):
+    climb = Climb(monkeypatch, lambda x: -((x - 8.0) ** 2), lambda x: (0.7 * (8.0 - x), (x - 8.0) ** 2))
+    at, evidence = climb.settled()
+    assert at == pytest.approx(8.0, abs=1.0) and evidence == pytest.approx(0.0, abs=1.0)
+    assert len(climb.seen) < 7
+
+
+def test_a_step_that_makes_the_values_unlikelier_is_shortened(monkeypatch):
+    # Twelve times too far, each time: a tenth of the step is nearly right, the whole of it and 0.3 of it are not.
+    climb = Climb(monkeypatch, lambda x: -((x - 2.0) ** 2), lambda x: (12.0 * (2.0 - x), (x - 2.0) ** 2))
+    at, _ = climb.settled()
+    assert at == pytest.approx(2.4) and climb.seen[1:4] == pytest.approx([24.0, 7.2, 2.4])
+    climb = Climb(
+        monkeypatch, lambda x: -np.inf if x > 5 else -((x - 2.0) ** 2), lambda x: (10.0, (x - 2.0) ** 2)
+    )
+    assert climb.settled()[0] in climb.seen
+
+
+def test_what_a_step_promises_and_does_not_keep_is_no_evidence(monkeypatch):
+    climb = Climb(monkeypatch, lambda x: -abs(x), lambda x: (5.0, 300.0))
+    assert climb.settled() == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_values_stay_within_their_limits(monkeypatch, kept):
+    climb = Climb(monkeypatch, lambda x: x if kept else -x, lambda x: (500.0, 500.0 - x))
+    assert climb.settled(1)[0] == (50.0 if kept else 0.0)
+
+
+RMS, TIME, HIDDEN = np.array([15.0, 15.0, 15.0, 1.5, 1.5, 2.0]), 1.0, 12.0
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_fit_from_the_null_finds_the_value_and_is_at_least_as_likely_as_one_of_output_errors(seed):
+    truth = GreyBox(small_vehicle()).with_effects({NAME: {"force": HIDDEN}})
+    log = wandering_log(truth, RMS, TIME, runs=3, duration=40.0, seed=seed)
+    model = GreyBox(small_vehicle())
+    (windows, *_), layout = split(windows_for(model, log)), lay_out(model, [NAME])
+    base = ["added_mass", "linear_damping", "quadratic_damping", "inertia"]
+    first = fit_hypothesis(layout, windows, base, (), iterations=4)
+    sigma = white(first, np.zeros(18))
+
+    def judge(explanation: FittedHypothesis, law, held=False):
+        sums = force_sums(explanation, windows, sigma)
+        return judged(layout, explanation, sums, sigma, law, 0 if held else 40)
+
+    law = estimate(force_sums(first, windows, sigma)).law
+    assert law is not None
+    fits = LawFits(windows, first.fitted.sigma, judge)
+    null = fits.settled(judge(first, law))
+    found = fits.from_null(layout, null.explanation.fitted.model, null, base, [NAME])
+    at = layout.places(found.explanation.names)[NAME]
+    value = float(found.explanation.fitted.theta[at[0]])
+    std = float(np.sqrt(found.weighed.fitted.covariance()[at[0], at[0]]))
+    assert abs(value - HIDDEN) < 3.0 * std < 0.5 * HIDDEN
+    assert found.evidence > null.evidence + 20.0
+    # At the end little is left to gain, and where a fit of output errors ends is no likelier.
+    assert 0.5 * found.estimate.gain < 5.0
+    plain = fit_hypothesis(layout, windows, base, [NAME], start=first.fitted, sigma=first.fitted.sigma)
+    there = judge(plain, law)
+    assert found.evidence > there.evidence - 0.5 * there.estimate.gain - 1.0
