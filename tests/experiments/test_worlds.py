@@ -16,7 +16,14 @@ HERE = Path(__file__).resolve().parents[2] / "experiments" / "worlds"
 
 
 # Samples that were run, and where each of them began.
-SAMPLES = {"rows.jsonl": 0, "rows-2.jsonl": 1, "rows-3.jsonl": 2, "rows-4.jsonl": 3, "rows-5.jsonl": 4}
+SAMPLES = {
+    "rows.jsonl": 0,
+    "rows-2.jsonl": 1,
+    "rows-3.jsonl": 2,
+    "rows-4.jsonl": 3,
+    "rows-5.jsonl": 4,
+    "rows-6.jsonl": 5,
+}
 
 
 def rows_of(name):
