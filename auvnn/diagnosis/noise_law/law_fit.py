@@ -37,7 +37,7 @@ Judge = Callable[[FittedHypothesis, ForceLaw, bool], Hypothesis]
 # What is raised where free running grows without bound, and sums of it cannot be solved.
 UNSOLVED = (FitError, np.linalg.LinAlgError, SINGULAR)
 # At most so many steps, the shares of a step that are tried, and the gain of the log likelihood that ends a fit.
-STEPS, SHARES, SETTLED = 8, (1.0, 0.3, 0.1, 0.03), 1.0
+STEPS, SHARES, SETTLED = 12, (1.0, 0.3, 0.1, 0.03), 1.0
 # How often the law is estimated again.
 ROUNDS = 3
 
@@ -79,25 +79,29 @@ class LawFits:
         absent = effects[-1] not in model.without_absent().effect_names
         initial = begun.initial if absent else None
         started = self._at(replace(explanation, judged=judged), begun.theta, initial)
-        return self.settled(self.judge(started, current.estimate.law, True))
+        return self.settled(self.judge(started, current.estimate.law, True), least=current.evidence)
 
-    def settled(self, found: Hypothesis, most: int = STEPS) -> Hypothesis:
+    def settled(self, found: Hypothesis, most: int = STEPS, least: float = -np.inf) -> Hypothesis:
         """Return a hypothesis at parameters where its likelihood is largest, as far as steps lead there.
 
         Its evidence is that of the parameters at which it ends: what a further step only promises does not count.
 
         Args:
             found: to begin from.
-            most: steps.
+            most: steps, under all laws together.
+            least: evidence below which, what a step promises included, it is given up.
         """
         for _ in range(ROUNDS):
-            for _ in range(most):
-                again = self._step(found) if 0.5 * found.estimate.gain >= SETTLED else None
+            while most > 0 and found.evidence > least and 0.5 * found.estimate.gain >= SETTLED:
+                again = self._step(found)
                 if again is None:
                     break
+                most -= 1
                 found, little = again, _here(again) - _here(found) < SETTLED
                 if little:
                     break
+            if found.evidence <= least:
+                break
             before, law = found.evidence, found.estimate.law
             assert law is not None
             again = self.judge(found.explanation, law, False)
