@@ -18,7 +18,7 @@ from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.answer import answer_with_force
-from auvnn.diagnosis.search import search
+from auvnn.diagnosis.search import a_force_stays, search
 from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.shorter_windows import search_over_shorter
 from auvnn.diagnosis.stages.state import Searched, Setting
@@ -173,11 +173,14 @@ def searched(
         say=say,
     )
     try:
-        state, told, words = search(asked, windows), {}, []
+        state, told, words = search(asked, windows, until=a_force_stays if stochastic else None), {}, []
         if window is None:
             asked, state = search_over_shorter(asked, state, search)
         if stochastic:
-            state, told, words = answer_with_force(asked, state)
+            interrupted, (state, told, words) = state.interrupted, answer_with_force(asked, state)
+            if interrupted and "force" not in told:
+                # What stayed was no stochastic force: names alone have to do.
+                state, told, words = answer_with_force(asked, search(asked, state.windows))
         state = settled(asked, state)
         found = answer(asked, state)
     except (np.linalg.LinAlgError, SINGULAR) as problem:

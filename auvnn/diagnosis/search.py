@@ -4,19 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from auvnn.diagnosis.stages.search_round import fit_null, regroup, search_round
+import numpy as np
+
+from auvnn.diagnosis.residuals.variance_component_test import variance_component_test, white
+from auvnn.diagnosis.stages.search_round import ALPHA_UNKNOWN, fit_null, regroup, search_round
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.diagnosis.stages.what_is_left import what_is_left
 from auvnn.metrics.windows import Windows
 
+# Share of what looks like a force that may stay after one round, and after more, before names alone will not do.
+STAYS_AT_FIRST, STAYS = 0.9, 0.5
 
-def search(asked: Setting, windows: Windows, worthwhile: Callable[[State], bool] | None = None) -> State:
+
+def search(
+    asked: Setting,
+    windows: Windows,
+    worthwhile: Callable[[State], bool] | None = None,
+    until: Callable[[Setting, State], bool] | None = None,
+) -> State:
     """Search for what is missing.
 
     Args:
         asked: what is asked.
         windows: of the log.
         worthwhile: asked after every round; where it is not, the search is given up as it stands.
+        until: asked after every round; where it holds, the search ends there, and what is left is unknown.
 
     Returns:
         where the search ended; whether names that are no cause predict is still open then (`stages.what_is_left`).
@@ -29,4 +41,27 @@ def search(asked: Setting, windows: Windows, worthwhile: Callable[[State], bool]
         state = search_round(asked, state)
         if worthwhile is not None and not worthwhile(state):
             return state
+        if until is not None and not state.ended and until(asked, state):
+            state = state.step("unknown", [], state.p_value).but(ended=True, interrupted=True)
     return what_is_left(asked, regroup(asked, state))
+
+
+def a_force_stays(asked: Setting, state: State) -> bool:
+    """Whether names leave so much of a force that further ones alone will not explain it.
+
+    Then names are better sought together with a stochastic force than one after the other without.
+
+    Args:
+        asked: what is asked.
+        state: after a round.
+    """
+    rounds = len(state.path)
+    if not rounds:
+        return False
+    try:
+        before = variance_component_test(state.first, state.windows, white(state.first, asked.floor))
+        left = variance_component_test(state.current, state.windows, white(state.current, asked.floor))
+    except np.linalg.LinAlgError:
+        return False
+    most = STAYS_AT_FIRST if rounds == 1 else STAYS
+    return left.p_value < ALPHA_UNKNOWN and left.left_of(before) > most

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.errors import InputError
-from auvnn.estimation.initial_steps import better_of, shorter_steps, window_costs
 from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.priors import Priors, limits, parameters_of, set_parameters
 from auvnn.estimation.sensitivity import Response
+from auvnn.estimation.trajectories.initial_steps import better_of, shorter_steps, window_costs
 from auvnn.estimation.window_normal_equations import (
     TRUST,
     cost_of,

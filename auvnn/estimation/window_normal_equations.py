@@ -58,6 +58,8 @@ def linearise(
     initial: Tensor,
     names: Sequence[str],
     runs: Sequence[tuple[Tensor, Tensor, Tensor]] | None = None,
+    *,
+    motion: slice | None = None,
 ) -> Iterator[Response]:
     """Yield the windows' answers chunk by chunk.
 
@@ -67,6 +69,7 @@ def linearise(
         initial: their initial states, (B, 13).
         names: effects whose parameters are differentiated by.
         runs: what `runs_by_block` returned, where that has been done.
+        motion: rows of which the change of the states themselves is kept too, see `Response`.
     """
     model = model.without_absent(names)
     columns = sum(len(model.effect(n).parameters_of) for n in names)
@@ -84,7 +87,9 @@ def linearise(
         few = max(NEAR // (some.nu.shape[1] * 18 * (12 + columns)), 1)
         for begin in range(0, len(some), size):
             part = slice(begin, begin + size)
-            yield from respond_by(few, asked, some.pick(part), states[part], by, ran=ran.pick(part))
+            yield from respond_by(
+                few, asked, some.pick(part), states[part], by, ran=ran.pick(part), motion=motion
+            )
 
 
 def normal_equations(

@@ -14,6 +14,8 @@ from auvnn.estimation.few_inputs import slopes
 from auvnn.metrics.free_run import predict
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
+from auvnn.models.actuation.actuators import Drive
+from auvnn.models.free_running.one_interval import one_interval
 from auvnn.models.free_running.rollout import steps_per_interval
 from auvnn.physics.attitude import quat_conjugate, quat_multiply, quat_to_matrix, quat_to_rotvec
 
@@ -31,17 +33,20 @@ class Thrust(nn.Module):
         super().__init__()
         self.model = model
 
-    def forward(self, windows: Windows, substeps: int) -> tuple[Tensor, Tensor]:
-        """Return both, (B, L, n) each, by so many substeps in an interval."""
-        model = self.model
-        drive = model.actuators.drive(
+    def drive(self, windows: Windows, substeps: int) -> Drive:
+        """Return the thrust over every step, by so many steps in an interval."""
+        return self.model.actuators.drive(
             windows.inputs.command,
             windows.times,
-            model.before_thrust,
+            self.model.before_thrust,
             substeps,
             windows.warmup,
             windows.inputs.fins,
         )
+
+    def forward(self, windows: Windows, substeps: int) -> tuple[Tensor, Tensor]:
+        """Return both, (B, L, n) each, by so many substeps in an interval."""
+        drive = self.drive(windows, substeps)
         mean = torch.stack([sum(parts[1:], parts[0]) / len(parts) for parts in drive.mean], dim=-2)
         return mean, torch.stack(drive.start, dim=-2)
 
@@ -103,12 +108,14 @@ class SimulatedWindows:
     Attributes:
         eta: (B, L, 7).
         nu: (B, L, 6).
-        error: measured minus predicted outputs, (B, L, 18).
+        error: measured minus predicted outputs, (B, L, 18); about a given trajectory, that of its own outputs.
         mean: mean thrust of every interval, (B, L, n).
         start: thrust as it begins, (B, L, n).
         columns: which of the P parameters the thrusts depend on, (Q,).
         mean_slope: change of `mean` with those, (B, L, n, Q).
         start_slope: change of `start` with those, (B, L, n, Q).
+        defect: by how much each interval misses a given trajectory, (B, L - 1, 12): where it leads from one of its
+            states, less the next one; None where the trajectory is that of free running, which has none.
     """
 
     eta: Tensor
@@ -119,6 +126,7 @@ class SimulatedWindows:
     columns: list[int]
     mean_slope: Tensor
     start_slope: Tensor
+    defect: Tensor | None = None
 
     def pick(self, part: slice) -> SimulatedWindows:
         """Return some of the windows."""
@@ -131,6 +139,7 @@ class SimulatedWindows:
             self.columns,
             self.mean_slope[part],
             self.start_slope[part],
+            None if self.defect is None else self.defect[part],
         )
 
 
@@ -179,7 +188,8 @@ def simulate_windows(
 ) -> SimulatedWindows:
     """Run windows free, and differentiate their thrusts by the parameters of the named effects.
 
-    Both go step by step through time, which costs the same for few windows as for many.
+    Both go step by step through time, which costs the same for few windows as for many. Windows that are linear about a
+    given trajectory are not run: of each interval it is asked by how much it misses the trajectory.
 
     Args:
         model: that is run.
@@ -189,6 +199,9 @@ def simulate_windows(
         ran: what `run_windows` returned of them, where that has been done.
     """
     module, substeps = Thrust(model), substeps_of(windows)
+    defect = None
+    if windows.around is not None:
+        ran, defect = _about(model, windows, windows.around)
     eta, nu, error = run_windows(model, windows, initial) if ran is None else ran
     with torch.no_grad():
         mean, start = module(windows, substeps)
@@ -203,7 +216,7 @@ def simulate_windows(
         at += size
     if not keys:
         none = mean.new_zeros(*mean.shape, 0)
-        return SimulatedWindows(eta, nu, error, mean, start, [], none, none)
+        return SimulatedWindows(eta, nu, error, mean, start, [], none, none, defect)
     sizes = [theta.numel() for theta in keys.values()]
 
     def thrusts(values: Tensor) -> tuple[Tensor, Tensor]:
@@ -211,4 +224,21 @@ def simulate_windows(
         return functional_call(module, some, (windows, substeps))
 
     joined = [x.detach() for x in slopes(thrusts, torch.cat(list(keys.values())))]
-    return SimulatedWindows(eta, nu, error, mean, start, columns, joined[0], joined[1])
+    return SimulatedWindows(eta, nu, error, mean, start, columns, joined[0], joined[1], defect)
+
+
+def _about(model: GreyBox, windows: Windows, around: Tensor) -> tuple[tuple[Tensor, Tensor, Tensor], Tensor]:
+    """Return eta, nu and output error of a given trajectory (B, L, 13), and the defects of its intervals."""
+    there, substeps = model.without_absent(), substeps_of(windows)
+    with torch.no_grad():
+        reached = one_interval(
+            there, around, windows.inputs.rows(windows.warmup), windows.times[:, windows.warmup :],
+            Thrust(there).drive(windows, substeps), substeps,
+        )  # fmt: skip
+        after = around[:, 1:]
+        turn = quat_to_rotvec(quat_multiply(quat_conjugate(after[..., 3:7]), reached[..., 3:7]))
+        defect = torch.cat(
+            [reached[..., :3] - after[..., :3], turn, reached[..., 7:] - after[..., 7:]], dim=-1
+        )
+        eta, nu = around[..., :7], around[..., 7:]
+        return (eta, nu, window_error(there, windows, eta, nu)), defect

@@ -38,6 +38,9 @@ class ForceLaw:
         cell: length of the cells, s.
         span: longest window, s.
         plain: cells of unit variance that do not hang together; for the estimate of the law itself.
+        response: (6, 6) acceleration that a unit of the force gives, whatever the model's inertia is; that of the model
+            itself where None. With a response of its own the spread of what is predicted does not change with the
+            inertia, so that steps of Gauss and Newton, which do not see that it would, lead to the likeliest values.
     """
 
     rms: Array
@@ -45,6 +48,7 @@ class ForceLaw:
     cell: float
     span: float
     plain: bool = False
+    response: Array | None = None
 
     @cached_property
     def axes(self) -> list[int]:
@@ -87,6 +91,37 @@ def correlation(count: int, cell: float, time: float) -> Array:
         time: correlation time, s.
     """
     return covariance_of_means(count, cell, torch.tensor(float(time), dtype=torch.float64)).numpy()
+
+
+def covariance_with_end(count: int, cell: float, time: Tensor) -> Tensor:
+    """Return the covariance of a unit process's means over cells and, last, its value at their end, (count + 1,) * 2.
+
+    With a = cell / time the mean of the cell that is k before the last one has exp(-k a) (1 - exp(-a)) / a with that
+    value. What follows depends on what was before by that value alone: the process is Markov, its means are not.
+
+    Args:
+        count: of cells.
+        cell: their length, s.
+        time: correlation time, s, a scalar.
+    """
+    end = after(count, cell, time).flip(0)
+    means = covariance_of_means(count, cell, time)
+    corner = torch.ones(1, dtype=torch.float64)
+    return torch.cat(
+        [torch.cat([means, end[:, None]], dim=1), torch.cat([end, corner])[None]], dim=0
+    ) + 1e-9 * torch.eye(count + 1, dtype=torch.float64)
+
+
+def after(count: int, cell: float, time: Tensor) -> Tensor:
+    """Return what means over cells (count,) are expected to be after a value of one, as shares of it.
+
+    Args:
+        count: of cells.
+        cell: their length, s.
+        time: correlation time, s, a scalar.
+    """
+    a = cell / time
+    return torch.exp(-a * torch.arange(count, dtype=torch.float64)) * -torch.expm1(-a) / a
 
 
 def covariance_of_means(count: int, cell: float, time: Tensor) -> Tensor:

@@ -44,6 +44,7 @@ class Windows:
         law: of a stochastic force that acts in them; None for none.
         noise: of the sensors, where it is not white.
         estimated: channels that were estimated and not measured: free running starts from them, and they do not count.
+        around: states (B, L, 13) of a trajectory about which the motion is linear; None for that of free running.
     """
 
     run: np.ndarray
@@ -60,6 +61,7 @@ class Windows:
     law: ForceLaw | None = None
     noise: NoiseColour | None = None
     estimated: tuple[str, ...] = ()
+    around: Tensor | None = None
 
     def __len__(self) -> int:
         """Return the number of windows."""
@@ -96,6 +98,7 @@ class Windows:
             inputs=inputs,
             mask=self.mask[index],
             length=self.length[chosen],
+            around=None if self.around is None else self.around[index],
         )
 
 

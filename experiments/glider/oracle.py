@@ -20,8 +20,8 @@ from auvnn import diagnose
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, lay_out
-from auvnn.diagnosis.noise_law.estimate_law import estimate
-from auvnn.diagnosis.noise_law.sums import CELL, force_sums
+from auvnn.diagnosis.noise_law.likelihood.estimate_law import estimate
+from auvnn.diagnosis.noise_law.likelihood.sums import CELL, force_sums
 from auvnn.diagnosis.score_tests.score import projection, score
 from auvnn.estimation.priors import set_parameters
 from auvnn.estimation.window_normal_equations import linearise, normal_equations

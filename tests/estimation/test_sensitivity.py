@@ -11,7 +11,8 @@ from torch.func import functional_call, vmap
 
 from auvnn.effects import EFFECTS
 from auvnn.estimation.priors import parameters_of, set_parameters
-from auvnn.estimation.sensitivity import _terms, respond
+from auvnn.estimation.propagation import _terms
+from auvnn.estimation.sensitivity import respond
 from auvnn.estimation.window_simulation import output_error
 from auvnn.logs import Log, Run
 from auvnn.metrics.free_run import initial_states, moved

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.score_tests.probes import Probed, probed
 from auvnn.effects import Extent
-from auvnn.estimation.initial_states import ROUNDS, fit_initial_states
+from auvnn.estimation.trajectories.initial_states import ROUNDS, fit_initial_states
 from auvnn.estimation.window_sums.sufficient_statistics import (
     Combination,
     InformationShares,

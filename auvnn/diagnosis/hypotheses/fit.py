@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.measured_start import better_from_measured
 from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
@@ -45,6 +46,7 @@ class FittedHypothesis:
         judged: what is assumed of the parameters where something is left out; as in the fit by default.
         under_law: the fit with sums under the law of a stochastic force, in the sensors' white noise; standard errors
             follow from these. None without a force.
+        around: trajectories (B, L, 13) about which its windows are linear under a law; None for free running.
     """
 
     effects: tuple[str, ...]
@@ -56,6 +58,7 @@ class FittedHypothesis:
     misfit: float = 0.0
     judged: Priors | None = None
     under_law: Fitted | None = None
+    around: Tensor | None = None
 
     @property
     def cv(self) -> float:

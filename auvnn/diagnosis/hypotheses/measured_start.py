@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
-from auvnn.estimation.initial_steps import costs_from
 from auvnn.estimation.prediction_error import FitError, Fitted
 from auvnn.estimation.priors import Priors
+from auvnn.estimation.trajectories.initial_steps import costs_from
 from auvnn.metrics.free_run import initial_states
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox

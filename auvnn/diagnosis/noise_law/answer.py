@@ -16,10 +16,10 @@ from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.commands.holding import Holding, cost_at_best, holding
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncertain_wrench
-from auvnn.diagnosis.noise_law.estimate_law import ALPHA_BOUNDARY
 from auvnn.diagnosis.noise_law.hypothesis import WithForce, under_its_law
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
+from auvnn.diagnosis.noise_law.likelihood.estimate_law import ALPHA_BOUNDARY
 from auvnn.diagnosis.noise_law.noise_colour import Colour, noise_colour
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction, predicted_by_inputs
 from auvnn.diagnosis.noise_law.search import ForceSearch

@@ -11,21 +11,18 @@ from scipy.stats import chi2
 from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, correlation_root, scales, shapes
-from auvnn.diagnosis.noise_law.estimate_law import Estimate, estimate
-from auvnn.diagnosis.noise_law.law_likelihood import STEPS, Likelihood
-from auvnn.diagnosis.noise_law.sums import ForceSums
+from auvnn.diagnosis.noise_law.likelihood.estimate_law import Estimate, estimate
+from auvnn.diagnosis.noise_law.likelihood.law_likelihood import STEPS, Likelihood
+from auvnn.diagnosis.noise_law.likelihood.sums import ForceSums
 from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS, confused
 from auvnn.diagnosis.selection.predictive_density import gain_by_window
 from auvnn.effects import effect_class
-from auvnn.estimation.priors import limits
 from auvnn.logs import Log
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.rollouts import Rolled, Scale, roll
 from auvnn.metrics.windows import VELOCITY, Windows
 
 Array = NDArray[np.float64]
-# How often parameters that would leave their bounds are held there.
-ROUNDS = 6
 HORIZON = "5"
 # Members of a group that the log cannot tell apart, at most.
 GROUP = 3
@@ -42,17 +39,25 @@ class Hypothesis:
         estimate: its own law, and its likelihood there.
         misfit: minus twice the log marginal likelihood, departure of the parameters in it, their volume aside.
         evidence: logarithm of the marginal likelihood, up to what all hypotheses of a log share.
+        promised: by how much more the misfit is where the parameters are, and not yet where the law moves them.
     """
 
     explanation: FittedHypothesis
     estimate: Estimate
     misfit: float
     evidence: float
+    promised: float = 0.0
 
     @property
     def weighed(self) -> FittedHypothesis:
         """The explanation in the sensors' white noise, with its windows' sums under its own law."""
         return under_its_law(self.explanation)
+
+    @property
+    def here(self) -> Hypothesis:
+        """The same without what a step only promises."""
+        worse = self.promised
+        return replace(self, misfit=self.misfit + worse, evidence=self.evidence - 0.5 * worse, promised=0.0)
 
     @property
     def name(self) -> str:
@@ -110,17 +115,8 @@ def judged(
         law: to begin from; a degree of freedom without a force in it has none here.
         most: steps of the search for the likeliest law; with none the law is the one given.
     """
-    found = estimate(sums, law, law.axes, most)
-    # What the law would move beyond a bound stays at it, and the others are asked again.
-    low, high = limits(explanation.fitted.model, explanation.names, explanation.fitted.priors)
-    for _ in range(ROUNDS):
-        beyond = sums.inside & (
-            (explanation.fitted.theta + found.step < low) | (explanation.fitted.theta + found.step > high)
-        )
-        if not beyond.any():
-            break
-        sums = replace(sums, inside=sums.inside & ~beyond)
-        found = estimate(sums, found.law or law, law.axes, most)
+    likelihood = Likelihood(sums)
+    found = estimate(likelihood, law, law.axes, most)
     size, mean, shape = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=bool)]
     for name in explanation.names:
         stated = name in layout.spreads and name not in explanation.effects
@@ -129,17 +125,39 @@ def judged(
         mean.append(layout.means[name])
         shape.append(shapes(layout, name))
     sizes, means, fixed = np.concatenate(size), np.concatenate(mean), np.concatenate(shape)
-    theta, priors = explanation.fitted.theta + found.step, explanation.fitted.priors
-    data = found.value - priors.penalty(theta)
-    away = np.where(fixed, 0.0, (theta - means) / sizes)
+    root, priors = correlation_root(layout, explanation.names, explanation.effects), explanation.fitted.priors
     information = found.information * sizes[:, None] * sizes
-    root = correlation_root(layout, explanation.names, explanation.effects)
     if root is not None:
-        away, information = np.linalg.solve(root, away), root.T @ information @ root
+        information = root.T @ information @ root
     volume = float(np.linalg.slogdet(information + np.eye(len(sizes)))[1])
-    misfit = data + float(away @ away)
-    own = replace(explanation.fitted, statistics=Likelihood(sums).by_window(found.law), sigma=sigma)
-    return Hypothesis(replace(explanation, under_law=own), found, misfit, -0.5 * (misfit + volume))
+
+    def misfit(theta: Array, value: float) -> float:
+        """Return a value with the departure from what is likely in the place of the fit's own priors."""
+        away = np.where(fixed, 0.0, (theta - means) / sizes)
+        if root is not None:
+            away = np.linalg.solve(root, away)
+        return value - priors.penalty(theta) + float(away @ away)
+
+    at = explanation.fitted.theta
+    whole, here = misfit(at + found.step, found.value), misfit(at, found.value + found.gain)
+    own = replace(explanation.fitted, statistics=likelihood.by_window(found.law), sigma=sigma)
+    return Hypothesis(
+        replace(explanation, under_law=own), found, whole, -0.5 * (whole + volume), here - whole
+    )
+
+
+def in_newtons(law: ForceLaw | None, found: FittedHypothesis) -> ForceLaw | None:
+    """Return a law of accelerations as that of the forces that a fit's inertia needs for them.
+
+    Args:
+        law: with a response of its own, see `ForceLaw`, or without.
+        found: the fit.
+    """
+    model = found.fitted.model.without_absent(found.effects)
+    if law is None or law.response is None or model.time_varying:
+        return law
+    whole = model.prepare().total.detach().numpy() @ law.response
+    return replace(law, rms=law.rms * np.abs(np.diag(whole)))
 
 
 def p_value_of(layout: Layout, after: Hypothesis, before: Hypothesis) -> float:

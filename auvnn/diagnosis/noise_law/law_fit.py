@@ -18,14 +18,14 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out, plausible
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, priors
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
-from auvnn.estimation.initial_states import fit_initial_states
-from auvnn.estimation.prediction_error import SINGULAR, FitError, Fitted
+from auvnn.diagnosis.noise_law.likelihood.about_motion import linear_about_its_own
+from auvnn.estimation.prediction_error import SINGULAR, FitError
 from auvnn.estimation.priors import limits, parameters_of, set_parameters
+from auvnn.estimation.trajectories.initial_states import fit_initial_states
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.windows import Windows
@@ -38,8 +38,8 @@ Judge = Callable[[FittedHypothesis, ForceLaw, bool], Hypothesis]
 UNSOLVED = (FitError, np.linalg.LinAlgError, SINGULAR)
 # At most so many steps, the shares of a step that are tried, and the gain of the log likelihood that ends a fit.
 STEPS, SHARES, SETTLED = 12, (1.0, 0.3, 0.1, 0.03), 1.0
-# How often the law is estimated again.
-ROUNDS = 3
+# Rounds of steps, the law estimated again between them.
+ROUNDS = 4
 
 
 class LawFits:
@@ -57,17 +57,23 @@ class LawFits:
         self.windows, self.weights, self.judge = windows, weights, judge
 
     def from_null(
-        self, layout: Layout, model: GreyBox, current: Hypothesis, base: list[str], effects: list[str]
+        self,
+        layout: Layout,
+        model: GreyBox,
+        current: Hypothesis,
+        base: list[str],
+        effects: list[str],
+        least: float = -np.inf,
     ) -> Hypothesis:
         """Return effects fitted under the law, from the values that a model has.
 
         Args:
             layout: stated values.
             model: with the values to begin from; of what is asked for, its null or near it.
-            current: an explanation without the last effect, whose law and initial states to begin from; the latter are
-                fitted again where the model does not begin at its null.
+            current: an explanation without the last effect, whose law and trajectories to begin from.
             base: effects that are free anyway.
             effects: effects asked for.
+            least: evidence below which, what steps promise included, the fit is given up.
         """
         assert current.estimate.law is not None
         names = tuple(dict.fromkeys([*base, *effects]))
@@ -76,10 +82,8 @@ class LawFits:
         begun = replace(begun, theta=parameters_of(model, names))
         explanation = FittedHypothesis(tuple(effects), begun, names, 0.0, np.zeros(0), np.zeros(0))
         judged = plausible(layout, names, effects, held, begun.theta)
-        absent = effects[-1] not in model.without_absent().effect_names
-        initial = begun.initial if absent else None
-        started = self._at(replace(explanation, judged=judged), begun.theta, initial)
-        return self.settled(self.judge(started, current.estimate.law, True), least=current.evidence)
+        started = replace(explanation, judged=judged, around=current.explanation.around)
+        return self.settled(self.judge(started, current.estimate.law, True), least=least)
 
     def settled(self, found: Hypothesis, most: int = STEPS, least: float = -np.inf) -> Hypothesis:
         """Return a hypothesis at parameters where its likelihood is largest, as far as steps lead there.
@@ -91,8 +95,9 @@ class LawFits:
             most: steps, under all laws together.
             least: evidence below which, what a step promises included, it is given up.
         """
-        for _ in range(ROUNDS):
-            while most > 0 and found.evidence > least and 0.5 * found.estimate.gain >= SETTLED:
+        best = found
+        for turn in range(ROUNDS):
+            while most > 0 and found.evidence > least and 0.5 * found.promised >= SETTLED:
                 again = self._step(found)
                 if again is None:
                     break
@@ -100,21 +105,20 @@ class LawFits:
                 found, little = again, _here(again) - _here(found) < SETTLED
                 if little:
                     break
-            if found.evidence <= least:
+            best = found if _here(found) > _here(best) else best
+            law = found.estimate.law
+            if found.evidence <= least or law is None or turn == ROUNDS - 1:
                 break
-            before, law = found.evidence, found.estimate.law
-            assert law is not None
+            smoothed = self._smoothed(found)
+            if smoothed is not None:
+                # What is linear about other trajectories is the nearer to the truth, and not to be compared.
+                best = found = self.judge(smoothed, law, True)
             again = self.judge(found.explanation, law, False)
-            # The likeliest law is that of what a step promises: where no step keeps that, the law before may be better.
-            if _here(again) < _here(found):
+            # The likeliest law is that of what a step promises, and worth what is left of that once it was taken.
+            if again.evidence - _here(found) < SETTLED:
                 break
             found = again
-            if found.evidence - before < SETTLED:
-                break
-        gain = found.estimate.gain
-        if 0.5 * gain < SETTLED:
-            return found
-        return replace(found, misfit=found.misfit + gain, evidence=_here(found))
+        return best if 0.5 * best.promised < SETTLED else best.here
 
     def _step(self, found: Hypothesis) -> Hypothesis | None:
         """Return the hypothesis a step on; None where no share of the step makes it likelier."""
@@ -130,44 +134,44 @@ class LawFits:
                     return again
         return None
 
-    def _at(self, found: FittedHypothesis, theta: Array, initial: Tensor | None = None) -> FittedHypothesis:
-        """Return an explanation at other values, its sums without a force computed again there.
+    def _at(self, found: FittedHypothesis, theta: Array) -> FittedHypothesis:
+        """Return an explanation at other values; its sums without a force are not worked out there, see `told`."""
+        model = found.fitted.model.rebuilt(found.fitted.model.copied_effects())
+        set_parameters(model, found.names, theta)
+        return replace(found, fitted=replace(found.fitted, model=model, theta=theta))
 
-        The windows stay linear about the free running without the force, with the initial states that suit it best: a
-        force takes an unstable vehicle too far from the free running for a linearisation about its own initial states.
+    def _smoothed(self, found: Hypothesis) -> FittedHypothesis | None:
+        """Return an explanation linear about its own likeliest trajectories; None where these are where they were.
 
         Args:
-            found: the explanation.
-            theta: values.
-            initial: initial states (B, 13), fitted again by default.
+            found: the explanation, with its law.
+        """
+        explanation = found.explanation
+        with suppress(*UNSOLVED):
+            return linear_about_its_own(explanation, self.windows, found.estimate, found.weighed.fitted.sigma)
+        return None
+
+    def told(self, found: FittedHypothesis) -> FittedHypothesis:
+        """Return an explanation with initial states, sums and errors on what is left out, all of free running.
+
+        Args:
+            found: fitted under a law.
         """
         fitted, judged_by = found.fitted, found.judged or found.fitted.priors
-        model = fitted.model.rebuilt(fitted.model.copied_effects())
-        set_parameters(model, found.names, theta)
-        if initial is None:
-            free = model.without_absent(found.names)
-            initial = fit_initial_states(free, self.windows, self.weights, fitted.initial)
+        free = fitted.model.without_absent(found.names)
+        initial = fit_initial_states(free, self.windows, self.weights, fitted.initial)
         sums, _, _ = normal_equations(
-            self.windows, linearise(model, self.windows, initial, found.names), self.weights
+            self.windows, linearise(fitted.model, self.windows, initial, found.names), self.weights
         )
-        cost = float(sums.cost.sum()) + fitted.priors.penalty(theta)
-        moved = Fitted(
-            model,
-            found.names,
-            theta,
-            initial,
-            self.weights,
-            sums,
-            fitted.priors,
-            cost,
-            True,
-            fitted.iterations,
-        )
-        own = left_out(sums, theta, judged_by, folds(self.windows.run))
+        cost = float(sums.cost.sum()) + fitted.priors.penalty(fitted.theta)
+        own = left_out(sums, fitted.theta, judged_by, folds(self.windows.run))
         count = sums.count[:, np.isfinite(self.weights)].sum(1)
-        return replace(found, fitted=moved, left_out=own, left_out_count=count)
+        whole = replace(
+            fitted, initial=initial, sigma=self.weights, statistics=sums, cost=cost, converged=True
+        )
+        return replace(found, fitted=whole, left_out=own, left_out_count=count)
 
 
 def _here(found: Hypothesis) -> float:
     """Return the evidence without what a further step promises."""
-    return found.evidence - 0.5 * found.estimate.gain
+    return found.here.evidence

@@ -52,11 +52,14 @@ class LeaderFits:
         layout: stated values.
         fits: under laws of the force.
         say: called with what is being done, in words.
+        known: what was fitted beside an explanation, by that and the effect's name: a search that passes there again asks
+            for the same.
     """
 
     layout: Layout
     fits: LawFits
     say: Callable[[str], None]
+    known: dict[tuple[int, str], tuple[Hypothesis, Hypothesis | None]] = field(default_factory=dict)
 
     def leading(
         self, at: Round, fitted: Sequence[FittedHypothesis], odds: float, level: float
@@ -114,7 +117,13 @@ class LeaderFits:
     def _each(
         self, names: Iterable[str], at: Round, known: Mapping[str, FittedHypothesis] | None = None
     ) -> list[Hypothesis]:
-        found = [self._one(name, at, (known or {}).get(name)) for name in names]
+        found = []
+        for name in names:
+            key = id(at.current), name
+            # The explanation is kept with what was fitted: no other one can have its place then.
+            if key not in self.known:
+                self.known[key] = at.current, self._one(name, at, (known or {}).get(name))
+            found.append(self.known[key][1])
         return [h for h in found if h is not None]
 
     def _one(self, name: str, at: Round, known: FittedHypothesis | None) -> Hypothesis | None:
@@ -141,7 +150,10 @@ class LeaderFits:
             model = tested.at.model.rebuilt(tested.at.model.copied_effects())
             set_parameters(model, [name], begin)
             with suppress(*UNSOLVED):
-                found.append(self.fits.from_null(self.layout, model, at.current, at.base, [*at.chosen, name]))
+                # Another beginning is followed where it promises more than where an earlier one has led.
+                least = max([at.current.evidence, *(h.evidence for h in found)])
+                asked = [*at.chosen, name]
+                found.append(self.fits.from_null(self.layout, model, at.current, at.base, asked, least))
         return max(found, key=lambda h: h.evidence, default=None)
 
 

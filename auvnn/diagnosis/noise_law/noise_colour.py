@@ -17,9 +17,9 @@ from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.commands.holding import cost_at_best
-from auvnn.diagnosis.noise_law.estimate_law import estimate
-from auvnn.diagnosis.noise_law.law_likelihood import Likelihood
-from auvnn.diagnosis.noise_law.sums import force_sums
+from auvnn.diagnosis.noise_law.likelihood.estimate_law import estimate
+from auvnn.diagnosis.noise_law.likelihood.law_likelihood import Likelihood
+from auvnn.diagnosis.noise_law.likelihood.sums import force_sums
 from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
@@ -128,8 +128,8 @@ class _Costs:
         if times.any():
             value = cost_at_best(self.explanation, windows, sigma)
         else:
-            sums = force_sums(self.explanation, windows, sigma)
-            value = Likelihood(sums).of(estimate(sums).law)[0]
+            likelihood = Likelihood(force_sums(self.explanation, windows, sigma))
+            value = likelihood.of(estimate(likelihood).law)[0]
         seen = np.isfinite(sigma)
         mask = windows.mask * (windows.mask.new_tensor(seen.astype(float)))
         counts = mask.sum((0, 1)).numpy()

@@ -22,23 +22,25 @@ from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.commands.uncertain import in_closed_loop
-from auvnn.diagnosis.noise_law.estimate_law import estimate
 from auvnn.diagnosis.noise_law.hypothesis import (
     GROUP,
     Hypothesis,
     WithForce,
     free_running_cost,
+    in_newtons,
     judged,
     p_value_of,
     predicts_better,
     tied,
 )
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
-from auvnn.diagnosis.noise_law.law_likelihood import STEPS
 from auvnn.diagnosis.noise_law.leader_fits import LeaderFits, Round
+from auvnn.diagnosis.noise_law.likelihood.about_motion import linear_about_its_own
+from auvnn.diagnosis.noise_law.likelihood.estimate_law import estimate
+from auvnn.diagnosis.noise_law.likelihood.law_likelihood import STEPS, Likelihood
+from auvnn.diagnosis.noise_law.likelihood.sums import CELL, ForceSums, force_sums
 from auvnn.diagnosis.noise_law.predicted_by_inputs import predicted_by_inputs
-from auvnn.diagnosis.noise_law.sums import CELL, force_sums
-from auvnn.diagnosis.score_tests.null_tests import NullTests
+from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.diagnosis.stages.state import Setting
@@ -46,6 +48,7 @@ from auvnn.estimation.priors import parameters_of
 from auvnn.metrics.force_law import ForceLaw, cell_for
 from auvnn.metrics.rollouts import scale_of
 from auvnn.metrics.windows import Windows
+from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
 # A name is given where chance would seldom do as well among all effects that were asked for; a further one on
@@ -57,8 +60,8 @@ GAIN, GAIN_FURTHER = 1.0, 2.0
 # log, and a force that is always there makes errors that no name takes away. And the share of the gain of all names
 # that a further one must bring.
 FIRST_COST, FURTHER_COST, FURTHER_SHARE = 0.5, 1.0, 0.1
-# Steps of the fit without any name.
-NULL_STEPS = 25
+# Steps of the fit without any name, and how often its windows are made linear about the motion first.
+NULL_STEPS, TURNS = 25, 3
 
 
 class ForceSearch:
@@ -76,9 +79,15 @@ class ForceSearch:
         self.log, self.scale = asked.log, scale_of(asked.log)
         self.sigma = self.weights = np.full(18, np.inf)
         self.cell = CELL
+        self.response: Array | None = None
         self.ignores_cost = self.looks_further = False
         self.in_closed_loop = False
-        self._first_look: tuple[Hypothesis, Round, list[Hypothesis]] | None = None
+        # What was asked at an explanation, for a second search that passes there: its tests, what was fitted beside it,
+        # and where an explanation went with a law of its own.
+        self._tests: dict[int, Tested] = {}
+        self._found: dict[int, list[Hypothesis]] = {}
+        self._gone_on: dict[int, Hypothesis] = {}
+        self._leaders: LeaderFits | None = None
 
     def begin(self, first: FittedHypothesis, sigma: Array) -> Hypothesis | None:
         """Return the explanation without any name under the law of the force; None where no variance is above zero.
@@ -92,18 +101,31 @@ class ForceSearch:
             self.in_closed_loop = in_closed_loop(first, self.windows)
         # Fits without the force weigh errors as the first one did, the force's among them.
         self.sigma, self.weights = sigma, first.fitted.sigma
-        found = estimate(force_sums(first, self.windows, sigma, self.cell))
+        self.response = GreyBox(first.fitted.model.vehicle).prepare().inverse.detach().numpy()
+        found = estimate(Likelihood(self._sums(first)))
         if found.law is None:
             return None
-        cell = cell_for(found.law.time[found.law.axes])
+        # A whole number of cells: a window's last force is that with which the next one begins.
+        cell = found.law.span / np.ceil(found.law.span / cell_for(found.law.time[found.law.axes]) - 1e-9)
         if cell < self.cell:
             self.cell = cell
-            found = estimate(
-                force_sums(first, self.windows, sigma, cell), replace(found.law, cell=cell), found.law.axes
-            )
+            found = estimate(Likelihood(self._sums(first)), replace(found.law, cell=cell), found.law.axes)
+        for _ in range(TURNS):
+            assert found.law is not None
+            about = linear_about_its_own(first, self.windows, found, sigma)
+            if about is None:
+                break
+            first = about
+            found = estimate(Likelihood(self._sums(first)), found.law)
+            if found.law is None:
+                return None
         assert found.law is not None
         # All names are compared with it: it must not gain by steps that names take first.
         return self._fits().settled(self.judged(first, found.law), NULL_STEPS)
+
+    def _about(self, explanation: FittedHypothesis, law: ForceLaw | None = None) -> Windows:
+        """Return the windows, linear about an explanation's trajectories, with a law or without."""
+        return replace(self.windows, law=law, around=explanation.around)
 
     def _fits(self) -> LawFits:
         return LawFits(self.windows, self.weights, self.judged)
@@ -116,8 +138,13 @@ class ForceSearch:
             law: to begin from.
             held: whether the law stays as it is.
         """
-        sums = force_sums(explanation, self.windows, self.sigma, self.cell)
-        return judged(self.layout, explanation, sums, self.sigma, law, 0 if held else STEPS)
+        return judged(
+            self.layout, explanation, self._sums(explanation), self.sigma, law, 0 if held else STEPS
+        )
+
+    def _sums(self, explanation: FittedHypothesis) -> ForceSums:
+        """Return what the windows say of parameters and force, linear about an explanation's trajectories."""
+        return force_sums(explanation, self._about(explanation), self.sigma, self.cell, self.response)
 
     def run(self, null: Hypothesis, fitted: Sequence[FittedHypothesis], most: int) -> WithForce:
         """Search for one effect after the other.
@@ -133,7 +160,7 @@ class ForceSearch:
         tried: list[Hypothesis] = []
         whole, earlier = 1.0, dict[str, Array]()
         under_law = self._fits()
-        fits = LeaderFits(self.layout, under_law, self.say)
+        fits = self._leaders = self._leaders or LeaderFits(self.layout, under_law, self.say)
         while len(chosen) < most:
             law = current.estimate.law
             assert law is not None
@@ -141,31 +168,21 @@ class ForceSearch:
             remaining = [n for n in self.usable if n not in chosen and n not in grouped]
             if not remaining:
                 break
-            self.say(f"testing {len(remaining)} effects together with the force")
             base = [*self.base, *[c for c in chosen if c not in self.base]]
-            # A second search begins with the same look.
-            look = (
-                self._first_look if not chosen and self._first_look and self._first_look[0] is null else None
-            )
-            tests = None if look is None else look[1].tested
-            if tests is None:
-                tests = NullTests(self.layout, replace(self.windows, law=law), self.say)(
-                    current.weighed, remaining, base, chosen
-                )
+            tests = self._tested(current, remaining, base, chosen)
             # Beside what was found the variance is no longer inflated by it: the tests say whether to go on.
             if chosen and tests.p_value >= ALPHA:
                 break
             share = 0.0 if self.looks_further else FURTHER_SHARE
             odds = max(ODDS, share * (current.evidence - null.evidence))
             at = Round(tests, current, base, chosen, earlier)
-            found = look[2] if look else fits.leading(at, fitted, odds, ALPHA_NAME)
+            found = self._joined(current, fits.leading(at, fitted, odds, ALPHA_NAME))
             good = self._good(found, at, odds, len(remaining))
-            if not good and not chosen and not look:
-                found = fits.wider(at, found, ALPHA_NAME)
+            if not good and not chosen:
+                found = self._joined(current, fits.wider(at, found, ALPHA_NAME))
                 good = self._good(found, at, odds, len(remaining))
             sure = {h.name: _sure(self.layout, h, at, len(remaining)) for h in found}
             if not chosen:
-                self._first_look = null, at, found
                 earlier = {h.name: parameters_of(h.explanation.fitted.model, [h.name]) for h in found}
                 tried, whole = found, min([tests.p_value, *sure.values()], default=1.0)
             if not good or (chosen and self._takes_up(good[0], chosen)):
@@ -176,22 +193,42 @@ class ForceSearch:
             names = [h.name for h in group]
             verdict = "ambiguous" if len(group) > 1 else "named"
             steps.append({"verdict": verdict, "effects": names, "p_value": sure[group[0].name]})
-            current = under_law.settled(group[0])
+            if id(group[0]) not in self._gone_on:
+                self._gone_on[id(group[0])] = under_law.settled(group[0])
+            current = self._gone_on[id(group[0])]
             if len(group) > 1:
                 groups.append([current.explanation, *(h.explanation for h in group[1:])])
             chosen.append(group[0].name)
         law = current.estimate.law
         assert law is not None
+        # From here on free running counts again.
         return WithForce(
             steps,
-            groups,
-            current.explanation,
-            replace(self.windows, law=law),
-            current.estimate,
-            [h.explanation for h in tried],
+            [[under_law.told(e) for e in group] for group in groups],
+            under_law.told(current.explanation),
+            self._about(current.explanation, law),
+            replace(current.estimate, law=in_newtons(law, current.explanation)),
+            [under_law.told(h.explanation) for h in tried],
             whole,
-            null.estimate.law,
+            in_newtons(null.estimate.law, null.explanation),
         )
+
+    def _tested(
+        self, current: Hypothesis, remaining: list[str], base: list[str], chosen: list[str]
+    ) -> Tested:
+        """Return the tests of what remains beside an explanation."""
+        if id(current) not in self._tests:
+            self.say(f"testing {len(remaining)} effects together with the force")
+            windows = self._about(current.explanation, current.estimate.law)
+            tests = NullTests(self.layout, windows, self.say)
+            self._tests[id(current)] = tests(current.weighed, remaining, base, chosen)
+        return self._tests[id(current)]
+
+    def _joined(self, current: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return what was fitted beside an explanation, now and by an earlier search, the most evident first."""
+        known = {h.name: h for h in [*self._found.get(id(current), []), *found]}
+        self._found[id(current)] = sorted(known.values(), key=lambda h: -h.evidence)
+        return list(self._found[id(current)])
 
     def _good(self, found: Sequence[Hypothesis], at: Round, odds: float, among: int) -> list[Hypothesis]:
         """Return those explanations that may be named, the most evident first.
@@ -254,7 +291,7 @@ class ForceSearch:
         law = further.estimate.law
         if law is None or not any(confused(further.name, name) for name in chosen):
             return False
-        predicted = predicted_by_inputs(further.weighed, replace(self.windows, law=law))
+        predicted = predicted_by_inputs(further.weighed, self._about(further.explanation, law))
         return predicted is not None and predicted.matters
 
 

@@ -26,6 +26,31 @@ from auvnn.metrics.windows import Windows
 SHORTER, SAMPLES = 2.0, 8
 # Shorter windows are asked where most of the error is left, and taken where the noise is more than this share of it.
 EXPLAINED = 0.8
+# Share of what is left that a name must take away for another one to be looked for.
+EACH = 0.25
+
+
+class Progress:
+    """Whether names still lead to where no more than the sensors' noise is left.
+
+    Names that leave most of the error here too are no reason to go on, nor is one that takes little of it away: beside a
+    stochastic force every name does.
+    """
+
+    def __init__(self) -> None:
+        """Begin before any name."""
+        self.before: float | None = None
+
+    def __call__(self, state: State) -> bool:
+        """Return it for a search after a round.
+
+        Args:
+            state: where it stands.
+        """
+        before = noise_share(state.first.fitted) if self.before is None else self.before
+        self.before = noise_share(state.current.fitted)
+        taken = (self.before - before) / max(1.0 - before, 1e-9)
+        return self.before >= EXPLAINED or (self.before >= GROSS and taken >= EACH)
 
 
 def search_over_shorter(
@@ -48,8 +73,7 @@ def search_over_shorter(
     try:
         windows, notes = windows_that_hold(asked.layout.model, asked.log, SHORTER)
         shorter = replace(asked, floor=TRUST * motion(windows) + 1e-9)
-        # Names that leave most of the error here too are no reason to go on.
-        other = search(shorter, windows, lambda found: noise_share(found.current.fitted) >= GROSS)
+        other = search(shorter, windows, Progress())
     except (InputError, FitError, np.linalg.LinAlgError, SINGULAR):
         return asked, state
     if not other.chosen or noise_share(other.current.fitted) < EXPLAINED:

@@ -93,6 +93,7 @@ class State:
         similar: effects, and how much they look like one another at the first look.
         silent: effects of which the log says nothing.
         ended: whether there is nothing more to ask for.
+        interrupted: whether it ended while names could still be asked for, because they left most of a force.
         left: the force that is left once the search has ended; None where there is none.
         traced: the force of a measured input that it looks most like, where that was asked.
         remainder: what any force could still explain, significant or not.
@@ -119,6 +120,7 @@ class State:
     similar: tuple[list[str], Array] = field(default_factory=lambda: ([], np.eye(0)))
     silent: tuple[str, ...] = ()
     ended: bool = False
+    interrupted: bool = False
     left: Unnamed | None = None
     traced: AdditiveForce | None = None
     remainder: Unnamed | None = None

@@ -67,10 +67,17 @@ class Cells:
         self.axes, self.size = law.axes, law.cells * len(law.axes)
         # What each cell's force owes to the independent variables, (A, K, K).
         self.factors = torch.as_tensor(law.factors.copy())
+        self.response = None if law.response is None else torch.as_tensor(law.response)
+        self._scale: Tensor | None = None
 
     def spread(self, slopes: Tensor) -> Tensor:
         """Return columns (B, L - 1, 6, P + 6) with those of each cell in the place of the last six."""
-        return torch.cat([slopes[..., :-6], self._by_cell(slopes[..., -6:], self.of_interval)], dim=-1)
+        push = slopes[..., -6:]
+        if self.response is not None:
+            # What is reported of the wrench is scaled as what moves is.
+            self._scale = torch.linalg.pinv(push[:, :1]) @ self.response
+            push = self.response.expand(push.shape)
+        return torch.cat([slopes[..., :-6], self._by_cell(push, self.of_interval)], dim=-1)
 
     def part(self, at: int, slope: Tensor, end: int) -> tuple[int, Tensor]:
         """Return a part of what is reported, (B, L, out, p), with cells where it is that of the wrench.
@@ -80,7 +87,9 @@ class Cells:
             slope: of the part in the parameters, (B, L, out, p).
             end: number of columns of the whole report.
         """
-        return (at, self._by_cell(slope, self.of_sample)) if at == end - 6 else (at, slope)
+        if at != end - 6:
+            return at, slope
+        return at, self._by_cell(slope if self._scale is None else slope @ self._scale, self.of_sample)
 
     def separate(self, columns: Tensor) -> tuple[Tensor, Tensor]:
         """Return the columns of the parameters, and those of the force's independent variables."""

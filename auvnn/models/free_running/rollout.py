@@ -133,7 +133,7 @@ def rollout(
             raise ConfigError(f"solver {solver} has no option {sorted(solver_options)[0]!r}")
         steps = (model, state, inputs, times, drive, substeps, TABLEAUS[solver])
         run = compiled_run(*steps, engine)
-        eta, nu = _fixed(*steps) if run is None else run
+        eta, nu = fixed_steps(*steps) if run is None else run
     else:
         raise ConfigError(
             f"no solver called '{solver}'. There are: {', '.join(TABLEAUS)}, torchdiffeq:METHOD"
@@ -181,10 +181,20 @@ def _rate(model: GreyBox, run: Trajectory, inputs: Inputs, batch: torch.Size) ->
     return max(found)
 
 
-def _fixed(
+def fixed_steps(
     model: GreyBox, state: tuple, inputs: Inputs, times: Tensor, drive: Drive, substeps: int, tableau: tuple
 ) -> tuple[Tensor, Tensor]:
-    """Step by step in plain torch: what every other way of running is measured against."""
+    """Return eta (..., T, 7) and nu (..., T, 6) step by step in plain torch: what every other engine is measured against.
+
+    Args:
+        model: that is run.
+        state: position and quaternion (..., 7), velocity (..., 6).
+        inputs: held per interval, T rows.
+        times: s, (..., T).
+        drive: thrust over each step.
+        substeps: steps per interval.
+        tableau: of the Runge-Kutta scheme.
+    """
     # One tensor for the whole state: what costs here is the number of operations, not their size.
     y = torch.cat(state, dim=-1)
     prepared = None if model.time_varying else model.prepare()

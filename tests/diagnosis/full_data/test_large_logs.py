@@ -23,7 +23,7 @@ from auvnn.diagnosis.score_tests import few_windows
 from auvnn.diagnosis.score_tests.probes import probed
 from auvnn.diagnosis.score_tests.score import score
 from auvnn.errors import ConfigError, InputError
-from auvnn.estimation.initial_states import fit_initial_states
+from auvnn.estimation.trajectories.initial_states import fit_initial_states
 from auvnn.estimation.window_sums.sufficient_statistics import ScoreMoments, add_parts, reduce_windows
 from auvnn.executors import executor_for
 from auvnn.log_chunks import scan as parts_

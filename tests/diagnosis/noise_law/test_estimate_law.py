@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from auvnn.diagnosis.noise_law.estimate_law import boundary_p_value, estimate
-from auvnn.diagnosis.noise_law.law_likelihood import Likelihood
-from auvnn.diagnosis.noise_law.sums import ForceSums
+from auvnn.diagnosis.noise_law.likelihood.estimate_law import boundary_p_value, estimate
+from auvnn.diagnosis.noise_law.likelihood.law_likelihood import Likelihood
+from auvnn.diagnosis.noise_law.likelihood.sums import ForceSums
 from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.force_law import correlation
 
@@ -41,14 +41,15 @@ def linear_windows(rms, time, *, windows=80, cells=10, known=2, seed=0, strength
         np.array(hessian), np.array(slope), np.array(cost), none, none, none, none, run, run
     )
     return ForceSums(
-        statistics, known, cells, np.zeros(known), np.zeros(known), np.full(known, 1e-4), np.ones(known, dtype=bool),
+        statistics, known, cells, np.zeros(known), np.zeros(known), np.full(known, 1e-4),
+        np.array([[-np.inf], [np.inf]]) * np.ones(known),
         np.ones(6), (0.1, 6.0), cells * CELL, CELL,
     )  # fmt: skip
 
 
 def test_variances_and_correlation_times_come_back():
     rms, time = np.array([2.0, 1.0, 0.0, 3.0, 0.0, 1.5]), np.array([0.7, 4.0, 1.0, 2.0, 1.0, 1.2])
-    found = estimate(linear_windows(rms, time))
+    found = estimate(Likelihood(linear_windows(rms, time)))
     assert found.law is not None and found.law.axes == [0, 1, 3, 5]
     assert found.law.rms == pytest.approx(rms, rel=0.2)
     ratio = found.law.time[found.law.axes] / time[found.law.axes]
@@ -59,7 +60,8 @@ def test_variances_and_correlation_times_come_back():
 def test_without_a_force_the_variance_is_zero():
     """Six tests at a level of one in a hundred: among 40 logs some three at most, were the test exact."""
     found = [
-        estimate(linear_windows(np.zeros(6), np.ones(6), windows=30, cells=4, seed=s)) for s in range(40)
+        estimate(Likelihood(linear_windows(np.zeros(6), np.ones(6), windows=30, cells=4, seed=s)))
+        for s in range(40)
     ]
     assert sum(f.law is not None for f in found) <= 6
 
@@ -133,7 +135,7 @@ def test_a_degree_of_freedom_that_moves_nothing_measured_is_not_asked():
         hessian[:, own], hessian[:, :, own], slope[:, own] = 0.0, 0.0, 0.0
     blind = replace(sums, statistics=replace(given, hessian=hessian, slope=slope))
     assert Likelihood(blind).shown() == [0, 3] and Likelihood(sums).shown() == list(range(6))
-    found, among = estimate(blind), estimate(blind, only=[0, 3])
+    found, among = estimate(Likelihood(blind)), estimate(Likelihood(blind), only=[0, 3])
     assert found.law is not None and among.law is not None and found.law.axes == [0, 3]
     assert (found.p_values[[1, 2, 4, 5]] == 1.0).all() and (found.p_values[[0, 3]] < 0.01).all()
     assert found.value == pytest.approx(among.value, abs=1e-9)

@@ -194,5 +194,8 @@ def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_ends_the_se
     told = None if predicted is None else InputPrediction("X", "u", 0.5, predicted)
     monkeypatch.setattr(search, "predicted_by_inputs", lambda *_: told)
     monkeypatch.setattr(search, "replace", lambda *_, **__: None)
-    law = SimpleNamespace(estimate=SimpleNamespace(law=object()), weighed=None, name=further)
+    about = SimpleNamespace(around=None)
+    law = SimpleNamespace(
+        estimate=SimpleNamespace(law=object()), weighed=None, name=further, explanation=about
+    )
     assert Search(windows=None)._takes_up(law, ["thrust_asymmetry"]) is expected  # type: ignore[arg-type]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,9 +20,12 @@ NAME, ESTIMATE = "net_buoyancy", 6.0
 
 def begun_and_found(monkeypatch, ends, earlier=None, known=None):
     """Return where fits under the law began, and which of them stands, by the evidence in which they end."""
-    layout, seen = lay_out(GreyBox(small_vehicle()), [NAME]), []
+    layout, seen, reached = lay_out(GreyBox(small_vehicle()), [NAME]), [], [-100.0]
 
-    def from_null(layout, model, current, base, effects):
+    def from_null(layout, model, current, base, effects, least):
+        # What promises less than where an earlier beginning has led is not followed.
+        assert least == max(reached)
+        reached.extend(e for e in ends[len(seen) : len(seen) + 1] if e is not None)
         seen.append(parameters_of(model, [NAME])[0])
         assert effects == ["waves", NAME]
         if (end := ends[len(seen) - 1]) is None:
@@ -31,7 +35,7 @@ def begun_and_found(monkeypatch, ends, earlier=None, known=None):
     fits: Any = SimpleNamespace(from_null=from_null, settled=lambda h: h, judge=lambda e, law: e)
     looks = LeaderFits(layout, fits, lambda _: None)
     tested: Any = SimpleNamespace(scores={NAME: SimpleNamespace(estimate=np.array([ESTIMATE]))}, at=layout)
-    current: Any = SimpleNamespace(estimate=SimpleNamespace(law="law"))
+    current: Any = SimpleNamespace(estimate=SimpleNamespace(law="law"), evidence=-100.0)
     found = looks._one(NAME, Round(tested, current, [], ["waves"], earlier or {}), known)
     return seen, None if found is None else found.evidence
 
@@ -72,9 +76,15 @@ def test_before_nothing_has_a_name_all_that_is_significant_is_fitted(monkeypatch
     tested: Any = SimpleNamespace(
         scores={n: SimpleNamespace(p_value=p, evidence=e, degrees=1) for n, (p, e) in scores.items()}
     )
-    at, known = Round(tested, nothing, [], []), SimpleNamespace(name="thruster_lag", evidence=-6.5)
+    current: Any = "null"
+    at, known = Round(tested, current, [], []), SimpleNamespace(name="thruster_lag", evidence=-6.5)
     looks: Any = LeaderFits(nothing, nothing, lambda _: None)
     found = looks.wider(at, [known], 0.01)
     # Of five that were asked for, one was fitted before, and the test of another one is not clear among five.
     assert fitted == ["waves", "payload", "tether"]
     assert [h.name for h in found] == ["payload", "thruster_lag", "waves"]
+    # A second search that passes there again fits nothing twice, beside another explanation it does.
+    assert [h.name for h in looks.wider(at, [known], 0.01)] == ["payload", "thruster_lag", "waves"]
+    assert len(fitted) == 3
+    looks.wider(replace(at, current="another"), [known], 0.01)
+    assert len(fitted) == 6

@@ -11,7 +11,7 @@ import pytest
 
 from auvnn.diagnosis.hypotheses.measured_start import noise_share
 from auvnn.diagnosis.stages import shorter_windows
-from auvnn.diagnosis.stages.shorter_windows import search_over_shorter
+from auvnn.diagnosis.stages.shorter_windows import Progress, search_over_shorter
 from auvnn.errors import InputError
 from auvnn.models import load
 from auvnn.simulation import simulate
@@ -47,8 +47,9 @@ class Asked:
 def state(ratio, chosen=(), length=5.0, leaves=True):
     mask = np.zeros((4, round(length / STEP), 18))
     return SimpleNamespace(
-        windows=SimpleNamespace(mask=mask), current=explanation(ratio), chosen=chosen, leaves_something=leaves
-    )
+        windows=SimpleNamespace(mask=mask), current=explanation(ratio), first=explanation(8.0), chosen=chosen,
+        leaves_something=leaves,
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +79,16 @@ def test_names_that_leave_the_noise_alone_are_taken_and_said(asked):
     assert seen == [pytest.approx(2.0, abs=0.11)]
     assert given.notes[0] == "stated" and "windows of 2 s were taken" in given.notes[1]
     assert np.shape(given.floor) == (18,)
+
+
+def test_a_name_that_takes_little_away_ends_the_search():
+    # Shares of the noise: an eighth before any name, then 0.6 of the squared error, 0.65, and 0.9.
+    go_on = Progress()
+    assert go_on(state(1.0 / 0.6)) and not go_on(state(1.0 / 0.65))
+    go_on = Progress()
+    assert go_on(state(1.0 / 0.6)) and go_on(state(1.0 / 0.72)) and go_on(state(1.0 / 0.9))
+    # Where no more than the noise is left, the search comes to its end.
+    assert go_on(state(1.0 / 0.9))
 
 
 @pytest.mark.parametrize(

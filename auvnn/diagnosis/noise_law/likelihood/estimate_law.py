@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from auvnn.diagnosis.noise_law.law_likelihood import STEPS, Likelihood
-from auvnn.diagnosis.noise_law.sums import ForceSums
+from auvnn.diagnosis.noise_law.likelihood.law_likelihood import STEPS, Likelihood
 from auvnn.metrics.force_law import ForceLaw
 
 Array = NDArray[np.float64]
@@ -48,28 +47,30 @@ class Estimate:
 
 
 def estimate(
-    sums: ForceSums, start: ForceLaw | None = None, only: Sequence[int] | None = None, most: int = STEPS
+    likelihood: Likelihood,
+    start: ForceLaw | None = None,
+    only: Sequence[int] | None = None,
+    most: int = STEPS,
 ) -> Estimate:
     """Return the law that is most likely, without the degrees of freedom whose variance may be zero.
 
     Args:
-        sums: of an explanation's windows.
+        likelihood: of an explanation.
         start: a law from which to begin.
         only: degrees of freedom to look at, by default all that show; given, none of them is left out.
         most: steps of each search for the likeliest law; with none the law is that of the start.
     """
-    likelihood = Likelihood(sums)
     axes = likelihood.shown() if only is None else list(only)
     p_values = np.ones(6)
     while axes:
         begin = None
         if start is not None and all(start.rms[i] > 0 for i in axes):
             begin = np.log(np.concatenate([start.rms[axes], start.time[axes]]))
-        value, x = likelihood.best(axes, begin, most)
+        x = begin if begin is not None and most == 0 else likelihood.best(axes, begin, most)[1]
         count = len(axes)
-        plain = likelihood.of(likelihood.law(axes, np.exp(x[:count]), np.exp(x[count:])))[0]
         if only is not None:
             break
+        plain = likelihood.of(likelihood.law(axes, np.exp(x[:count]), np.exp(x[count:])))[0]
         gains = []
         for k in range(count):
             rest = [j for j in range(count) if j != k]
@@ -85,11 +86,7 @@ def estimate(
         axes.pop(weakest)
     law = likelihood.law(axes, np.exp(x[:count]), np.exp(x[count:])) if axes else None
     value, step, information, gain = likelihood.of(law)
-    n = sums.known
-    whole, moved = sums.statistics.total[:n, :n].copy(), np.zeros(n)
-    whole[np.ix_(likelihood.keep, likelihood.keep)] = information
-    moved[likelihood.keep] = step
-    return Estimate(law, value, moved, whole, p_values, gain)
+    return Estimate(law, value, step, information, p_values, gain)
 
 
 def boundary_p_value(gain: float) -> float:

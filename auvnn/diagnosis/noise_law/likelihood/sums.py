@@ -9,20 +9,44 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.estimation.priors import Priors
+from auvnn.estimation.priors import Priors, limits
 from auvnn.estimation.sensitivity import Response
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.windows import Windows
+from auvnn.physics.attitude import quat_conjugate, quat_multiply, quat_to_rotvec
 
 Array = NDArray[np.float64]
 # Cells of the force while its law is looked for, s.
 CELL = 0.5
 # Windows of a chain.
 CHAIN = 10
+# Times that are nearer to one another are one moment, s.
+SAME_MOMENT = 1e-6
+
+
+@dataclass(frozen=True)
+class States:
+    """What windows say of their initial states, and where these lead: by that windows of a run hang together.
+
+    Attributes:
+        square: (B, 12, 12) J^T J of the initial states.
+        across: (B, 12, 1 + P + F) the same with the errors, the parameters and the force.
+        ends: (B, 12, 12 + P + F + 1) change of the last state with the initial one, the parameters, the force, and from
+            the trajectory to where its intervals lead.
+        offset: (B, 12) from a window's first state to the last one of the window that it follows.
+        follows: (B,) whether the window begins with the sample with which the one that it follows ends.
+    """
+
+    square: Array
+    across: Array
+    ends: Array
+    offset: Array
+    follows: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -36,7 +60,7 @@ class ForceSums:
         theta: (P,) where the windows were linearised.
         mean: (P,) of the parameters' priors.
         precision: (P,) of the same.
-        inside: (P,) which parameters can move.
+        reach: (2, P) least and largest steps that parameters can make.
         sizes: (6,) plausible forces, N and N m.
         times: shortest and longest correlation time, s.
         span: longest window, s.
@@ -44,6 +68,8 @@ class ForceSums:
         joint: (P, P) precision of all parameters together, where some go together.
         before: (B,) the window that each one follows, -1 where none does; None where none follows any.
         gap: (B,) time between the cells of that window and its own, s.
+        states: what goes from window to window beside the force; None where only the force does.
+        response: of the law, see `ForceLaw`.
     """
 
     statistics: Statistics
@@ -52,7 +78,7 @@ class ForceSums:
     theta: Array
     mean: Array
     precision: Array
-    inside: NDArray[np.bool_]
+    reach: Array
     sizes: Array
     times: tuple[float, float]
     span: float
@@ -60,6 +86,8 @@ class ForceSums:
     joint: Array | None = None
     before: NDArray[np.int64] | None = None
     gap: Array | None = None
+    states: States | None = None
+    response: Array | None = None
 
     @property
     def priors(self) -> Priors:
@@ -68,7 +96,11 @@ class ForceSums:
 
 
 def force_sums(
-    explanation: FittedHypothesis, windows: Windows, sigma: Array, cell: float = CELL
+    explanation: FittedHypothesis,
+    windows: Windows,
+    sigma: Array,
+    cell: float = CELL,
+    response: Array | None = None,
 ) -> ForceSums:
     """Linearise the windows towards the parameters of a fit and a force in cells.
 
@@ -77,17 +109,25 @@ def force_sums(
         windows: those it was fitted to; a law of theirs is not looked at.
         sigma: (18,) the sensors' white noise, infinite for channels that do not count.
         cell: s.
+        response: of the law, see `ForceLaw`.
     """
     fitted, vehicle = explanation.fitted, explanation.fitted.model.vehicle
     times = windows.times[:, windows.warmup :]
     span = float((times[:, -1] - times[:, 0]).max())
-    plain = ForceLaw(np.ones(6), np.ones(6), cell, span, plain=True)
+    plain = ForceLaw(np.ones(6), np.ones(6), cell, span, plain=True, response=response)
     asked = replace(windows, law=plain)
 
+    rows = None if windows.around is None else slice(-1, None)
+    weight = torch.as_tensor(np.where(np.isfinite(sigma), 1.0 / sigma, 0.0))
+    parts: list[tuple[Tensor, Tensor, Tensor]] = []
+
     def joined() -> Iterator[Response]:
-        for answer in linearise(fitted.model, asked, fitted.initial, explanation.names):
+        for answer in linearise(fitted.model, asked, fitted.initial, explanation.names, motion=rows):
             assert answer.force is not None
-            yield Response(answer.error, answer.state, torch.cat([answer.parameters, answer.force], dim=-1))
+            whole = torch.cat([answer.parameters, answer.force], dim=-1)
+            if answer.motion is not None:
+                parts.append((*_of_states(answer, whole, weight), answer.motion[:, -1]))
+            yield Response(answer.error, answer.state, whole)
 
     statistics, _, _ = normal_equations(windows, joined(), sigma)
     force = 0.02 * float(vehicle.mass) * float(vehicle.gravity)
@@ -97,12 +137,37 @@ def force_sums(
     ]
     shortest = 2.0 * float(np.median(steps[steps > 0]))
     priors = fitted.priors
+    reach = np.stack(limits(fitted.model, explanation.names, priors)) - fitted.theta
+    before, gap = followed(windows, plain.cells * cell)
+    states = None
+    if windows.around is not None:
+        square, across, ends = (torch.cat(p).numpy() for p in zip(*parts, strict=True))
+        states = States(square, across, ends, *_offsets(windows, windows.around, before))
     return ForceSums(
         statistics, len(fitted.theta), plain.cells, fitted.theta, priors.mean, priors.precision,
-        np.ones(len(fitted.theta), dtype=bool), np.array([force] * 3 + [0.1 * force * float(vehicle.length)] * 3),
+        reach, np.array([force] * 3 + [0.1 * force * float(vehicle.length)] * 3),
         (shortest, max(0.1 * max(runs), 2.0 * shortest)), span, cell, priors.joint,
-        *followed(windows, plain.cells * cell),
+        before, gap, states, response,
     )  # fmt: skip
+
+
+def _of_states(answer: Response, whole: Tensor, weight: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the products of a response's initial states with themselves, and with errors, parameters and force."""
+    told = answer.state.shape[2]
+    heavy = (answer.state * weight[:told, None] ** 2).flatten(1, 2).mT
+    error = heavy @ answer.error[..., :told].flatten(1, 2).unsqueeze(-1)
+    return heavy @ answer.state.flatten(1, 2), torch.cat([error, heavy @ whole.flatten(1, 2)], dim=-1)
+
+
+def _offsets(windows: Windows, around: Tensor, before: NDArray[np.int64]) -> tuple[Array, NDArray[np.bool_]]:
+    """Return what leads from each first state to the last one of the window before, and whether both are one moment."""
+    other = torch.as_tensor(np.maximum(before, 0))
+    first, last = around[:, 0], around[other, -1]
+    turn = quat_to_rotvec(quat_multiply(quat_conjugate(first[:, 3:7]), last[:, 3:7]))
+    times = windows.times[:, windows.warmup :]
+    same = (times[:, 0] - times[other, -1]).abs() < SAME_MOMENT
+    away = torch.cat([last[:, :3] - first[:, :3], turn, last[:, 7:] - first[:, 7:]], dim=-1)
+    return away.numpy(), same.numpy() & (before >= 0)
 
 
 def followed(windows: Windows, reach: float) -> tuple[NDArray[np.int64], Array]:

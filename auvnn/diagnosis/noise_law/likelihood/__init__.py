@@ -1,0 +1,6 @@
+"""The likelihood of a law of the stochastic force, and what it is made of.
+
+`sums` holds what windows say of parameters, states and force; `window_filter` takes them one after the other, conditional
+on those before; `law_likelihood` is the likelihood of a law, and `estimate_law` makes it as large as it can be.
+`about_motion` linearises the windows about the trajectories that are known from the past.
+"""

@@ -1,0 +1,46 @@
+"""When a search for names alone ends because a force stays."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from auvnn.diagnosis import search
+from auvnn.diagnosis.search import a_force_stays
+
+
+def state(rounds: int) -> Any:
+    return SimpleNamespace(path=("round",) * rounds, first="first", current="current", windows=None)
+
+
+def stays(monkeypatch, rounds, share, p_value=1e-9):
+    left = SimpleNamespace(p_value=p_value, left_of=lambda before: share)
+    monkeypatch.setattr(search, "white", lambda *_: None)
+    monkeypatch.setattr(search, "variance_component_test", lambda *_: left)
+    asked: Any = SimpleNamespace(floor=0.0)
+    return a_force_stays(asked, state(rounds))
+
+
+@pytest.mark.parametrize(
+    ("rounds", "share", "expected"),
+    [(0, 1.0, False), (1, 0.95, True), (1, 0.7, False), (2, 0.7, True), (2, 0.4, False)],
+)
+def test_after_one_round_nearly_all_must_stay_and_later_most(monkeypatch, rounds, share, expected):
+    assert stays(monkeypatch, rounds, share) is expected
+
+
+def test_what_chance_may_leave_is_no_force(monkeypatch):
+    assert not stays(monkeypatch, 2, 0.9, p_value=0.01)
+
+
+def test_where_the_test_cannot_be_solved_the_search_goes_on(monkeypatch):
+    def unsolved(*_):
+        raise np.linalg.LinAlgError
+
+    monkeypatch.setattr(search, "white", lambda *_: None)
+    monkeypatch.setattr(search, "variance_component_test", unsolved)
+    asked: Any = SimpleNamespace(floor=0.0)
+    assert not a_force_stays(asked, state(3))

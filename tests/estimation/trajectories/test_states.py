@@ -1,0 +1,96 @@
+"""Windows that are linear about given trajectories, and the trajectories that measurements make likely."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.estimation.trajectories.filtered_states import filtered_states
+from auvnn.estimation.trajectories.smoothed_states import smoothed_states
+from auvnn.estimation.window_normal_equations import linearise
+from auvnn.metrics.force_law import ForceLaw
+from auvnn.metrics.free_run import initial_states, moved, predict
+from auvnn.models import GreyBox
+from tests.diagnosis.noise_law.wandering import wandering_log
+from tests.small_logs import make_log, small_vehicle
+
+RMS, TIME = np.array([8.0, 8.0, 8.0, 0.8, 0.8, 1.0]), 1.0
+SIGMA = np.array([0.02] * 3 + [0.003] * 3 + [0.004] * 6 + [np.inf] * 6)
+
+
+def motion(model, windows, initial):
+    with torch.no_grad():
+        return torch.cat(predict(model.without_absent(), windows, initial), dim=-1)
+
+
+@pytest.mark.parametrize(
+    "hidden", [{}, {"thruster_lag": {"time_constant": 0.3}}, {"velocity_scale": {"factor": 1.2}}]
+)
+def test_about_free_running_itself_nothing_changes(hidden):
+    model = GreyBox(small_vehicle()).with_effects(hidden) if hidden else GreyBox(small_vehicle())
+    windows = windows_for(model, make_log(model, runs=1, duration=12.0))
+    initial = initial_states(model, windows)
+    names = list(hidden)
+    plain = list(linearise(model, windows, initial, names))
+    about = replace(windows, around=motion(model, windows, initial))
+    for one, other in zip(plain, linearise(model, about, initial, names), strict=True):
+        for name in ("error", "state", "parameters"):
+            torch.testing.assert_close(getattr(one, name), getattr(other, name), atol=1e-9, rtol=1e-7)
+
+
+def test_about_a_trajectory_nearby_errors_are_those_of_free_running_to_first_order():
+    model = GreyBox(small_vehicle())
+    windows = windows_for(model, make_log(model, runs=1, duration=12.0))
+    initial = initial_states(model, windows)
+    (plain,) = linearise(model, windows, initial, ())
+    run, off = motion(model, windows, initial), []
+    generator = torch.Generator().manual_seed(0)
+    change = torch.randn(run.shape[0] * run.shape[1], 12, generator=generator, dtype=torch.float64)
+    for size in (1e-3, 1e-4):
+        around = moved(run.flatten(0, 1), size * change).unflatten(0, run.shape[:2])
+        (about,) = linearise(model, replace(windows, around=around), initial, ())
+        # The run from the trajectory's own first state is away from the free run by that state's change.
+        first = (size * change).unflatten(0, run.shape[:2])[:, 0]
+        off.append(float((about.error - plain.left(first)).abs().max()))
+    assert off[0] < 2e-4 and off[1] < 0.08 * off[0]
+
+
+def wandering():
+    model = GreyBox(small_vehicle())
+    windows = windows_for(model, wandering_log(model, RMS, TIME, runs=2, duration=15.0, seed=3), 2.0)
+    times = windows.times[:, windows.warmup :]
+    span = float((times[:, -1] - times[:, 0]).max())
+    law = ForceLaw(RMS, np.full(6, TIME), 0.25, span)
+    return model, replace(windows, law=law), initial_states(model, windows)
+
+
+def test_smoothed_states_are_nearer_to_what_was_measured_than_free_running_is():
+    model, windows, initial = wandering()
+    run = motion(model, windows, initial)
+    smoothed = smoothed_states(model, windows, initial, (), SIGMA, np.zeros(0))
+    again = smoothed_states(model, replace(windows, around=smoothed), initial, (), SIGMA, np.zeros(0))
+
+    def rms(states):
+        return torch.sqrt(((states[..., 7:10] - windows.nu[..., :3]) ** 2).mean())
+
+    # The sensor's noise is 4 mm/s; the force drives free running tens of times as far off.
+    assert rms(run) > 0.03 and rms(smoothed) < 0.006
+    assert float((again - smoothed)[..., 7:].abs().max()) < 0.1 * float((smoothed - run)[..., 7:].abs().max())
+
+
+def test_filtered_states_know_nothing_of_what_is_measured_later():
+    model, windows, initial = wandering()
+    smoothed = smoothed_states(model, windows, initial, (), SIGMA, np.zeros(0))
+    row = windows.nu.shape[1] // 2
+    nu = windows.nu.clone()
+    nu[:, row:] += 0.05
+    about = replace(windows, around=smoothed)
+    before, after = (filtered_states(model, w, SIGMA) for w in (about, replace(about, nu=nu)))
+    torch.testing.assert_close(before[:, :row], after[:, :row], atol=1e-12, rtol=0.0)
+    assert bool(((after - before)[:, row, 7:].abs() > 0.01).any())
+    # At the end of a window the filter knows all that the smoother does, with cells in the place of a process.
+    assert float((before - smoothed)[:, -1, 7:].abs().mean()) < 0.004
