@@ -21,7 +21,7 @@ from auvnn.diagnosis.noise_law.answer import answer_with_force
 from auvnn.diagnosis.search import a_force_stays, search
 from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.shorter_windows import search_over_shorter
-from auvnn.diagnosis.stages.state import Searched, Setting
+from auvnn.diagnosis.stages.state import Searched, Setting, State
 from auvnn.diagnosis.stages.what_is_left import settled
 from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.prediction_error import SINGULAR
@@ -110,6 +110,20 @@ def diagnose(
     )[0]
 
 
+def beside_a_force(asked: Setting, state: State) -> tuple[State, dict[str, Any], list[str]]:
+    """Return where the search ends once a stochastic force has been asked for, what was found of it, and words.
+
+    Args:
+        asked: what is asked.
+        state: where the search for names alone has ended, or was ended because a force stays.
+    """
+    found = answer_with_force(asked, state)
+    if not state.interrupted or "force" in found[1]:
+        return found
+    # What stays is no stochastic force: names alone have to do.
+    return answer_with_force(asked, search(asked, state.windows))
+
+
 def searched(
     model: GreyBox,
     log: Log,
@@ -177,10 +191,7 @@ def searched(
         if window is None:
             asked, state = search_over_shorter(asked, state, search)
         if stochastic:
-            interrupted, (state, told, words) = state.interrupted, answer_with_force(asked, state)
-            if interrupted and "force" not in told:
-                # What stayed was no stochastic force: names alone have to do.
-                state, told, words = answer_with_force(asked, search(asked, state.windows))
+            state, told, words = beside_a_force(asked, state)
         state = settled(asked, state)
         found = answer(asked, state)
     except (np.linalg.LinAlgError, SINGULAR) as problem:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis import search
+from auvnn.diagnosis.diagnose import beside_a_force
 from auvnn.diagnosis.search import a_force_stays
 
 
@@ -44,3 +46,24 @@ def test_where_the_test_cannot_be_solved_the_search_goes_on(monkeypatch):
     monkeypatch.setattr(search, "variance_component_test", unsolved)
     asked: Any = SimpleNamespace(floor=0.0)
     assert not a_force_stays(asked, state(3))
+
+
+@pytest.mark.parametrize(
+    ("interrupted", "told", "searches"),
+    [(True, {}, 1), (True, {"force": "its law"}, 0), (False, {}, 0)],
+    ids=["ended early, and there is no force", "ended early, beside a force", "ended by itself"],
+)
+def test_a_search_that_was_ended_for_a_force_goes_on_where_there_is_none(
+    monkeypatch, interrupted, told, searches
+):
+    module = importlib.import_module("auvnn.diagnosis.diagnose")
+    seen = []
+    monkeypatch.setattr(module, "search", lambda asked, windows: seen.append(windows) or "whole")
+    monkeypatch.setattr(
+        module, "answer_with_force", lambda asked, state: (state, {} if state == "whole" else told, [])
+    )
+    asked: Any = "asked"
+    before: Any = SimpleNamespace(interrupted=interrupted, windows="windows")
+    found = beside_a_force(asked, before)
+    assert seen == ["windows"] * searches
+    assert found[0] == ("whole" if searches else before)

@@ -94,3 +94,51 @@ def test_filtered_states_know_nothing_of_what_is_measured_later():
     assert bool(((after - before)[:, row, 7:].abs() > 0.01).any())
     # At the end of a window the filter knows all that the smoother does, with cells in the place of a process.
     assert float((before - smoothed)[:, -1, 7:].abs().mean()) < 0.004
+
+
+def test_slopes_up_to_a_moment_do_not_change_with_the_trajectory_from_there_on():
+    """Else they would go together with the error that a measurement of that moment shows."""
+    model, windows, initial = wandering()
+    smoothed = smoothed_states(model, windows, initial, (), SIGMA, np.zeros(0))
+    row = windows.nu.shape[1] // 2
+    other = smoothed.clone()
+    other[:, row:, 7:] += 0.1
+    names = ["quadratic_damping"]
+    model = model.with_effects({"quadratic_damping": {"X": 1.0}})
+    one, two = (
+        next(linearise(model, replace(windows, law=None, around=around), initial, names))
+        for around in (smoothed, other)
+    )
+    for name in ("state", "parameters"):
+        before, after = getattr(one, name), getattr(two, name)
+        torch.testing.assert_close(before[:, : row + 1], after[:, : row + 1], atol=1e-12, rtol=1e-9)
+        assert float((before - after)[:, row + 1 :].abs().max()) > 1e-4
+
+
+def test_with_a_response_of_its_own_a_force_moves_any_model_as_much():
+    model, windows, initial = wandering()
+    heavy = model.with_effects({"added_mass": dict.fromkeys("XYZKMN", 1.4)})
+    around = smoothed_states(model, windows, initial, (), SIGMA, np.zeros(0))
+    response = model.prepare().inverse.detach().numpy()
+    assert windows.law is not None
+    off = []
+    for law in (windows.law, replace(windows.law, response=response)):
+        asked = replace(windows, law=law, around=around)
+        one, two = (next(linearise(m, asked, initial, ())).force for m in (model, heavy))
+        assert one is not None and two is not None
+        # Over one interval: later on the heavier vehicle is also damped less.
+        off.append(float((one[:, 1, 6:] - two[:, 1, 6:]).abs().max() / one[:, 1, 6:].abs().max()))
+    assert off[0] > 0.1 and off[1] < 0.03
+
+
+def test_filtered_states_are_the_same_about_another_trajectory_nearby():
+    model, windows, initial = wandering()
+    smoothed = smoothed_states(model, windows, initial, (), SIGMA, np.zeros(0))
+    generator = torch.Generator().manual_seed(0)
+    change = 1e-3 * torch.randn(
+        smoothed.shape[0] * smoothed.shape[1], 12, generator=generator, dtype=torch.float64
+    )
+    other = moved(smoothed.flatten(0, 1), change).unflatten(0, smoothed.shape[:2])
+    one, two = (filtered_states(model, replace(windows, around=a), SIGMA) for a in (smoothed, other))
+    assert float((other - smoothed).abs().max()) > 3e-3
+    assert float((one - two).abs().max()) < 1e-4
