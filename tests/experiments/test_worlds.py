@@ -23,6 +23,7 @@ SAMPLES = {
     "rows-4.jsonl": 3,
     "rows-5.jsonl": 4,
     "rows-6.jsonl": 5,
+    "rows-7.jsonl": 6,
 }
 
 

@@ -38,7 +38,7 @@ from auvnn.diagnosis.noise_law.leader_fits import LeaderFits, Round
 from auvnn.diagnosis.noise_law.likelihood.about_motion import linear_about_its_own
 from auvnn.diagnosis.noise_law.likelihood.estimate_law import estimate
 from auvnn.diagnosis.noise_law.likelihood.law_likelihood import STEPS, Likelihood
-from auvnn.diagnosis.noise_law.likelihood.sums import CELL, ForceSums, force_sums
+from auvnn.diagnosis.noise_law.likelihood.sums import CELL, ForceSums, force_sums, whole_cells
 from auvnn.diagnosis.noise_law.predicted_by_inputs import predicted_by_inputs
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.selection.choose import ALPHA
@@ -56,9 +56,8 @@ Array = NDArray[np.float64]
 ALPHA_NAME, ALPHA_FURTHER = 0.01, 0.001
 # Standard errors by which runs left out must be predicted better.
 GAIN, GAIN_FURTHER = 1.0, 2.0
-# What the first name and a further one must cost in free running, as shares of the tolerance: both fits are to all of the
-# log, and a force that is always there makes errors that no name takes away. And the share of the gain of all names
-# that a further one must bring.
+# What the first name and a further one must cost in free running, as shares of the tolerance (a force is always there
+# and makes errors that no name takes away), and the share of the gain of all names that a further one must bring.
 FIRST_COST, FURTHER_COST, FURTHER_SHARE = 0.5, 1.0, 0.1
 # Steps of the fit without any name, and how often its windows are made linear about the motion first.
 NULL_STEPS, TURNS = 25, 3
@@ -99,14 +98,15 @@ class ForceSearch:
         self.say("estimating the law of the force that is left")
         with suppress(*UNSOLVED):
             self.in_closed_loop = in_closed_loop(first, self.windows)
-        # Fits without the force weigh errors as the first one did, the force's among them.
+        # Fits without the force weigh errors as the first one did.
         self.sigma, self.weights = sigma, first.fitted.sigma
         self.response = GreyBox(first.fitted.model.vehicle).prepare().inverse.detach().numpy()
+        # A whole number of cells: a window's last force is that with which the next one begins.
+        self.cell = whole_cells(self.windows, CELL)
         found = estimate(Likelihood(self._sums(first)))
         if found.law is None:
             return None
-        # A whole number of cells: a window's last force is that with which the next one begins.
-        cell = found.law.span / np.ceil(found.law.span / cell_for(found.law.time[found.law.axes]) - 1e-9)
+        cell = whole_cells(self.windows, cell_for(found.law.time[found.law.axes]))
         if cell < self.cell:
             self.cell = cell
             found = estimate(Likelihood(self._sums(first)), replace(found.law, cell=cell), found.law.axes)

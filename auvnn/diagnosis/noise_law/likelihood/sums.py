@@ -112,9 +112,17 @@ def force_sums(
         response: of the law, see `ForceLaw`.
     """
     fitted, vehicle = explanation.fitted, explanation.fitted.model.vehicle
-    times = windows.times[:, windows.warmup :]
-    span = float((times[:, -1] - times[:, 0]).max())
+    times, span = windows.times[:, windows.warmup :], span_of(windows)
     plain = ForceLaw(np.ones(6), np.ones(6), cell, span, plain=True, response=response)
+    before, gap = followed(windows, plain.cells * cell)
+    offset, follows = np.zeros((len(windows), 12)), np.zeros(len(windows), dtype=bool)
+    if windows.around is not None and windows.noise is None:
+        # Noise that is not white would go on from window to window, too: then each begins with a state of its own.
+        offset, follows = _offsets(windows, windows.around, before)
+        # The sample that two windows share was measured once.
+        mask = windows.mask.clone()
+        mask[torch.as_tensor(follows), 0] = 0.0
+        windows = replace(windows, mask=mask)
     asked = replace(windows, law=plain)
 
     rows = None if windows.around is None else slice(-1, None)
@@ -138,17 +146,33 @@ def force_sums(
     shortest = 2.0 * float(np.median(steps[steps > 0]))
     priors = fitted.priors
     reach = np.stack(limits(fitted.model, explanation.names, priors)) - fitted.theta
-    before, gap = followed(windows, plain.cells * cell)
     states = None
     if windows.around is not None:
         square, across, ends = (torch.cat(p).numpy() for p in zip(*parts, strict=True))
-        states = States(square, across, ends, *_offsets(windows, windows.around, before))
+        states = States(square, across, ends, offset, follows)
     return ForceSums(
         statistics, len(fitted.theta), plain.cells, fitted.theta, priors.mean, priors.precision,
         reach, np.array([force] * 3 + [0.1 * force * float(vehicle.length)] * 3),
         (shortest, max(0.1 * max(runs), 2.0 * shortest)), span, cell, priors.joint,
         before, gap, states, response,
     )  # fmt: skip
+
+
+def span_of(windows: Windows) -> float:
+    """Return the length of the longest window, s."""
+    times = windows.times[:, windows.warmup :]
+    return float((times[:, -1] - times[:, 0]).max())
+
+
+def whole_cells(windows: Windows, cell: float) -> float:
+    """Return the length of cells, s, no longer than this one, of which the longest window holds a whole number.
+
+    Args:
+        windows: B windows.
+        cell: s.
+    """
+    span = span_of(windows)
+    return span / max(float(np.ceil(span / cell - 1e-9)), 1.0)
 
 
 def _of_states(answer: Response, whole: Tensor, weight: Tensor) -> tuple[Tensor, Tensor]:
