@@ -40,28 +40,17 @@ def interval_maps(
     return forward, forcing
 
 
-def propagate(
-    jac_state: Tensor,
-    jac_theta: Tensor,
-    quaternion: Tensor,
-    nu: Tensor,
-    steps: Tensor,
-    defect: Tensor | None = None,
-) -> tuple[Tensor, Tensor]:
+def propagate(forward: Tensor, forcing: Tensor, defect: Tensor | None = None) -> tuple[Tensor, Tensor]:
     """Return the change of the state with initial state, (B, L, 12, 12), and parameters, (B, L, 12, P).
 
     With defects, the last column of the parameters is what they add up to, (B, L, 12, P + 1).
 
     Args:
-        jac_state: of the acceleration, (B, L - 1, 6, 12).
-        jac_theta: (B, L - 1, 6, P).
-        quaternion: (B, L - 1, 4).
-        nu: (B, L - 1, 6).
-        steps: s, (B, L - 1).
+        forward: what every interval makes of the state's change, see `interval_maps`, (B, L - 1, 12, 12).
+        forcing: what it makes of the parameters, (B, L - 1, 12, P).
         defect: by how much each interval misses the trajectory, (B, L - 1, 12), or None.
     """
-    count, intervals = steps.shape
-    forward, forcing = interval_maps(jac_state, jac_theta, quaternion, nu, steps)
+    count, intervals = forward.shape[:2]
     if defect is not None:
         forcing = torch.cat([forcing, defect.unsqueeze(-1)], dim=-1)
     # Time comes first, so that each step reads and writes what lies together.

@@ -21,7 +21,7 @@ from torch import Tensor
 
 from auvnn.estimation.force_marginalisation.columns import PUSH, Cells
 from auvnn.estimation.point_slopes import OperatingPoint, differentiate
-from auvnn.estimation.propagation import propagate
+from auvnn.estimation.propagation import interval_maps, propagate
 from auvnn.estimation.window_simulation import SimulatedWindows, simulate_windows
 from auvnn.metrics.free_run import moved
 from auvnn.metrics.windows import Windows
@@ -139,9 +139,8 @@ def respond_by(
     for begin in range(0, count, size):
         part = slice(begin, begin + size)
         defect = None if ran.defect is None else ran.defect[part]
-        by_state, by_theta = propagate(
-            along[0][part], along[1][part], points[1][part], points[2][part], steps[part], defect
-        )
+        maps = interval_maps(along[0][part], along[1][part], points[1][part], points[2][part], steps[part])
+        by_state, by_theta = propagate(*maps, defect)
         states = None if motion is None else torch.cat([by_state[:, motion], by_theta[:, motion]], dim=-1)
         state, parameters = _outputs(seen, part, by_state, by_theta)
         mask = windows.mask[part, :, : state.shape[-2]].unsqueeze(-1)
