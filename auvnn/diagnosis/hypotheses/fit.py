@@ -11,6 +11,7 @@ from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.measured_start import better_from_measured
 from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
+from auvnn.diagnosis.hypotheses.plausible_sizes import departure, sizes_of
 from auvnn.diagnosis.hypotheses.stated_priors import (
     DETERMINED,
     Layout,
@@ -190,27 +191,16 @@ def log_evidence(layout: Layout, explanation: FittedHypothesis, factor: float) -
 
     Reference: MacKay (1992), Neural Computation 4(3).
     """
-    fitted, prior = explanation.fitted, []
-    means = []
-    for name in explanation.names:
-        mean = layout.means[name]
-        means.append(mean)
-        size = scales(layout, name)
-        if name in layout.spreads and name not in explanation.effects:
-            size = layout.spreads[name]
-        prior.append(np.broadcast_to(size, mean.shape))
+    fitted, names, effects = explanation.fitted, explanation.names, explanation.effects
     # With nothing uncertain and nothing asked for, there is nothing to weigh but the data.
-    size = np.concatenate([np.zeros(0), *prior])
-    away = (fitted.theta - np.concatenate([np.zeros(0), *means])) / size
+    size = sizes_of(layout, names, effects)
     information = fitted.statistics.total * size[:, None] * size / factor
-    root = correlation_root(layout, explanation.names, explanation.effects)
+    root = correlation_root(layout, names, effects)
     if root is not None:
-        away, information = np.linalg.solve(root, away), root.T @ information @ root
-    # Where it begins and how often it swings is as likely in one place as in another.
-    away[np.concatenate([np.zeros(0, dtype=bool), *(shapes(layout, n) for n in explanation.names)])] = 0.0
+        information = root.T @ information @ root
     data = float(fitted.statistics.cost.sum()) / factor
     volume = np.linalg.slogdet(information + np.eye(len(size)))[1]
-    misfit = data + float(away @ away)
+    misfit = data + departure(layout, names, effects, fitted.theta)
     return replace(explanation, evidence=-0.5 * (misfit + volume), misfit=misfit)
 
 

@@ -16,12 +16,12 @@ from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.commands.holding import Holding, cost_at_best, holding
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncertain_wrench
-from auvnn.diagnosis.noise_law.hypothesis import WithForce, under_its_law
+from auvnn.diagnosis.noise_law.hypothesis import WithForce
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
 from auvnn.diagnosis.noise_law.likelihood.estimate_law import ALPHA_BOUNDARY
 from auvnn.diagnosis.noise_law.noise_colour import Colour, noise_colour
-from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction, predicted_by_inputs
+from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.diagnosis.noise_law.split_windows import fitted_over_parts
 from auvnn.diagnosis.noise_law.words import left
@@ -136,14 +136,13 @@ def _with_force(
     if null is None:
         return None
     result = beside.run(null, alone, asked.most)
-    predicted = _predictable(asked, result)
+    predicted = result.predicted
     if predicted is not None and not asked.tolerance.strict:
         # What inputs predict has a cause: one that costs little is taken where nothing is predicted beside it.
         beside.ignores_cost = beside.looks_further = True
         again = beside.run(null, alone, asked.most)
-        left = _predictable(asked, again)
-        if left is None or goes_further(again, result):
-            result, predicted = again, left
+        if again.predicted is None or goes_further(again, result):
+            result, predicted = again, again.predicted
     over_parts = state.but(first=first, windows=windows)
     ended = _state(asked, state, over_parts, result, uncertain, chance=predicted is None)
     return ended, result.estimate.law, predicted
@@ -166,13 +165,6 @@ def goes_further(again: WithForce, before: WithForce) -> bool:
 def _leaves_force(asked: Setting, state: State, end: FittedHypothesis) -> bool:
     noise = white(end, asked.floor)
     return variance_component_test(end, state.windows, noise).p_value < ALPHA_BOUNDARY
-
-
-def _predictable(asked: Setting, result: WithForce) -> InputPrediction | None:
-    """Return what measured inputs predict of the force, None where that is little."""
-    asked.say("asking how much of the force measured inputs predict")
-    predicted = predicted_by_inputs(under_its_law(result.last), result.windows)
-    return predicted if predicted is not None and predicted.matters else None
 
 
 def _state(
@@ -250,12 +242,16 @@ def exceeds_actuators(asked: Setting, state: State, law: ForceLaw | None) -> boo
     """
     if law is None:
         return False
-    # What changes faster than the vehicle answers moves it little: the mean over a second counts.
-    mean = law.rms * np.sqrt(np.minimum(1.0, 2.0 * law.time / SECOND))
+    mean = _over_a_second(law)
     drive = actuators_of(asked.layout.model, state.windows)
     # Fins and a vehicle's own balance hold what thrusters do not: the largest of forces, and of moments, is the measure.
     most = np.repeat([drive[:3].max(), drive[3:].max()], 3)
     return bool((mean[most > 0.0] > LARGEST * most[most > 0.0]).any())
+
+
+def _over_a_second(law: ForceLaw) -> Array:
+    """Return the rms of a force's mean over a second, (6,): what changes faster moves a vehicle little."""
+    return law.rms * np.sqrt(np.minimum(1.0, 2.0 * law.time / SECOND))
 
 
 def negligible(asked: Setting, state: State, law: ForceLaw | None, uncertain: UncertainWrench) -> bool:
@@ -292,8 +288,8 @@ def _words(predicted: InputPrediction) -> str:
 
 def _share_left(result: WithForce) -> float:
     """Return the stochastic force's share of what was above noise before any name."""
-    before, law = result.first_law, result.estimate.law
-    if law is None or before is None:
+    if result.estimate.law is None or result.first_law is None:
         return 0.0
-    known = before.rms > 0.0
-    return float(np.clip(((law.rms[known] / before.rms[known]) ** 2).mean(), 0.0, 1.0))
+    before, after = _over_a_second(result.first_law), _over_a_second(result.estimate.law)
+    known = before > 0.0
+    return float(np.clip(((after[known] / before[known]) ** 2).mean(), 0.0, 1.0))

@@ -37,7 +37,7 @@ Judge = Callable[[FittedHypothesis, ForceLaw, bool], Hypothesis]
 # What is raised where free running grows without bound, and sums of it cannot be solved.
 UNSOLVED = (FitError, np.linalg.LinAlgError, SINGULAR)
 # At most so many steps, the shares of a step that are tried, and the gain of the log likelihood that ends a fit.
-STEPS, SHARES, SETTLED = 12, (1.0, 0.3, 0.1, 0.03), 1.0
+STEPS, SHARES, SETTLED = 12, (1.0, 0.3, 0.1), 1.0
 # Rounds of steps, the law estimated again between them.
 ROUNDS = 4
 
@@ -97,9 +97,11 @@ class LawFits:
         """
         best = found
         for turn in range(ROUNDS):
+            stuck = False
             while most > 0 and found.evidence > least and 0.5 * found.promised >= SETTLED:
                 again = self._step(found)
                 if again is None:
+                    stuck = True
                     break
                 most -= 1
                 found, little = again, _here(again) - _here(found) < SETTLED
@@ -113,9 +115,11 @@ class LawFits:
             if smoothed is not None:
                 # What is linear about other trajectories is the nearer to the truth, and not to be compared.
                 best = found = self.judge(smoothed, law, True)
+                stuck = False
             again = self.judge(found.explanation, law, False)
-            # The likeliest law is that of what a step promises, and worth what is left of that once it was taken.
-            if again.evidence - _here(found) < SETTLED:
+            # The likeliest law is that of what a step promises, and worth what is left of that once it was taken. Where
+            # no share of the step brought anything, it must promise more by the new law than by the old one.
+            if again.evidence - (found.evidence if stuck else _here(found)) < SETTLED:
                 break
             found = again
         return best if 0.5 * best.promised < SETTLED else best.here

@@ -1,8 +1,9 @@
 """How much of a force the measured inputs predict: that part is not stochastic.
 
-With the law of the stochastic force in the windows, a force that is a simple function of one measured input
-(`InputForces`) is asked for in every degree of freedom. The one is taken whose gain on runs left out is surest, and its
-mean square is compared with that of what stays stochastic.
+A force that is a simple function of one measured input (`InputForces`) is asked for in every degree of freedom, beside
+the stochastic one: its mean over the cells of the law is known but for its size. Windows are conditional on those before
+them, so that a slow force that looks like an input by chance does not count anew in each. The input is taken whose gain
+on runs left out is surest, and its mean square is compared with that of the force.
 """
 
 from __future__ import annotations
@@ -12,11 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out
-from auvnn.diagnosis.residuals.additive_force_test import _by_part
-from auvnn.diagnosis.residuals.input_forces import ANGLES, AXES, InputForces, _euler, _raw
+from auvnn.diagnosis.noise_law.likelihood.known_forces import with_known_forces
+from auvnn.diagnosis.noise_law.likelihood.law_likelihood import Likelihood
+from auvnn.diagnosis.noise_law.likelihood.sums import ForceSums
+from auvnn.diagnosis.residuals.input_forces import AXES, InputForces
 from auvnn.estimation.window_sums.statistics import Statistics
+from auvnn.metrics.force_law import ForceLaw, covariance_of_means
+from auvnn.metrics.free_run import predict
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
@@ -35,7 +41,7 @@ class InputPrediction:
     Attributes:
         axis: "X" to "N".
         input: name.
-        share: of the force's mean square, that of the stochastic force included.
+        share: of the force's mean square.
         least: lower 95 % limit of the share; zero where the gain on runs left out may be chance.
         gain: fall of the weighted squared error on what is left out.
     """
@@ -52,44 +58,38 @@ class InputPrediction:
         return self.least > PREDICTABLE
 
 
-def predicted_by_inputs(explanation: FittedHypothesis, windows: Windows) -> InputPrediction | None:
+def predicted_by_inputs(
+    explanation: FittedHypothesis, windows: Windows, sums: ForceSums, law: ForceLaw | None
+) -> InputPrediction | None:
     """Return the largest share that is predicted, None where there is no stochastic force.
 
     Args:
         explanation: the fit under the law.
-        windows: with the law.
+        windows: without a law.
+        sums: of these windows at the fit.
+        law: of the force that is left.
     """
-    law = windows.law
     if law is None or not law.axes:
         return None
-    fitted = explanation.fitted
-    probe = InputForces(fitted.model, windows)
-    features = _features(probe, windows)
-    known = len(fitted.theta)
-    scale = np.array([p.scale for p in probe.parameters_of])
-    parts: list[list[Statistics]] = [[] for _ in AXES]
-    for part in _by_part(explanation, probe, windows, fitted.sigma):
-        for axis, one in zip(parts, part, strict=True):
-            axis.append(one)
+    probe = InputForces(explanation.fitted.model, windows)
+    courses = _courses(probe, explanation, windows, sums)
+    known, each = len(explanation.fitted.theta), courses.shape[-1]
+    scale = np.array([p.scale for p in probe.parameters_of]).reshape(6, each)
     fold, best = folds(windows.run), None
     for i in law.axes:
-        hessian = np.concatenate([s.hessian for s in parts[i]])
-        slope = np.concatenate([s.slope for s in parts[i]])
-        cost = np.concatenate([s.cost for s in parts[i]])
-        one = parts[i][0]
-        whole = Statistics(
-            hessian, slope, cost, one.channel, one.count, one.rough, one.pairs, windows.run, windows.first
-        )
-        before = _left(whole, list(range(known)), explanation, scale[:0], fold)
+        whole = Likelihood(with_known_forces(sums, i, courses, scale[i])).by_window(law).finite()
+        before = _left(whole, list(range(known)), explanation, scale[i, :0], fold)
+        mean = float(covariance_of_means(1, sums.cell, torch.tensor(float(law.time[i]))))
         for name, place in probe.inputs.items():
             if name == "t":
                 continue
-            own = np.arange(len(scale) // 6)[place]
-            size = scale[own + i * (len(scale) // 6)]
+            own = np.arange(each)[place]
+            size = scale[i, own]
             columns = [*range(known), *(known + own)]
             gain = before - _left(whole, columns, explanation, size, fold)
             z = float(gain.sum()) / max(float(np.sqrt(len(gain)) * gain.std(ddof=1)), 1e-300)
-            found = _share(whole, columns, explanation, size, features[:, own], float(law.rms[i]))
+            features = courses[..., own].reshape(-1, len(own))
+            found = _share(whole, columns, explanation, size, features, float(law.rms[i]) * mean**0.5)
             least = found[1] if z > SURE else 0.0
             predicted = InputPrediction(AXES[i], name, found[0], least, float(gain.sum()))
             if best is None or (predicted.least, predicted.share) > (best.least, best.share):
@@ -124,7 +124,9 @@ def _share(
     )
     least = max(mean_square - LIMIT * error, 0.0)
     mean_square = max(mean_square, 0.0)
-    return mean_square / (mean_square + rms**2), least / (least + rms**2)
+    # The law was estimated without the known force, which is in its mean square.
+    whole = max(mean_square, rms**2, 1e-300)
+    return mean_square / whole, least / whole
 
 
 def _left(
@@ -135,31 +137,30 @@ def _left(
     return left_out(sums.columns(columns), np.concatenate([fitted.theta, np.zeros(len(size))]), held, fold)
 
 
-def _features(probe: InputForces, windows: Windows) -> Array:
-    """Return the functions of the inputs at all samples, (N, k), in the order of one degree of freedom's parameters."""
-    given = windows.inputs.rows(windows.warmup)
-    raw = _raw(
-        windows.times[:, windows.warmup :], windows.eta[..., :3], _euler(windows.eta[..., 3:]), windows.nu,
-        given.command, given.fins, given.voltage, given.altitude,
-    )  # fmt: skip
-    seen = torch.as_tensor(np.arange(raw.shape[1]) < windows.length[:, None])
-    values = raw[seen].numpy()
-    names = _names_of(probe, windows, raw.shape[-1])
-    columns = []
-    for name in probe.inputs:
-        k = names.index(name)
-        x = values[:, k]
-        if name in ANGLES:
-            columns += [np.sin(x), np.cos(x), np.sin(2 * x), np.cos(2 * x)]
-        else:
-            z = (x - float(probe.kept("mean")[k])) / float(probe.kept("spread")[k])
-            columns += [z, z * z, np.abs(z) * z]
-    return np.stack(columns, axis=-1)
+def _courses(probe: InputForces, explanation: FittedHypothesis, windows: Windows, sums: ForceSums) -> Array:
+    """Return the mean over each cell of the functions of the inputs, (B, K, k), along the explanation's trajectories."""
+    seen = torch.as_tensor(np.arange(windows.eta.shape[1]) < windows.length[:, None])
+    values = torch.where(seen[..., None], _along(probe, explanation, windows), 0.0).numpy()
+    times = windows.times[:, windows.warmup :].numpy()
+    cell = ForceLaw(np.ones(6), np.ones(6), sums.cell, sums.span).cell_of(times - times[:, :1])
+    total, count = np.zeros((len(values), sums.cells, values.shape[-1])), np.zeros((len(values), sums.cells))
+    window = np.arange(len(values))[:, None]
+    np.add.at(total, (window, cell), values)
+    np.add.at(count, (window, cell), seen.numpy())
+    means = total / np.maximum(count, 1.0)[..., None]
+    for k in range(1, sums.cells):
+        # Where samples are further apart than cells, what was before goes on.
+        means[:, k] = np.where(count[:, k, None] > 0, means[:, k], means[:, k - 1])
+    return means
 
 
-def _names_of(probe: InputForces, windows: Windows, count: int) -> list[str]:
-    """Return the name of every column of the raw inputs; those that stand still have none."""
-    names = [""] * count
-    for name, k in zip(probe.inputs, probe._moving, strict=True):
-        names[k] = name
-    return names
+def _along(probe: InputForces, explanation: FittedHypothesis, windows: Windows) -> Tensor:
+    """Return the functions of the inputs at all samples, (B, L, k)."""
+    around = explanation.around
+    with torch.no_grad():
+        eta, nu = (
+            predict(explanation.fitted.model, windows, explanation.fitted.initial)
+            if around is None
+            else (around[..., :7], around[..., 7:])
+        )
+        return probe.along(windows, eta, nu)

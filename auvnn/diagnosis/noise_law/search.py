@@ -22,11 +22,11 @@ from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.commands.uncertain import in_closed_loop
+from auvnn.diagnosis.noise_law.free_running_cost import free_running_cost, paying
 from auvnn.diagnosis.noise_law.hypothesis import (
     GROUP,
     Hypothesis,
     WithForce,
-    free_running_cost,
     in_newtons,
     judged,
     p_value_of,
@@ -39,7 +39,7 @@ from auvnn.diagnosis.noise_law.likelihood.about_motion import linear_about_its_o
 from auvnn.diagnosis.noise_law.likelihood.estimate_law import estimate
 from auvnn.diagnosis.noise_law.likelihood.law_likelihood import STEPS, Likelihood
 from auvnn.diagnosis.noise_law.likelihood.sums import CELL, ForceSums, force_sums, whole_cells
-from auvnn.diagnosis.noise_law.predicted_by_inputs import predicted_by_inputs
+from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction, predicted_by_inputs
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
@@ -211,7 +211,15 @@ class ForceSearch:
             [under_law.told(h.explanation) for h in tried],
             whole,
             in_newtons(null.estimate.law, null.explanation),
+            self._predicted(current),
         )
+
+    def _predicted(self, found: Hypothesis) -> InputPrediction | None:
+        """Return what measured inputs predict of the force that an explanation leaves; None where that is little."""
+        self.say("asking how much of the force measured inputs predict")
+        about, law = self._about(found.explanation), found.estimate.law
+        told = predicted_by_inputs(found.weighed, about, self._sums(found.explanation), law)
+        return told if told is not None and told.matters else None
 
     def _tested(
         self, current: Hypothesis, remaining: list[str], base: list[str], chosen: list[str]
@@ -250,36 +258,12 @@ class ForceSearch:
         return self._paying(likely, at.current, FURTHER_COST if at.chosen else FIRST_COST)
 
     def _paying(self, likely: Sequence[Hypothesis], current: Hypothesis, share: float) -> list[Hypothesis]:
-        """Return those explanations that cost enough, and those that the data prefer to the likeliest of them.
-
-        A less likely one must not be named because a likelier one that makes free running better costs little: then
-        that one comes first, and the other is asked for again beside it. Effects that the catalogue knows to be confused
-        with the name are compared with it, too. In open loop none is given where a likelier one makes free running
-        worse: what the data prefer and what free running contradicts says that neither can be trusted. In closed loop
-        a right name may make it worse, and how far it moves the predictions counts.
-
-        Args:
-            likely: explanations, the most evident first.
-            current: that without them.
-            share: of the tolerated cost that is enough.
-        """
+        """Return what costs so large a share of the tolerance in free running, and what goes with it."""
         if self.tolerance.strict:
             return list(likely)
         enough = 0.0 if self.ignores_cost else share * self.tolerance.cost
         found = [free_running_cost(h, current, self.log, self.scale) for h in likely]
-        costs = [max(cost) if self.in_closed_loop else cost[0] for cost in found]
-        paying = [k for k, cost in enumerate(costs) if cost > enough]
-        if not paying:
-            return []
-        first = paying[0]
-        if any(
-            c <= 0.0 and h.evidence > likely[first].evidence + ODDS
-            for h, c in zip(likely, costs, strict=True)
-        ):
-            return []
-        good = [k for k in range(len(likely)) if k in paying or (k < first and costs[k] > 0.0)]
-        best = likely[good[0]].name
-        return [h for k, h in enumerate(likely) if k in good or (k > first and confused(h.name, best))]
+        return paying(likely, [max(cost) if self.in_closed_loop else cost[0] for cost in found], enough)
 
     def _takes_up(self, further: Hypothesis, chosen: Sequence[str]) -> bool:
         """Whether a further effect only takes up what the shape of an earlier one gets wrong.
@@ -288,11 +272,8 @@ class ForceSearch:
         named: an effect that the catalogue knows to be confused with an earlier one, and beside which measured inputs
         still predict the force, is no further cause.
         """
-        law = further.estimate.law
-        if law is None or not any(confused(further.name, name) for name in chosen):
-            return False
-        predicted = predicted_by_inputs(further.weighed, self._about(further.explanation, law))
-        return predicted is not None and predicted.matters
+        known = any(confused(further.name, name) for name in chosen)
+        return known and self._predicted(further) is not None
 
 
 def _sure(layout: Layout, found: Hypothesis, at: Round, among: int) -> float:

@@ -36,18 +36,7 @@ class InputForces(Effect):
             model: says how it is driven.
             windows: of the log.
         """
-        rows = slice(windows.warmup, None)
-        given = windows.inputs.rows(windows.warmup)
-        raw = _raw(
-            windows.times[:, rows],
-            windows.eta[..., :3],
-            _euler(windows.eta[..., 3:]),
-            windows.nu,
-            given.command,
-            given.fins,
-            given.voltage,
-            given.altitude,
-        )
+        raw = _raw_of(windows, windows.eta, windows.nu)
         names = _names(model, windows)
         seen = torch.as_tensor(np.arange(raw.shape[1]) < windows.length[:, None])
         values = raw[seen]
@@ -107,6 +96,16 @@ class InputForces(Effect):
         features = self.features(raw)
         return features @ self.theta.to(features).unflatten(0, (6, -1)).mT
 
+    def along(self, windows: Windows, eta: Tensor, nu: Tensor) -> Tensor:
+        """Return the functions of all inputs along trajectories, (B, L, I).
+
+        Args:
+            windows: B of L rows, for their times and what drives the vehicle.
+            eta: position and quaternion, (B, L, 7).
+            nu: velocity, m/s and rad/s, (B, L, 6).
+        """
+        return self.features(_raw_of(windows, eta, nu))
+
     def features(self, raw: Tensor) -> Tensor:
         """Return the functions of all inputs (..., I) side by side."""
         parts = []
@@ -119,6 +118,14 @@ class InputForces(Effect):
                 z = (x - self.kept("mean")[k]) / self.kept("spread")[k]
                 parts += [z, pressed[..., k] if fin else z * z, z.abs() * z]
         return torch.stack(parts, dim=-1)
+
+
+def _raw_of(windows: Windows, eta: Tensor, nu: Tensor) -> Tensor:
+    given = windows.inputs.rows(windows.warmup)
+    return _raw(
+        windows.times[:, windows.warmup :], eta[..., :3], _euler(eta[..., 3:]), nu,
+        given.command, given.fins, given.voltage, given.altitude,
+    )  # fmt: skip
 
 
 def _pressed(velocity: Tensor, raw: Tensor) -> Tensor:

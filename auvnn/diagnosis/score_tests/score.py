@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from auvnn.diagnosis.hypotheses.plausible_sizes import heavy
 from auvnn.diagnosis.hypotheses.stated_priors import DETERMINED, FREE, Layout, priors, scales
 from auvnn.diagnosis.score_tests.few_windows import are_few, freedom
 from auvnn.diagnosis.score_tests.variance_inflation import TINY, inverse_root, share_left, variance_inflation
@@ -215,7 +216,9 @@ def score_from_sums(
     if prior is None:
         centre = np.zeros(len(values))
         statistic = float(np.sum(along**2 / spread))
-        evidence = 0.5 * float(np.sum(along**2 / spread - along**2 / (spread + 1.0) - np.log1p(1.0 / spread)))
+        # What the data know to 1 / spread is likely to be by 1 + spread, with the tail of what is a guess.
+        likely = heavy(along / np.sqrt(spread + 1.0))
+        evidence = 0.5 * float(np.sum(along**2 / spread - likely - np.log1p(1.0 / spread)))
     else:
         # The coefficient counts as missing only beyond what was stated of it.
         mean = layout.means[effect]

@@ -85,6 +85,8 @@ def test_a_step_that_makes_the_values_unlikelier_is_shortened(monkeypatch):
 def test_what_a_step_promises_and_does_not_keep_is_no_evidence(monkeypatch):
     climb = Climb(monkeypatch, lambda x: -abs(x), lambda x: (5.0, 300.0))
     assert climb.settled() == (0.0, 0.0)
+    # No share of it is tried again where the law stays what it was: begun, three shares, and the law asked once more.
+    assert climb.seen == pytest.approx([0.0, 5.0, 1.5, 0.5, 0.0])
 
 
 @pytest.mark.parametrize("kept", [True, False])

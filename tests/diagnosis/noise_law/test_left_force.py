@@ -81,10 +81,12 @@ def test_further_names_after_the_same_ones_stand_where_they_leave_less_than_half
 ):
     def found(effects, share):
         known = np.full(6, 2.0)
+        # Slow before, fast after: of what changes within a second, a fifth of the mean square counts.
+        after = ForceLaw(known * np.sqrt(5.0 * share), np.full(6, 0.1), 0.5, 5.0)
         return SimpleNamespace(
             steps=[{"effects": [n]} for n in effects],
-            estimate=SimpleNamespace(law=SimpleNamespace(rms=known * np.sqrt(share))),
-            first_law=SimpleNamespace(rms=known),
+            estimate=SimpleNamespace(law=after),
+            first_law=ForceLaw(known, np.full(6, 4.0), 0.5, 5.0),
         )
 
     again: Any = found(names, left)

@@ -11,7 +11,8 @@ import pytest
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.noise_law import search
-from auvnn.diagnosis.noise_law.hypothesis import free_running_cost, tied
+from auvnn.diagnosis.noise_law.free_running_cost import free_running_cost
+from auvnn.diagnosis.noise_law.hypothesis import predicts_better, tied
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.metrics.rollouts import roll, scale_of
@@ -192,10 +193,31 @@ def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_ends_the_se
     further, predicted, expected, monkeypatch
 ):
     told = None if predicted is None else InputPrediction("X", "u", 0.5, predicted)
+    asked = Search(windows=None)
     monkeypatch.setattr(search, "predicted_by_inputs", lambda *_: told)
-    monkeypatch.setattr(search, "replace", lambda *_, **__: None)
-    about = SimpleNamespace(around=None)
-    law = SimpleNamespace(
-        estimate=SimpleNamespace(law=object()), weighed=None, name=further, explanation=about
+    monkeypatch.setattr(asked, "say", lambda _: None, raising=False)
+    monkeypatch.setattr(asked, "_about", lambda _: None)
+    monkeypatch.setattr(asked, "_sums", lambda _: None)
+    found = SimpleNamespace(
+        estimate=SimpleNamespace(law=object()), weighed=None, name=further, explanation=None
     )
-    assert Search(windows=None)._takes_up(law, ["thrust_asymmetry"]) is expected  # type: ignore[arg-type]
+    assert asked._takes_up(found, ["thrust_asymmetry"]) is expected  # type: ignore[arg-type]
+
+
+def test_runs_left_out_are_predicted_better_in_the_mean_or_in_most_windows(monkeypatch):
+    random = np.random.default_rng(0)
+
+    def better(gain, least=1.0):
+        monkeypatch.setattr("auvnn.diagnosis.noise_law.hypothesis.gain_by_window", lambda *_: gain)
+        nothing = SimpleNamespace(weighed=None)
+        return predicts_better(nothing, nothing, least)  # type: ignore[arg-type]
+
+    # An effect in few windows, and one in most of them whose mean three windows decide in which sensors are wrong.
+    few = np.concatenate([0.1 * random.normal(size=90), 30.0 + random.normal(size=10)])
+    most = np.concatenate([20.0 + 15.0 * random.normal(size=90), [-1700.0, -1500.0, -700.0]])
+    assert better(few) and better(few, 2.0) and better(most) and better(most, 2.0)
+    assert most.sum() < np.sqrt(len(most)) * most.std(ddof=1)
+    # Of what explains nothing one in a thousand does by its ranks.
+    worse = [better(random.normal(size=100) - 0.1, 3.0) for _ in range(200)]
+    assert sum(worse) <= 2
+    assert not better(np.zeros(50)) and not better(np.full(50, np.nan))

@@ -1,0 +1,80 @@
+"""What a name costs in free running, and which explanations cost enough to be named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
+from auvnn.diagnosis.selection.model_comparison import ODDS, confused
+from auvnn.logs import Log
+from auvnn.metrics.rollouts import Rolled, Scale, roll
+from auvnn.metrics.windows import VELOCITY
+
+Array = NDArray[np.float64]
+HORIZON = "5"
+
+
+def free_running_cost(after: Hypothesis, before: Hypothesis, log: Log, scale: Scale) -> tuple[float, float]:
+    """Return what a name costs in free running over 5 s: by the errors, and by how far predictions move.
+
+    The first is by what share the error is larger before than after. Under a controller the commands answer the force, so
+    that the error of free running is least at wrong values, and a right name may make it larger. The second is what the
+    first would be if the force were independent of the commands: sqrt(1 + d^2) - 1, with d the change of the predictions
+    over the error that is left.
+
+    Args:
+        after: hypothesis with a name more.
+        before: hypothesis without it.
+        log: on which both run freely.
+        scale: of the errors, as `rollouts.scale_of` has it.
+    """
+    rolled = [
+        roll(h.explanation.fitted.model.without_absent(h.explanation.effects), log, HORIZON, scale)
+        for h in (before, after)
+    ]
+    first, last = rolled
+    if first is None or last is None:
+        return float("inf"), float("inf")
+    errors = [r.total(scale) for r in (first, last)]
+    cost = errors[0] / errors[1] - 1.0 if np.isfinite(errors[1]) and errors[1] > 0.0 else -1.0
+    change = replace(last, squared=_moved(first.predicted, last)).total(scale)
+    away = change / errors[1] if errors[1] > 0.0 else float("inf")
+    return cost, float(np.sqrt(1.0 + away**2) - 1.0) if np.isfinite(away) else 0.0
+
+
+def _moved(before: Array, last: Rolled) -> Array:
+    """Return the sum of squared changes of what was predicted, (B, 6), zero where a window diverged."""
+    mask = last.windows.mask[..., VELOCITY].numpy().copy()
+    mask[:, 0] = 0.0
+    return (np.nan_to_num(last.predicted - before) ** 2 * mask).sum(1)
+
+
+def paying(likely: Sequence[Hypothesis], costs: Sequence[float], enough: float) -> list[Hypothesis]:
+    """Return those explanations that cost enough, and those that the data prefer to the likeliest of them.
+
+    A less likely one must not be named because a likelier one that makes free running better costs little: then
+    that one comes first, and the other is asked for again beside it. Effects that the catalogue knows to be confused
+    with the name are compared with it, too. In open loop none is given where a likelier one makes free running
+    worse: what the data prefer and what free running contradicts says that neither can be trusted. In closed loop
+    a right name may make it worse, and how far it moves the predictions counts.
+
+    Args:
+        likely: explanations, the most evident first.
+        costs: of each of them.
+        enough: the cost that is enough.
+    """
+    paid = [k for k, cost in enumerate(costs) if cost > enough]
+    if not paid:
+        return []
+    first = paid[0]
+    if any(
+        c <= 0.0 and h.evidence > likely[first].evidence + ODDS for h, c in zip(likely, costs, strict=True)
+    ):
+        return []
+    good = [k for k in range(len(likely)) if k in paid or (k < first and costs[k] > 0.0)]
+    best = likely[good[0]].name
+    return [h for k, h in enumerate(likely) if k in good or (k > first and confused(h.name, best))]
