@@ -1,9 +1,9 @@
 """How much of a force the measured inputs predict: that part is not stochastic.
 
 A force that is a simple function of one measured input (`InputForces`) is asked for in every degree of freedom, beside
-the stochastic one: its mean over the cells of the law is known but for its size. Windows are conditional on those before
-them, so that a slow force that looks like an input by chance does not count anew in each. The input is taken whose gain
-on runs left out is surest, and its mean square is compared with that of the force.
+the stochastic one: its course over the cells of the law is known but for its size. Windows are conditional on those
+before them, so that a slow force that looks like an input by chance does not count anew in each. Of inputs whose gain on
+runs left out is sure, those that gain most are taken, and the law is estimated again with each of them in the model.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out
+from auvnn.diagnosis.noise_law.likelihood.estimate_law import estimate
 from auvnn.diagnosis.noise_law.likelihood.known_forces import with_known_forces
 from auvnn.diagnosis.noise_law.likelihood.law_likelihood import Likelihood
-from auvnn.diagnosis.noise_law.likelihood.sums import ForceSums
-from auvnn.diagnosis.residuals.input_forces import AXES, InputForces
+from auvnn.diagnosis.noise_law.likelihood.sums import SAME_MOMENT, ForceSums
+from auvnn.diagnosis.residuals.input_forces import ANGLES, AXES, InputForces
 from auvnn.estimation.window_sums.statistics import Statistics
-from auvnn.metrics.force_law import ForceLaw, covariance_of_means
+from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.free_run import predict
 from auvnn.metrics.windows import Windows
 
@@ -30,6 +31,10 @@ Array = NDArray[np.float64]
 PREDICTABLE = 0.1
 # Standard errors of a gain on runs left out, below which it may be chance; many inputs are asked.
 SURE = 3.0
+# What answers a force whatever moves the vehicle.
+MOTION = (*"uvwpqr", *ANGLES, *"xyz", "altitude")
+# Inputs with each of which the law is estimated again, and the steps of that.
+LOOKED, STEPS = 3, 10
 # One-sided 95 per cent.
 LIMIT = 1.645
 
@@ -42,7 +47,7 @@ class InputPrediction:
         axis: "X" to "N".
         input: name.
         share: of the force's mean square.
-        least: lower 95 % limit of the share; zero where the gain on runs left out may be chance.
+        least: lower 95 % limit of the share; zero where every gain on runs left out may be chance.
         gain: fall of the weighted squared error on what is left out.
     """
 
@@ -59,74 +64,53 @@ class InputPrediction:
 
 
 def predicted_by_inputs(
-    explanation: FittedHypothesis, windows: Windows, sums: ForceSums, law: ForceLaw | None
+    explanation: FittedHypothesis,
+    windows: Windows,
+    sums: ForceSums,
+    law: ForceLaw | None,
+    *,
+    closed_loop: bool = False,
 ) -> InputPrediction | None:
     """Return the largest share that is predicted, None where there is no stochastic force.
+
+    The share's limit has the relative uncertainty of the gain.
 
     Args:
         explanation: the fit under the law.
         windows: without a law.
         sums: of these windows at the fit.
         law: of the force that is left.
+        closed_loop: whether commands answer the motion.
     """
     if law is None or not law.axes:
         return None
     probe = InputForces(explanation.fitted.model, windows)
-    courses = _courses(probe, explanation, windows, sums)
+    courses = _courses(probe, explanation, windows, sums, closed_loop)
     known, each = len(explanation.fitted.theta), courses.shape[-1]
     scale = np.array([p.scale for p in probe.parameters_of]).reshape(6, each)
-    fold, best = folds(windows.run), None
+    fold = folds(windows.run)
+    surest: list[tuple[float, float, int, str]] = []
     for i in law.axes:
         whole = Likelihood(with_known_forces(sums, i, courses, scale[i])).by_window(law).finite()
         before = _left(whole, list(range(known)), explanation, scale[i, :0], fold)
-        mean = float(covariance_of_means(1, sums.cell, torch.tensor(float(law.time[i]))))
         for name, place in probe.inputs.items():
-            if name == "t":
-                continue
             own = np.arange(each)[place]
-            size = scale[i, own]
             columns = [*range(known), *(known + own)]
-            gain = before - _left(whole, columns, explanation, size, fold)
+            gain = before - _left(whole, columns, explanation, scale[i, own], fold)
             z = float(gain.sum()) / max(float(np.sqrt(len(gain)) * gain.std(ddof=1)), 1e-300)
-            features = courses[..., own].reshape(-1, len(own))
-            found = _share(whole, columns, explanation, size, features, float(law.rms[i]) * mean**0.5)
-            least = found[1] if z > SURE else 0.0
-            predicted = InputPrediction(AXES[i], name, found[0], least, float(gain.sum()))
-            if best is None or (predicted.least, predicted.share) > (best.least, best.share):
-                best = predicted
+            if z > SURE and name != "t":
+                surest.append((float(gain.sum()), z, i, name))
+    best = InputPrediction(AXES[law.axes[0]], next(iter(probe.inputs)), 0.0, 0.0)
+    for gain, z, i, name in sorted(surest, reverse=True)[:LOOKED]:
+        own = np.arange(each)[probe.inputs[name]]
+        beside = with_known_forces(sums, i, courses[..., own], scale[i, own])
+        left = estimate(Likelihood(beside), law, law.axes, STEPS).law
+        # What is left of the force says how much was predicted: parameters of the model that take the opposite force
+        # upon them leave much of it, however large the part that the input has.
+        share = 1.0 if left is None else max(1.0 - float(left.rms[i] / law.rms[i]) ** 2, 0.0)
+        predicted = InputPrediction(AXES[i], name, share, share * max(1.0 - LIMIT / z, 0.0), gain)
+        best = max(best, predicted, key=lambda p: (p.least, p.share))
     return best
-
-
-def _share(
-    sums: Statistics,
-    columns: list[int],
-    explanation: FittedHypothesis,
-    size: Array,
-    features: Array,
-    rms: float,
-) -> tuple[float, float]:
-    """Return the share of the mean square that a force of some features has, and its lower limit."""
-    fitted, known = explanation.fitted, len(explanation.fitted.theta)
-    some = sums.columns(columns)
-    held = fitted.priors.extended_by(size**-2.0)
-    square = some.total + held.square
-    unit = 1.0 / np.sqrt(np.maximum(np.diag(square), 1e-300))
-    square = square * unit[:, None] * unit
-    covariance = np.linalg.pinv(square, hermitian=True) * unit[:, None] * unit
-    pull = held.pull(np.concatenate([fitted.theta, np.zeros(len(size))]))
-    step = (covariance @ (some.slope.sum(0) - pull))[known:]
-    spread = covariance[known:, known:]
-    gram = np.cov(features.T).reshape(len(size), len(size))
-    inside = gram @ spread
-    mean_square = float(step @ gram @ step) - float(np.trace(inside))
-    error = np.sqrt(
-        max(4.0 * float(step @ gram @ spread @ gram @ step) + 2.0 * float(np.trace(inside @ inside)), 0.0)
-    )
-    least = max(mean_square - LIMIT * error, 0.0)
-    mean_square = max(mean_square, 0.0)
-    # The law was estimated without the known force, which is in its mean square.
-    whole = max(mean_square, rms**2, 1e-300)
-    return mean_square / whole, least / whole
 
 
 def _left(
@@ -137,20 +121,33 @@ def _left(
     return left_out(sums.columns(columns), np.concatenate([fitted.theta, np.zeros(len(size))]), held, fold)
 
 
-def _courses(probe: InputForces, explanation: FittedHypothesis, windows: Windows, sums: ForceSums) -> Array:
-    """Return the mean over each cell of the functions of the inputs, (B, K, k), along the explanation's trajectories."""
-    seen = torch.as_tensor(np.arange(windows.eta.shape[1]) < windows.length[:, None])
-    values = torch.where(seen[..., None], _along(probe, explanation, windows), 0.0).numpy()
+def _courses(
+    probe: InputForces, explanation: FittedHypothesis, windows: Windows, sums: ForceSums, answers: bool
+) -> Array:
+    """Return what the functions of the inputs are in each cell, (B, K, k), along the explanation's trajectories.
+
+    The motion answers the force: what it was as a cell begins is known before the force in that cell acts, and says
+    nothing of it where it is stochastic. So do commands where a controller makes them; of others the mean over the cell
+    counts.
+    """
+    seen = np.arange(windows.eta.shape[1]) < windows.length[:, None]
+    values = np.where(seen[..., None], _along(probe, explanation, windows).numpy(), 0.0)
     times = windows.times[:, windows.warmup :].numpy()
-    cell = ForceLaw(np.ones(6), np.ones(6), sums.cell, sums.span).cell_of(times - times[:, :1])
-    total, count = np.zeros((len(values), sums.cells, values.shape[-1])), np.zeros((len(values), sums.cells))
-    window = np.arange(len(values))[:, None]
+    since = np.where(seen, times - times[:, :1], np.inf)
+    window, begins = np.arange(len(values))[:, None], sums.cell * np.arange(sums.cells)
+    last = (since[:, None] <= begins[:, None] + SAME_MOMENT).sum(-1) - 1
+    first = values[window, last]
+    if answers:
+        return first
+    cell = np.minimum((since / sums.cell + SAME_MOMENT), sums.cells - 1.0).astype(np.int64)
+    total, count = np.zeros_like(first), np.zeros(first.shape[:2])
     np.add.at(total, (window, cell), values)
-    np.add.at(count, (window, cell), seen.numpy())
-    means = total / np.maximum(count, 1.0)[..., None]
-    for k in range(1, sums.cells):
-        # Where samples are further apart than cells, what was before goes on.
-        means[:, k] = np.where(count[:, k, None] > 0, means[:, k], means[:, k - 1])
+    np.add.at(count, (window, cell), seen)
+    # Where samples are further apart than cells, what was before goes on.
+    means = np.where(count[..., None] > 0, total / np.maximum(count, 1.0)[..., None], first)
+    for name, place in probe.inputs.items():
+        if name in MOTION:
+            means[..., place] = first[..., place]
     return means
 
 

@@ -218,7 +218,8 @@ class ForceSearch:
         """Return what measured inputs predict of the force that an explanation leaves; None where that is little."""
         self.say("asking how much of the force measured inputs predict")
         about, law = self._about(found.explanation), found.estimate.law
-        told = predicted_by_inputs(found.weighed, about, self._sums(found.explanation), law)
+        sums, closed = self._sums(found.explanation), self.in_closed_loop
+        told = predicted_by_inputs(found.weighed, about, sums, law, closed_loop=closed)
         return told if told is not None and told.matters else None
 
     def _tested(

@@ -193,8 +193,8 @@ def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_ends_the_se
     further, predicted, expected, monkeypatch
 ):
     told = None if predicted is None else InputPrediction("X", "u", 0.5, predicted)
-    asked = Search(windows=None)
-    monkeypatch.setattr(search, "predicted_by_inputs", lambda *_: told)
+    asked = Search(windows=None, in_closed_loop=True)
+    monkeypatch.setattr(search, "predicted_by_inputs", lambda *_, **__: told)
     monkeypatch.setattr(asked, "say", lambda _: None, raising=False)
     monkeypatch.setattr(asked, "_about", lambda _: None)
     monkeypatch.setattr(asked, "_sums", lambda _: None)
