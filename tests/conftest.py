@@ -18,9 +18,10 @@ if "AUVNN_CACHE" not in os.environ:
     os.environ["AUVNN_CACHE"] = KERNELS.name
 
 import pytest
-import torch
 
-torch.set_num_threads(1)
+from auvnn.threads import beside_others
+
+beside_others()
 
 from auvnn.effects import EFFECTS  # noqa: E402
 from auvnn.report import page, style  # noqa: E402
