@@ -47,7 +47,7 @@ class InputPrediction:
         axis: "X" to "N".
         input: name.
         share: of the force's mean square.
-        least: lower 95 % limit of the share; zero where every gain on runs left out may be chance.
+        least: lower 95 % limit of the share.
         gain: fall of the weighted squared error on what is left out.
     """
 
@@ -71,7 +71,7 @@ def predicted_by_inputs(
     *,
     closed_loop: bool = False,
 ) -> InputPrediction | None:
-    """Return the largest share that is predicted, None where there is no stochastic force.
+    """Return the largest share that is predicted; None where no input surely predicts any, or there is no force.
 
     The share's limit has the relative uncertainty of the gain.
 
@@ -100,7 +100,7 @@ def predicted_by_inputs(
             z = float(gain.sum()) / max(float(np.sqrt(len(gain)) * gain.std(ddof=1)), 1e-300)
             if z > SURE and name != "t":
                 surest.append((float(gain.sum()), z, i, name))
-    best = InputPrediction(AXES[law.axes[0]], next(iter(probe.inputs)), 0.0, 0.0)
+    best: InputPrediction | None = None
     for gain, z, i, name in sorted(surest, reverse=True)[:LOOKED]:
         own = np.arange(each)[probe.inputs[name]]
         beside = with_known_forces(sums, i, courses[..., own], scale[i, own])
@@ -109,7 +109,8 @@ def predicted_by_inputs(
         # upon them leave much of it, however large the part that the input has.
         share = 1.0 if left is None else max(1.0 - float(left.rms[i] / law.rms[i]) ** 2, 0.0)
         predicted = InputPrediction(AXES[i], name, share, share * max(1.0 - LIMIT / z, 0.0), gain)
-        best = max(best, predicted, key=lambda p: (p.least, p.share))
+        if best is None or (predicted.least, predicted.share) > (best.least, best.share):
+            best = predicted
     return best
 
 

@@ -116,8 +116,8 @@ def test_a_force_of_no_input_is_not_predicted(seed, rms, time, drive):
     # A correlation time of five windows looks like some input in each of them by chance; a force of a second moves the
     # vehicle, so that the motion later in a cell tells of it.
     found, _, law = asked(0.0, rms, seed, time, drive)
-    assert law is not None and found is not None
-    assert not found.matters
+    assert law is not None
+    assert found is None or not found.matters
 
 
 def test_without_a_force_nothing_is_predicted():
