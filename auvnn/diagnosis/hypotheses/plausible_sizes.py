@@ -56,7 +56,7 @@ def departure(layout: Layout, names: Sequence[str], effects: Sequence[str], thet
     away = (theta - means) / sizes_of(layout, names, effects)
     root = correlation_root(layout, names, effects)
     if root is not None:
-        away = np.linalg.solve(root, away)
+        away = np.asarray(np.linalg.solve(root, away), dtype=np.float64)
     # Where it begins and how often it swings is as likely in one place as in another.
     away[np.concatenate([np.zeros(0, dtype=bool), *(shapes(layout, n) for n in names)])] = 0.0
     asked = [np.full(len(layout.means[n]), n in effects) for n in names]

@@ -216,4 +216,4 @@ def predicts_better(after: Hypothesis, before: Hypothesis, least: float) -> bool
     if float(gain.sum()) > least * float(np.sqrt(len(gain)) * gain.std(ddof=1)):
         return True
     finite = bool(np.isfinite(gain).all()) and bool((gain != 0.0).any())
-    return finite and float(wilcoxon(gain, alternative="greater").pvalue) < ALPHA_RANKS
+    return finite and float(np.asarray(wilcoxon(gain, alternative="greater"))[1]) < ALPHA_RANKS
