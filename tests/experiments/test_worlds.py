@@ -24,6 +24,7 @@ SAMPLES = {
     "rows-5.jsonl": 4,
     "rows-6.jsonl": 5,
     "rows-7.jsonl": 6,
+    "rows-8.jsonl": 7,
 }
 
 
