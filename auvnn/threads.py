@@ -5,9 +5,9 @@ that others use too it costs a great deal, because threads wait for one another 
 interface run on one thread, and give back whatever setting they found. Large work is spread over processes (`workers=`).
 Whoever sets OMP_NUM_THREADS has decided: nothing is changed then.
 
-What is independent, such as the fits of several effects, may run side by side on threads of its own (`side_by_side`):
-tensor operations leave the interpreter free for one another. Processes of ours that work beside others say so with
-`beside_others`, and then nothing runs side by side in them.
+What is independent and small, such as the fits of several effects beside a stochastic force, may run side by side on
+threads of its own (`side_by_side`): tensor operations leave the interpreter free for one another. Processes of ours that
+work beside others say so with `beside_others`, and then nothing runs side by side in them.
 """
 
 from __future__ import annotations

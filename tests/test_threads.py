@@ -13,10 +13,12 @@ from threadpoolctl import threadpool_info
 
 from auvnn import threads
 from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.noise_law.leader_fits import LeaderFits
 from auvnn.models import GreyBox
 from auvnn.threads import on_one_thread, one_thread, processors, side_by_side, sleep_when_idle
 from tests.cli.stand_ins import ENVIRONMENT
-from tests.small_logs import make_log, small_vehicle
+from tests.diagnosis.noise_law.wandering import wandering_log
+from tests.small_logs import small_vehicle
 
 
 @pytest.fixture(autouse=True)
@@ -163,10 +165,19 @@ def test_how_many_compute_side_by_side(monkeypatch):
 
 
 def test_a_diagnosis_says_the_same_on_two_threads(monkeypatch):
-    model = GreyBox(small_vehicle())
-    log = make_log(model.with_effects({"net_buoyancy": {"force": 8.0}}), noise=1.0, duration=30.0)
+    model, members = GreyBox(small_vehicle()), []
+    log = wandering_log(model.with_effects({"net_buoyancy": {"force": 8.0}}), 2.0, 1.0, runs=2, duration=20.0)
     found = []
+    fit = LeaderFits._one
+
+    def followed(fits, name, *given):
+        members.append(threading.current_thread() is threading.main_thread())
+        return fit(fits, name, *given)
+
+    monkeypatch.setattr(LeaderFits, "_one", followed)
     for count in (1, 2):
         monkeypatch.setattr(threads, "processors", lambda *_, n=count: n)
-        found.append(diagnose(model, log, advice=False, costs=False, whiteness=False).to_dict())
-    assert found[0] == found[1] and found[0]["missing"] == ["net_buoyancy"]
+        asked = ["net_buoyancy", "constant_force", "biofouling"]
+        found.append(diagnose(model, log, asked, advice=False, costs=False, whiteness=False).to_dict())
+    assert True in members and False in members
+    assert found[0] == found[1] and "net_buoyancy" in found[0]["missing"]

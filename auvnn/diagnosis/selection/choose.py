@@ -22,7 +22,6 @@ from auvnn.diagnosis.selection.prune import Pruning
 from auvnn.effects import effect_class
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
-from auvnn.threads import side_by_side
 
 Array = NDArray[np.float64]
 ALPHA = 0.05
@@ -97,18 +96,15 @@ class Chooser(Pruning):
         # Evidence counts an effect of many parameters low while it is small; a test that is clear even among
         # all the others lets it be judged by what it does on runs left out.
         clear = {s.effect for s in significant if s.p_value < ALPHA / len(scores)}
-
-        def fitted(candidate: Score) -> FittedHypothesis | str:
+        tried, failed = [], {}
+        for candidate in leading:
             try:
-                return self._refitted(candidate, at, base, chosen, current)
+                tried.append(self._refitted(candidate, at, base, chosen, current))
             except (FitError, np.linalg.LinAlgError) as problem:
-                return f"its fit failed: {problem}"
-
-        each = dict(zip([c.effect for c in leading], side_by_side(fitted, leading), strict=True))
-        failed = {n: e for n, e in each.items() if isinstance(e, str)}
-        tried = [e for e in each.values() if not isinstance(e, str)]
-        more = side_by_side(fitted, self._beyond_slopes(tried, significant, current))
-        tried += [e for e in more if not isinstance(e, str)]
+                failed[candidate.effect] = f"its fit failed: {problem}"
+        for candidate in self._beyond_slopes(tried, significant, current):
+            with suppress(FitError, np.linalg.LinAlgError):
+                tried.append(self._refitted(candidate, at, base, chosen, current))
         found = self._among(tried, clear, at, base, current)
         return replace(found, failed=failed)
 
