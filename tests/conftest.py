@@ -18,10 +18,9 @@ if "AUVNN_CACHE" not in os.environ:
     os.environ["AUVNN_CACHE"] = KERNELS.name
 
 import pytest
+import torch
 
-from auvnn.threads import beside_others
-
-beside_others()
+torch.set_num_threads(1)
 
 from auvnn.effects import EFFECTS  # noqa: E402
 from auvnn.report import page, style  # noqa: E402

@@ -4,21 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import threading
 
-import numpy as np
 import pytest
 import torch
 from threadpoolctl import threadpool_info
 
-from auvnn import threads
-from auvnn.diagnosis import diagnose
-from auvnn.diagnosis.noise_law.leader_fits import LeaderFits
-from auvnn.models import GreyBox
-from auvnn.threads import on_one_thread, one_thread, processors, side_by_side, sleep_when_idle
+from auvnn.threads import on_one_thread, one_thread, sleep_when_idle
 from tests.cli.stand_ins import ENVIRONMENT
-from tests.diagnosis.noise_law.wandering import wandering_log
-from tests.small_logs import small_vehicle
 
 
 @pytest.fixture(autouse=True)
@@ -117,67 +109,3 @@ def test_every_call_that_computes_runs_on_one_thread_and_gives_the_setting_back(
         call(*given)
     assert probe.threads == [(1, {1})]
     assert torch.get_num_threads() == 2 and pools() == before
-
-
-@pytest.fixture
-def two(monkeypatch):
-    """Nobody else computes on this machine, which has two processors."""
-    monkeypatch.setattr(threads, "processors", lambda *_: 2)
-
-
-def test_items_are_worked_on_at_the_same_time_and_come_back_in_order(two):
-    both = threading.Barrier(2, timeout=30.0)
-
-    def one(item):
-        both.wait()
-        return item, threading.get_ident()
-
-    found = side_by_side(one, [3, 1])
-    assert [item for item, _ in found] == [3, 1] and len({thread for _, thread in found}) == 2
-    assert side_by_side(one, []) == []
-
-
-def test_what_holds_for_a_time_holds_side_by_side_too(two):
-    def one(_):
-        return np.geterr()["divide"], torch.is_grad_enabled()
-
-    with np.errstate(divide="raise"), torch.no_grad():
-        assert side_by_side(one, range(3)) == [("raise", False)] * 3
-    assert side_by_side(one, range(2))[0][1]
-
-
-def test_the_first_error_is_raised(two):
-    def one(item):
-        if item:
-            raise ValueError(str(item))
-
-    with pytest.raises(ValueError, match="1"):
-        side_by_side(one, [0, 1, 2])
-
-
-def test_how_many_compute_side_by_side(monkeypatch):
-    monkeypatch.setattr(threads._Place, "shared", False)
-    assert [processors({"OMP_NUM_THREADS": n}) for n in ("1", "3", "99", "2,4", "many")] == [1, 3, 4, 2, 1]
-    monkeypatch.setattr("os.sched_getaffinity", lambda _: range(3), raising=False)
-    assert processors({}) == 3
-    threads.beside_others()
-    assert processors({}) == processors({"OMP_NUM_THREADS": "3"}) == 1
-
-
-def test_a_diagnosis_says_the_same_on_two_threads(monkeypatch):
-    model, members = GreyBox(small_vehicle()), []
-    log = wandering_log(model.with_effects({"net_buoyancy": {"force": 8.0}}), 2.0, 1.0, runs=2, duration=20.0)
-    found = []
-    fit = LeaderFits._one
-
-    def followed(fits, name, *given):
-        members.append(threading.current_thread() is threading.main_thread())
-        return fit(fits, name, *given)
-
-    monkeypatch.setattr(LeaderFits, "_one", followed)
-    for count in (1, 2):
-        monkeypatch.setattr(threads, "processors", lambda *_, n=count: n)
-        asked = ["net_buoyancy", "constant_force", "biofouling"]
-        found.append(diagnose(model, log, asked, advice=False, costs=False, whiteness=False).to_dict())
-    assert True in members and False in members
-    assert found[0] == found[1] and "net_buoyancy" in found[0]["missing"]

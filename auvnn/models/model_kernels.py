@@ -5,7 +5,6 @@ from __future__ import annotations
 import weakref
 from dataclasses import dataclass, field
 from functools import lru_cache
-from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import torch
@@ -67,7 +66,6 @@ _MADE: weakref.WeakKeyDictionary[nn.Module, dict[Any, _Made]] = weakref.WeakKeyD
 
 
 _KERNELS: dict[str, Kernel] = {}
-_LOCK = Lock()
 
 
 _MOST = 64
@@ -145,14 +143,12 @@ def _traced(
     plain = trace(side, layout, numbers, one, False)
     joint = trace(side, layout, numbers, one, True) if gradient else None
     source = write(layout, (plain, joint), _attitude(), tableau)
-    # Models of several threads may be traced at the same time.
-    with _LOCK:
-        kernel = _KERNELS.get(source)
-        if kernel is None:
-            places = [place for place, _ in joint.parameter_gradient] if joint else []
-            kernel = _KERNELS[source] = Kernel(source, layout, places, gradient)
-            while len(_KERNELS) > _MOST:
-                _KERNELS.pop(next(iter(_KERNELS)))
+    kernel = _KERNELS.get(source)
+    if kernel is None:
+        places = [place for place, _ in joint.parameter_gradient] if joint else []
+        kernel = _KERNELS[source] = Kernel(source, layout, places, gradient)
+        while len(_KERNELS) > _MOST:
+            _KERNELS.pop(next(iter(_KERNELS)))
     return kernel, numbers.fixed()
 
 

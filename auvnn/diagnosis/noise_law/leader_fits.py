@@ -16,7 +16,6 @@ from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
 from auvnn.diagnosis.noise_law.leaders import rivals_of
 from auvnn.diagnosis.score_tests.null_tests import Tested
 from auvnn.estimation.priors import parameters_of, set_parameters
-from auvnn.threads import side_by_side
 
 Array = NDArray[np.float64]
 # Fitted in full beside those that the first search has fitted: so many of those that lead under the law, and so many more
@@ -118,12 +117,13 @@ class LeaderFits:
     def _each(
         self, names: Iterable[str], at: Round, known: Mapping[str, FittedHypothesis] | None = None
     ) -> list[Hypothesis]:
-        keys = [(id(at.current), name) for name in names]
-        new = [key for key in dict.fromkeys(keys) if key not in self.known]
-        fitted = side_by_side(lambda key: self._one(key[1], at, (known or {}).get(key[1])), new)
-        # The explanation is kept with what was fitted: no other one can have its place then.
-        self.known.update({key: (at.current, one) for key, one in zip(new, fitted, strict=True)})
-        found = [self.known[key][1] for key in keys]
+        found = []
+        for name in names:
+            key = id(at.current), name
+            # The explanation is kept with what was fitted: no other one can have its place then.
+            if key not in self.known:
+                self.known[key] = at.current, self._one(name, at, (known or {}).get(name))
+            found.append(self.known[key][1])
         return [h for h in found if h is not None]
 
     def _one(self, name: str, at: Round, known: FittedHypothesis | None) -> Hypothesis | None:

@@ -49,7 +49,6 @@ from auvnn.metrics.force_law import ForceLaw, cell_for
 from auvnn.metrics.rollouts import scale_of
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.threads import side_by_side
 
 Array = NDArray[np.float64]
 # A name is given where chance would seldom do as well among all effects that were asked for; a further one on
@@ -209,7 +208,7 @@ class ForceSearch:
             under_law.told(current.explanation),
             self._about(current.explanation, law),
             replace(current.estimate, law=in_newtons(law, current.explanation)),
-            side_by_side(under_law.told, [h.explanation for h in tried]),
+            [under_law.told(h.explanation) for h in tried],
             whole,
             in_newtons(null.estimate.law, null.explanation),
             self._predicted(current),

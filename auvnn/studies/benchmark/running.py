@@ -11,7 +11,6 @@ from multiprocessing import get_context
 from typing import Any
 
 from auvnn.studies.benchmark.cases import Case
-from auvnn.threads import beside_others
 
 # How often a log may take its process with it before that is its outcome.
 DEATHS = 2
@@ -61,8 +60,7 @@ def _pool(batch: Sequence[Case], size: int, run: Runner) -> Iterator[tuple[Case,
     """Yield case and row until all are done or a process dies; None for a case that was under way then."""
     before = set(multiprocessing.active_children())
     # Spawned, not forked: torch's threads do not survive a fork.
-    aside = beside_others if size > 1 else None
-    pool = ProcessPoolExecutor(size, mp_context=get_context("spawn"), initializer=aside)
+    pool = ProcessPoolExecutor(size, mp_context=get_context("spawn"))
     under_way: dict[Future, Case] = {}
     rest = iter(batch)
     broken = False

@@ -124,9 +124,7 @@ class Pool:
 
 def test_a_log_that_kills_its_process_is_a_fault_and_the_others_are_done(todo, monkeypatch):
     log: list[list[Case]] = []
-    monkeypatch.setattr(
-        running, "ProcessPoolExecutor", lambda size, mp_context, initializer: Pool({todo[1]}, log)
-    )
+    monkeypatch.setattr(running, "ProcessPoolExecutor", lambda size, mp_context: Pool({todo[1]}, log))
     rows = {Case.of_row(row): row for row in run_all(todo, 2, answered)}
     assert set(rows) == set(todo)
     assert [c for c in todo if rows[c]["verdict"] == "fault"] == [todo[1]]
@@ -137,7 +135,7 @@ def test_a_log_that_kills_its_process_is_a_fault_and_the_others_are_done(todo, m
 
 
 def test_an_error_of_the_program_in_the_pool_is_not_swallowed(todo, monkeypatch):
-    monkeypatch.setattr(running, "ProcessPoolExecutor", lambda size, mp_context, initializer: Pool(set(), []))
+    monkeypatch.setattr(running, "ProcessPoolExecutor", lambda size, mp_context: Pool(set(), []))
 
     def broken(case: Case) -> dict[str, Any]:
         raise ZeroDivisionError
