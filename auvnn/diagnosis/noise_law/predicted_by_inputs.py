@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 PREDICTABLE = 0.1
 # Standard errors of a gain on runs left out, below which it may be chance; many inputs are asked.
 SURE = 3.0
-# What answers a force whatever moves the vehicle.
+# Measured motion: it answers the force, in open loop too.
 MOTION = (*"uvwpqr", *ANGLES, *"xyz", "altitude")
 # Inputs with each of which the law is estimated again, and the steps of that.
 LOOKED, STEPS = 3, 10

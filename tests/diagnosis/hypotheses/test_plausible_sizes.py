@@ -10,6 +10,7 @@ from scipy.stats import t
 
 from auvnn.diagnosis.hypotheses.plausible_sizes import departure, heavy, sizes_of
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.score_tests.score import score_from_sums
 from auvnn.models import GreyBox
 from tests.small_logs import small_vehicle
 
@@ -45,3 +46,14 @@ def test_what_is_stated_stays_normal_and_what_is_asked_for_has_the_tail():
     free = float(heavy((far - theta) / asked).sum())
     assert departure(layout, names, names, far) == pytest.approx(free)
     assert departure(layout, [], [], np.zeros(0)) == 0.0
+
+
+def test_the_evidence_of_a_test_has_the_tail_too():
+    layout = lay_out(GreyBox(small_vehicle()), ["net_buoyancy"])
+    scale = float(layout.described("net_buoyancy")[0].scale)
+    known, away = 1e4, 20.0
+    found = score_from_sums(
+        layout, "net_buoyancy", np.array([away * known / scale]), np.array([[known / scale**2]]), lambda *_: 1.0, 400
+    )  # fmt: skip
+    likely = float(heavy(np.array([away / np.sqrt(1.0 + 1.0 / known)]))[0])
+    assert found.evidence == pytest.approx(0.5 * (away**2 * known - likely - np.log1p(known)))

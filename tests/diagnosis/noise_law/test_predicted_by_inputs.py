@@ -15,7 +15,8 @@ from auvnn.diagnosis.noise_law.likelihood.estimate_law import estimate
 from auvnn.diagnosis.noise_law.likelihood.known_forces import with_known_forces
 from auvnn.diagnosis.noise_law.likelihood.law_likelihood import Likelihood
 from auvnn.diagnosis.noise_law.likelihood.sums import force_sums
-from auvnn.diagnosis.noise_law.predicted_by_inputs import predicted_by_inputs
+from auvnn.diagnosis.noise_law.predicted_by_inputs import _courses, predicted_by_inputs
+from auvnn.diagnosis.residuals.input_forces import InputForces
 from auvnn.effects import Body, Effect, Moment, Parameter
 from auvnn.logs import Log
 from auvnn.metrics.force_law import ForceLaw
@@ -118,6 +119,21 @@ def test_a_force_of_no_input_is_not_predicted(seed, rms, time, drive):
     found, _, law = asked(0.0, rms, seed, time, drive)
     assert law is not None
     assert found is None or not found.matters
+
+
+def test_of_commands_the_mean_over_a_cell_counts_and_in_closed_loop_what_they_were_before():
+    model = GreyBox(small_vehicle())
+    first, windows = about_the_measured(model, make_log(model, runs=1, duration=20.0))
+    sums = force_sums(first, windows, first.fitted.sigma, 0.5)
+    probe = InputForces(first.fitted.model, windows)
+    opened, closed = (_courses(probe, first, windows, sums, answers) for answers in (False, True))
+    along = probe.along(windows, windows.eta, windows.nu).numpy()
+    # Ten samples per second: the second cell holds the samples 5 to 9.
+    command, motion = probe.inputs["thruster_1"], probe.inputs["v"]
+    assert opened[:, 1, command] == pytest.approx(along[:, 5:10, command].mean(1))
+    assert closed[:, 1, command] == pytest.approx(along[:, 5, command])
+    for courses in (opened, closed):
+        assert courses[:, 1, motion] == pytest.approx(along[:, 5, motion])
 
 
 def test_without_a_force_nothing_is_predicted():

@@ -15,12 +15,12 @@ Array = NDArray[np.float64]
 def with_known_forces(sums: ForceSums, axis: int, courses: Array, scale: Array) -> ForceSums:
     """Return what the windows say with the sizes of forces of known courses as further parameters, at zero.
 
-    A force whose mean over the cells is known is a combination of the cells' columns: nothing is linearised again.
+    A force that is known in each cell is a combination of the cells' columns: nothing is linearised again.
 
     Args:
         sums: of the windows, with P parameters.
         axis: degree of freedom in which the forces act, 0 to 5.
-        courses: (B, K, k) mean over each cell of k forces of size one.
+        courses: (B, K, k) what k forces of size one are in each cell.
         scale: (k,) standard deviations of their sizes' priors, N or N m.
     """
     known, own, states = sums.known, sums.statistics, sums.states
