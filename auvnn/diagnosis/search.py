@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.measured_start import GROSS, noise_share
 from auvnn.diagnosis.residuals.variance_component_test import variance_component_test, white
 from auvnn.diagnosis.stages.search_round import ALPHA_UNKNOWN, fit_null, regroup, search_round
 from auvnn.diagnosis.stages.state import Setting, State
@@ -14,6 +16,8 @@ from auvnn.metrics.windows import Windows
 
 # Share of what looks like a force that may stay after one round, and after more, before names alone will not do.
 STAYS_AT_FIRST, STAYS = 0.9, 0.5
+# Where most of the error is left, a name must take this share of what is above the noise for the search to go on.
+EACH = 0.25
 
 
 def search(
@@ -49,7 +53,8 @@ def search(
 def a_force_stays(asked: Setting, state: State) -> bool:
     """Whether names leave so much of a force that further ones alone will not explain it.
 
-    Then names are better sought together with a stochastic force than one after the other without.
+    Then names are better sought together with a stochastic force than one after the other without. So they are where
+    free running goes so far off that a name takes little of the error: slopes of such runs rank names by chance.
 
     Args:
         asked: what is asked.
@@ -63,5 +68,21 @@ def a_force_stays(asked: Setting, state: State) -> bool:
         left = variance_component_test(state.current, state.windows, white(state.current, asked.floor))
     except np.linalg.LinAlgError:
         return False
+    if not left.p_value < ALPHA_UNKNOWN:
+        return False
     most = STAYS_AT_FIRST if rounds == 1 else STAYS
-    return left.p_value < ALPHA_UNKNOWN and left.left_of(before) > most
+    return left.left_of(before) > most or _takes_little(
+        state.path[-2] if rounds > 1 else state.first, state.current
+    )
+
+
+def _takes_little(before: FittedHypothesis, after: FittedHypothesis) -> bool:
+    """Whether most of the error is left and a name has taken little of it away.
+
+    Args:
+        before: explanation without it.
+        after: explanation with it.
+    """
+    share = noise_share(after.fitted)
+    excess = [1.0 / max(s, 1e-12) - 1.0 for s in (noise_share(before.fitted), share)]
+    return share < GROSS and excess[1] > (1.0 - EACH) * excess[0]

@@ -11,7 +11,7 @@ from torch.func import functional_call
 
 from auvnn.effects import Sensed
 from auvnn.estimation.few_inputs import slopes
-from auvnn.metrics.free_run import predict
+from auvnn.metrics.free_run import away, predict
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 from auvnn.models.actuation.actuators import Drive
@@ -235,10 +235,6 @@ def _about(model: GreyBox, windows: Windows, around: Tensor) -> tuple[tuple[Tens
             there, around, windows.inputs.rows(windows.warmup), windows.times[:, windows.warmup :],
             Thrust(there).drive(windows, substeps), substeps,
         )  # fmt: skip
-        after = around[:, 1:]
-        turn = quat_to_rotvec(quat_multiply(quat_conjugate(after[..., 3:7]), reached[..., 3:7]))
-        defect = torch.cat(
-            [reached[..., :3] - after[..., :3], turn, reached[..., 7:] - after[..., 7:]], dim=-1
-        )
+        defect = away(around[:, 1:], reached)
         eta, nu = around[..., :7], around[..., 7:]
         return (eta, nu, window_error(there, windows, eta, nu)), defect

@@ -72,6 +72,10 @@ class ForceLaw:
             ]
         )
 
+    def mean_over(self, duration: float) -> Array:
+        """Return the rms of the force's mean over some time, s, (6,): what changes faster moves a vehicle little."""
+        return self.rms * np.sqrt(np.minimum(1.0, 2.0 * self.time / duration))
+
     def cell_of(self, since: Array) -> NDArray[np.int64]:
         """Return the cell of moments so long after a window's start, s."""
         return np.clip((since / self.cell + 1e-9).astype(np.int64), 0, self.cells - 1)

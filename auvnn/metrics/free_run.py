@@ -9,7 +9,7 @@ from auvnn.effects import Sensed
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 from auvnn.models.free_running.rollout import rollout
-from auvnn.physics.attitude import quat_multiply, rotvec_to_quat
+from auvnn.physics.attitude import quat_conjugate, quat_multiply, quat_to_rotvec, rotvec_to_quat
 
 
 def predict(
@@ -53,3 +53,9 @@ def moved(initial: Tensor, change: Tensor) -> Tensor:
     quaternion = quat_multiply(initial[:, 3:7], rotvec_to_quat(change[:, 3:6]))
     quaternion = quaternion / torch.linalg.norm(quaternion, dim=-1, keepdim=True)
     return torch.cat([initial[:, :3] + change[:, :3], quaternion, initial[:, 7:] + change[:, 6:]], dim=-1)
+
+
+def away(begin: Tensor, end: Tensor) -> Tensor:
+    """Return the change (..., 12) of position, attitude and velocity that leads from states to others, (..., 13) each."""
+    turn = quat_to_rotvec(quat_multiply(quat_conjugate(begin[..., 3:7]), end[..., 3:7]))
+    return torch.cat([end[..., :3] - begin[..., :3], turn, end[..., 7:] - begin[..., 7:]], dim=-1)

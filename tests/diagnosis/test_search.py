@@ -14,16 +14,19 @@ from auvnn.diagnosis.diagnose import beside_a_force
 from auvnn.diagnosis.search import a_force_stays
 
 
-def state(rounds: int) -> Any:
-    return SimpleNamespace(path=("round",) * rounds, first="first", current="current", windows=None)
+def state(rounds: int, shares: Any = None) -> Any:
+    """Return a search after so many rounds, and of the noise's share in the error at first and after each."""
+    first, *path = [SimpleNamespace(fitted=s) for s in shares or (1.0,) * (rounds + 1)]
+    return SimpleNamespace(path=tuple(path), first=first, current=[first, *path][-1], windows=None)
 
 
-def stays(monkeypatch, rounds, share, p_value=1e-9):
+def stays(monkeypatch, rounds, share, p_value=1e-9, shares=None):
     left = SimpleNamespace(p_value=p_value, left_of=lambda before: share)
+    monkeypatch.setattr(search, "noise_share", lambda fitted: fitted)
     monkeypatch.setattr(search, "white", lambda *_: None)
     monkeypatch.setattr(search, "variance_component_test", lambda *_: left)
     asked: Any = SimpleNamespace(floor=0.0)
-    return a_force_stays(asked, state(rounds))
+    return a_force_stays(asked, state(rounds, shares))
 
 
 @pytest.mark.parametrize(
@@ -32,6 +35,25 @@ def stays(monkeypatch, rounds, share, p_value=1e-9):
 )
 def test_after_one_round_nearly_all_must_stay_and_later_most(monkeypatch, rounds, share, expected):
     assert stays(monkeypatch, rounds, share) is expected
+
+
+@pytest.mark.parametrize(
+    ("shares", "expected"),
+    [
+        # Error of 20 times the noise before: 19 of it above the noise, of which a quarter is 4.75.
+        ((1 / 20, 1 / 20), True),
+        ((1 / 20, 1 / 15.5), True),
+        ((1 / 20, 1 / 15), False),
+        # What counts is what the last name has taken.
+        ((1 / 20, 1 / 10, 1 / 9), True),
+        ((1 / 20, 1 / 19.9, 1 / 9), False),
+        # As much noise as anything else: names are sought on.
+        ((0.6, 0.6), False),
+    ],
+)
+def test_where_most_of_the_error_is_left_a_name_must_take_a_quarter_of_it(monkeypatch, shares, expected):
+    assert stays(monkeypatch, len(shares) - 1, 0.4, shares=shares) is expected
+    assert not stays(monkeypatch, len(shares) - 1, 0.4, p_value=0.01, shares=shares)
 
 
 def test_what_chance_may_leave_is_no_force(monkeypatch):

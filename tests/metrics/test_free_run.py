@@ -7,7 +7,7 @@ import torch
 from scipy.spatial.transform import Rotation
 
 from auvnn.effects import Sensed
-from auvnn.metrics.free_run import initial_states, moved, predict
+from auvnn.metrics.free_run import away, initial_states, moved, predict
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
@@ -25,6 +25,11 @@ def test_states_move_by_a_turn_about_the_bodys_own_axes():
     turned = Rotation.from_quat(state[:, 3:7], scalar_first=True) * Rotation.from_rotvec(change[:, 3:6])
     np.testing.assert_allclose(
         turned.as_matrix(), Rotation.from_quat(found[:, 3:7], scalar_first=True).as_matrix(), atol=1e-12
+    )
+    # The way back: turns of less than half a revolution come back as they were.
+    small = torch.tensor(0.5 * change)
+    np.testing.assert_allclose(
+        away(torch.tensor(state), moved(torch.tensor(state), small)), small, atol=1e-12
     )
 
 

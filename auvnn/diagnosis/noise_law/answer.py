@@ -16,7 +16,7 @@ from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.commands.holding import Holding, cost_at_best, holding
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncertain_wrench
-from auvnn.diagnosis.noise_law.hypothesis import WithForce
+from auvnn.diagnosis.noise_law.hypothesis import SECOND, WithForce, shares_left
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
 from auvnn.diagnosis.noise_law.likelihood.estimate_law import ALPHA_BOUNDARY
@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 MOST = 0.5
 # A stochastic force beyond this share of the actuators' is no disturbance: the model lacks what moves the vehicle. A name
 # that leaves less than this share of what there was has explained that.
-LARGEST, SECOND, EXPLAINED = 0.5, 1.0, 0.25
+LARGEST, EXPLAINED = 0.5, 0.25
 UNDECIDED = (
     "names were not compared together with a stochastic force: with one, free running grows without bound; "
     "choose shorter windows with window="
@@ -242,16 +242,11 @@ def exceeds_actuators(asked: Setting, state: State, law: ForceLaw | None) -> boo
     """
     if law is None:
         return False
-    mean = _over_a_second(law)
+    mean = law.mean_over(SECOND)
     drive = actuators_of(asked.layout.model, state.windows)
     # Fins and a vehicle's own balance hold what thrusters do not: the largest of forces, and of moments, is the measure.
     most = np.repeat([drive[:3].max(), drive[3:].max()], 3)
     return bool((mean[most > 0.0] > LARGEST * most[most > 0.0]).any())
-
-
-def _over_a_second(law: ForceLaw) -> Array:
-    """Return the rms of a force's mean over a second, (6,): what changes faster moves a vehicle little."""
-    return law.rms * np.sqrt(np.minimum(1.0, 2.0 * law.time / SECOND))
 
 
 def negligible(asked: Setting, state: State, law: ForceLaw | None, uncertain: UncertainWrench) -> bool:
@@ -290,6 +285,5 @@ def _share_left(result: WithForce) -> float:
     """Return the stochastic force's share of what was above noise before any name."""
     if result.estimate.law is None or result.first_law is None:
         return 0.0
-    before, after = _over_a_second(result.first_law), _over_a_second(result.estimate.law)
-    known = before > 0.0
-    return float(np.clip(((after[known] / before[known]) ** 2).mean(), 0.0, 1.0))
+    left = shares_left(result.estimate.law, result.first_law)
+    return float(np.clip(left.mean(), 0.0, 1.0))

@@ -27,6 +27,11 @@ Array = NDArray[np.float64]
 GROUP = 3
 # Level of the signed-rank test of the gains on what is left out: windows that follow one another gain alike.
 ALPHA_RANKS = 0.001
+# Forces are compared by their mean over so long, s.
+SECOND = 1.0
+# Share of the force of a degree of freedom of which a further name must leave less, where it does not bring much of the
+# gain of all names: after a large effect every other one brings little of it.
+LEAVES = 0.1
 # Share of the gain by which an effect that is known to be confused with the best may fall short of it.
 CLOSE = 0.1
 
@@ -152,6 +157,29 @@ def in_newtons(law: ForceLaw | None, found: FittedHypothesis) -> ForceLaw | None
         return law
     whole = model.prepare().total.detach().numpy() @ law.response
     return replace(law, rms=law.rms * np.abs(np.diag(whole)))
+
+
+def shares_left(after: ForceLaw | None, before: ForceLaw) -> Array:
+    """Return what is left of a force in each degree of freedom that had one, as a share of its mean square, (A,).
+
+    Args:
+        after: the law that is left; None where none is.
+        before: the law before.
+    """
+    known = before.mean_over(SECOND)[before.axes]
+    left = np.zeros(len(known)) if after is None else after.mean_over(SECOND)[before.axes]
+    return (left / known) ** 2
+
+
+def explains_an_axis(after: Hypothesis, before: Hypothesis) -> bool:
+    """Whether an effect leaves next to nothing of the force in a degree of freedom.
+
+    Args:
+        after: hypothesis with the effect.
+        before: hypothesis without it.
+    """
+    law = before.estimate.law
+    return law is not None and bool((shares_left(after.estimate.law, law) < LEAVES).any())
 
 
 def p_value_of(layout: Layout, after: Hypothesis, before: Hypothesis) -> float:

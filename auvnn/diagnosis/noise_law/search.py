@@ -27,6 +27,7 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     GROUP,
     Hypothesis,
     WithForce,
+    explains_an_axis,
     in_newtons,
     judged,
     p_value_of,
@@ -59,6 +60,9 @@ GAIN, GAIN_FURTHER = 1.0, 2.0
 # What the first name and a further one must cost in free running, as shares of the tolerance (a force is always there
 # and makes errors that no name takes away), and the share of the gain of all names that a further one must bring.
 FIRST_COST, FURTHER_COST, FURTHER_SHARE = 0.5, 1.0, 0.1
+# Logarithm of the odds at which a name is given whatever it costs: with nothing hidden, in worlds that the model does not
+# describe, effects that are not there have reached 90, and a `drag_curve`, which is there in part, 200.
+DECISIVE = 1000.0
 # Steps of the fit without any name, and how often its windows are made linear about the motion first.
 NULL_STEPS, TURNS = 25, 3
 
@@ -96,8 +100,6 @@ class ForceSearch:
             sigma: (18,) the sensors' white noise.
         """
         self.say("estimating the law of the force that is left")
-        with suppress(*UNSOLVED):
-            self.in_closed_loop = in_closed_loop(first, self.windows)
         # Fits without the force weigh errors as the first one did.
         self.sigma, self.weights = sigma, first.fitted.sigma
         self.response = GreyBox(first.fitted.model.vehicle).prepare().inverse.detach().numpy()
@@ -121,7 +123,10 @@ class ForceSearch:
                 return None
         assert found.law is not None
         # All names are compared with it: it must not gain by steps that names take first.
-        return self._fits().settled(self.judged(first, found.law), NULL_STEPS)
+        null = self._fits().settled(self.judged(first, found.law), NULL_STEPS)
+        with suppress(*UNSOLVED):
+            self.in_closed_loop = in_closed_loop(null.explanation, self.windows)
+        return null
 
     def _about(self, explanation: FittedHypothesis, law: ForceLaw | None = None) -> Windows:
         """Return the windows, linear about an explanation's trajectories, with a law or without."""
@@ -252,7 +257,7 @@ class ForceSearch:
         likely = [
             h
             for h in found
-            if h.evidence > at.current.evidence + odds
+            if h.evidence > at.current.evidence + (ODDS if explains_an_axis(h, at.current) else odds)
             and _sure(self.layout, h, at, among) < level
             and predicts_better(h, at.current, least)
         ]
@@ -263,8 +268,14 @@ class ForceSearch:
         if self.tolerance.strict:
             return list(likely)
         enough = 0.0 if self.ignores_cost else share * self.tolerance.cost
-        found = [free_running_cost(h, current, self.log, self.scale) for h in likely]
-        return paying(likely, [max(cost) if self.in_closed_loop else cost[0] for cost in found], enough)
+        costs = []
+        for h in likely:
+            if h.evidence > current.evidence + DECISIVE:
+                costs.append(np.inf)
+                continue
+            cost = free_running_cost(h, current, self.log, self.scale)
+            costs.append(max(cost) if self.in_closed_loop else cost[0])
+        return paying(likely, costs, enough)
 
     def _takes_up(self, further: Hypothesis, chosen: Sequence[str]) -> bool:
         """Whether a further effect only takes up what the shape of an earlier one gets wrong.

@@ -12,9 +12,11 @@ from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.noise_law import search
 from auvnn.diagnosis.noise_law.free_running_cost import free_running_cost
-from auvnn.diagnosis.noise_law.hypothesis import predicts_better, tied
+from auvnn.diagnosis.noise_law.hypothesis import explains_an_axis, predicts_better, shares_left, tied
+from auvnn.diagnosis.noise_law.leader_fits import Round
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.search import ForceSearch
+from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
 from tests.diagnosis.noise_law.wandering import wandering_log
@@ -110,11 +112,14 @@ class Search(ForceSearch):
         )
 
 
-def paying(costs, monkeypatch, **given):
-    """Return which of some explanations, each ten in evidence after the one before it, are taken at these costs."""
+def paying(costs, monkeypatch, without=1e3, **given):
+    """Return which of some explanations, each ten in evidence after the one before it, are taken at these costs.
+
+    The first is ahead of the explanation without any by 450.
+    """
     likely = [hypothesis(name, 100.0 + 20.0 * k) for k, name in enumerate(costs)]
     monkeypatch.setattr(search, "free_running_cost", lambda h, *_: costs[h.name])
-    return [h.name for h in Search(**given)._paying(likely, hypothesis("", 1e4), 0.5)]
+    return [h.name for h in Search(**given)._paying(likely, hypothesis("", without), 0.5)]
 
 
 def test_a_name_must_cost_enough_by_the_errors(monkeypatch):
@@ -125,6 +130,40 @@ def test_a_name_must_cost_enough_by_the_errors(monkeypatch):
     assert paying({"waves": (0.01, 0.3)}, monkeypatch, ignores_cost=True) == ["waves"]
     assert paying({"waves": (-0.2, 0.3)}, monkeypatch, ignores_cost=True) == []
     assert paying({"waves": (-0.2, 0.3)}, monkeypatch, tolerance=Tolerance.of(0)) == ["waves"]
+
+
+def test_what_is_beyond_doubt_is_named_whatever_it_costs(monkeypatch):
+    """Ahead by half of 2099, 2079 and so on."""
+    assert paying({"waves": (-0.2, 0.0)}, monkeypatch, without=2199.0) == ["waves"]
+    assert paying({"waves": (-0.2, 0.0)}, monkeypatch, without=2099.0) == []
+    assert paying({"waves": (-0.2, 0.0), "tether": (0.01, 0.0)}, monkeypatch, without=2119.0) == ["waves"]
+
+
+def with_law(rms, evidence=0.0, name="", time=1.0):
+    law = ForceLaw(np.array([*rms, 0.0, 0.0, 0.0, 0.0]), np.full(6, time), 0.5, 5.0)
+    return SimpleNamespace(
+        name=name, evidence=evidence, misfit=-2.0 * evidence, estimate=SimpleNamespace(law=law)
+    )
+
+
+def test_a_force_left_is_that_of_the_mean_over_a_second():
+    before, after = with_law((2.0, 4.0)), with_law((1.0, 4.0), time=0.125)
+    # The mean over a second of what lasts an eighth: half of the rms.
+    np.testing.assert_allclose(shares_left(after.estimate.law, before.estimate.law), [0.25 / 4.0, 0.25])
+    np.testing.assert_allclose(shares_left(None, before.estimate.law), [0.0, 0.0])
+    assert explains_an_axis(after, before) and not explains_an_axis(before, before)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("rms", "expected"), [((0.3, 2.0), ["waves"]), ((0.7, 2.0), [])])
+def test_a_further_name_brings_much_of_the_gain_or_takes_the_force_of_an_axis(rms, expected, monkeypatch):
+    monkeypatch.setattr(search, "predicts_better", lambda *_: True)
+    monkeypatch.setattr(search, "p_value_of", lambda *_: 1e-12)
+    asked = Search(tolerance=Tolerance.of(0), layout=None)
+    at = Round(None, with_law((2.0, 2.0)), [], ["tether"])  # type: ignore[arg-type]
+    found = with_law(rms, 50.0, "waves")
+    assert [h.name for h in asked._good([found], at, 100.0, 10)] == expected  # type: ignore[list-item]
+    # As much evidence as was asked for is enough by itself.
+    assert asked._good([found], at, 40.0, 10) == [found]  # type: ignore[list-item]
 
 
 def test_in_open_loop_free_running_must_not_get_worse(monkeypatch):

@@ -21,6 +21,7 @@ from auvnn.diagnosis.noise_law.commands.holding import LINEAR, Holding, between
 from auvnn.diagnosis.residuals.forces import fins_of
 from auvnn.effects.base import AXES
 from auvnn.estimation.window_normal_equations import linearise
+from auvnn.metrics.free_run import away
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 
@@ -185,10 +186,14 @@ def in_closed_loop(end: FittedHypothesis, windows: Windows) -> bool:
 def _fast_errors(end: FittedHypothesis, windows: Windows) -> tuple[Tensor, Array] | None:
     """Return the samples (B, L) that have both neighbours, and the fast part of the errors there, (N, c).
 
-    None where there are too few of them.
+    None where there are too few of them. Of an explanation about filtered trajectories the errors are those that these
+    leave: free running with a model that is far off may not stay finite.
     """
     fitted = end.fitted
-    error = torch.cat([r.error for r in linearise(fitted.model, windows, fitted.initial, ())])
+    if end.around is not None:
+        error = away(end.around, torch.cat([windows.eta, windows.nu], dim=-1))
+    else:
+        error = torch.cat([r.error for r in linearise(fitted.model, windows, fitted.initial, ())])
     if not torch.isfinite(error[windows.mask[..., : error.shape[-1]] > 0]).all():
         raise np.linalg.LinAlgError("free running grows without bound")
     known = windows.mask[..., : error.shape[-1]] > 0

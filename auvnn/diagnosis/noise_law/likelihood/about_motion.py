@@ -13,8 +13,8 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.likelihood.estimate_law import Estimate
 from auvnn.estimation.trajectories.filtered_states import filtered_states
 from auvnn.estimation.trajectories.smoothed_states import smoothed_states
+from auvnn.metrics.free_run import away
 from auvnn.metrics.windows import Windows
-from auvnn.physics.attitude import quat_conjugate, quat_multiply, quat_to_rotvec
 
 Array = NDArray[np.float64]
 # Standard deviations of the sensors' noise, root mean square of a channel, within which trajectories are the same.
@@ -45,10 +45,8 @@ def linear_about_its_own(
 
 def _same(one: Tensor, other: Tensor, mask: Tensor, sigma: Array) -> bool:
     """Whether trajectories (B, L, 13) differ by less than the sensors' noise where they were measured."""
-    turn = quat_to_rotvec(quat_multiply(quat_conjugate(other[..., 3:7]), one[..., 3:7]))
-    away = torch.cat([one[..., :3] - other[..., :3], turn, one[..., 7:] - other[..., 7:]], dim=-1)
     seen = mask[..., :12]
-    square = (away**2 * seen).sum((0, 1)) / seen.sum((0, 1)).clamp(min=1.0)
+    square = (away(other, one) ** 2 * seen).sum((0, 1)) / seen.sum((0, 1)).clamp(min=1.0)
     size = np.sqrt(square.numpy())
     known = np.isfinite(sigma[:12])
     return bool((size[known] < SAME * sigma[:12][known]).all())

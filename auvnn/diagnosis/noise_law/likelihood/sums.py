@@ -17,8 +17,8 @@ from auvnn.estimation.sensitivity import Response
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.force_law import ForceLaw
+from auvnn.metrics.free_run import away
 from auvnn.metrics.windows import Windows
-from auvnn.physics.attitude import quat_conjugate, quat_multiply, quat_to_rotvec
 
 Array = NDArray[np.float64]
 # Cells of the force while its law is looked for, s.
@@ -186,12 +186,9 @@ def _of_states(answer: Response, whole: Tensor, weight: Tensor) -> tuple[Tensor,
 def _offsets(windows: Windows, around: Tensor, before: NDArray[np.int64]) -> tuple[Array, NDArray[np.bool_]]:
     """Return what leads from each first state to the last one of the window before, and whether both are one moment."""
     other = torch.as_tensor(np.maximum(before, 0))
-    first, last = around[:, 0], around[other, -1]
-    turn = quat_to_rotvec(quat_multiply(quat_conjugate(first[:, 3:7]), last[:, 3:7]))
     times = windows.times[:, windows.warmup :]
     same = (times[:, 0] - times[other, -1]).abs() < SAME_MOMENT
-    away = torch.cat([last[:, :3] - first[:, :3], turn, last[:, 7:] - first[:, 7:]], dim=-1)
-    return away.numpy(), same.numpy() & (before >= 0)
+    return away(around[:, 0], around[other, -1]).numpy(), same.numpy() & (before >= 0)
 
 
 def followed(windows: Windows, reach: float) -> tuple[NDArray[np.int64], Array]:

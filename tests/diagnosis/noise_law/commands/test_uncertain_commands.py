@@ -109,6 +109,14 @@ def test_commands_that_answer_the_noise_leave_its_share_uncertain():
     found = noise_answered(first, answering)
     # Half of the noise is the log's own, which nothing answers: what is regressed on is noisy itself.
     assert not in_closed_loop(first, windows) and in_closed_loop(first, answering)
+    # About filtered trajectories their errors count, and no run of the model, which may not stay finite.
+    diverging = replace(first, fitted=replace(first.fitted, initial=first.fitted.initial * np.inf))
+    with pytest.raises(np.linalg.LinAlgError):
+        in_closed_loop(diverging, answering)
+    around = torch.cat([windows.eta, windows.nu], dim=-1)
+    assert in_closed_loop(replace(diverging, around=around), answering)
+    other = torch.as_tensor(np.random.default_rng(4).normal(size=windows.nu.shape)) * 0.004
+    assert not in_closed_loop(replace(diverging, around=around), replace(windows, nu=windows.nu + other))
     assert 0.5 * 0.12 < found[2] < 1.1 * 0.12 and (np.delete(found, 2)[:2] < 0.4 * found[2]).all()
 
 
