@@ -58,7 +58,7 @@ def test_without_a_force_the_answer_is_the_plain_search():
     assert found.missing == ["net_buoyancy"] and "force" not in found.stochastic
 
 
-def hypothesis(name, misfit, evidence=None):
+def hypothesis(name, misfit, evidence=None) -> Any:
     """Return as much of a hypothesis as a comparison looks at."""
     return SimpleNamespace(name=name, misfit=misfit, evidence=-0.5 * misfit if evidence is None else evidence)
 
@@ -139,7 +139,7 @@ def test_what_is_beyond_doubt_is_named_whatever_it_costs(monkeypatch):
     assert paying({"waves": (-0.2, 0.0), "tether": (0.01, 0.0)}, monkeypatch, without=2119.0) == ["waves"]
 
 
-def with_law(rms, evidence=0.0, name="", time=1.0):
+def with_law(rms, evidence=0.0, name="", time=1.0) -> Any:
     law = ForceLaw(np.array([*rms, 0.0, 0.0, 0.0, 0.0]), np.full(6, time), 0.5, 5.0)
     return SimpleNamespace(
         name=name, evidence=evidence, misfit=-2.0 * evidence, estimate=SimpleNamespace(law=law)
