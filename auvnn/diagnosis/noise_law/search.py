@@ -61,8 +61,8 @@ GAIN, GAIN_FURTHER = 1.0, 2.0
 # and makes errors that no name takes away), and the share of the gain of all names that a further one must bring.
 FIRST_COST, FURTHER_COST, FURTHER_SHARE = 0.5, 1.0, 0.1
 # Logarithm of the odds at which a name is given whatever it costs: with nothing hidden, in worlds that the model does not
-# describe, effects that are not there have reached 90, and a `drag_curve`, which is there in part, 200.
-DECISIVE = 1000.0
+# describe, an effect that is not there has reached 758 (`thrust_overshoot` in `shaped`, of 20 logs).
+DECISIVE = 2000.0
 # What the test of a further name must promise a part of before it is fitted is no more than these odds, however large the
 # gain of the names before it.
 WORTH_ODDS = 300.0

@@ -133,10 +133,13 @@ def test_a_name_must_cost_enough_by_the_errors(monkeypatch):
 
 
 def test_what_is_beyond_doubt_is_named_whatever_it_costs(monkeypatch):
-    """Ahead by half of 2099, 2079 and so on."""
-    assert paying({"waves": (-0.2, 0.0)}, monkeypatch, without=2199.0) == ["waves"]
-    assert paying({"waves": (-0.2, 0.0)}, monkeypatch, without=2099.0) == []
-    assert paying({"waves": (-0.2, 0.0), "tether": (0.01, 0.0)}, monkeypatch, without=2119.0) == ["waves"]
+    """The first has a misfit of 100 and the second one of 120: twice the log odds are what they are below `without`."""
+    one, both = {"waves": (-0.2, 0.0)}, {"waves": (-0.2, 0.0), "tether": (0.01, 0.0)}
+    enough = 100.0 + 2.0 * search.DECISIVE
+    assert paying(one, monkeypatch, without=enough + 1.0) == ["waves"]
+    assert paying(one, monkeypatch, without=enough - 1.0) == []
+    assert paying(both, monkeypatch, without=enough + 19.0) == ["waves"]
+    assert paying(both, monkeypatch, without=enough + 21.0) == ["waves", "tether"]
 
 
 def with_law(rms, evidence=0.0, name="", time=1.0) -> Any:
