@@ -21,8 +21,9 @@ Array = NDArray[np.float64]
 # Fitted in full beside those that the first search has fitted: so many of those that lead under the law, and so many more
 # of those whose tests are significant where none of these stands.
 LEADERS, FURTHER_LEADERS = 3, 5
-# Share of the odds that a further name needs, which its test must promise before it is fitted.
-WORTH_A_FIT = 0.3
+# Share of the odds that a further name needs, which its test must promise before it is fitted; of no more than these
+# odds, however large the gain of the names before it.
+WORTH_A_FIT, LARGE_ODDS = 0.3, 300.0
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ class LeaderFits:
             level: at which chance among all effects is rejected.
         """
         known = self._known(at, fitted)
-        found = self._each([*known, *self._worth(at, known, WORTH_A_FIT * odds)], at, known)
+        found = self._each([*known, *self._worth(at, known, WORTH_A_FIT * min(odds, LARGE_ODDS))], at, known)
         # Beside what was found tests are weaker: a rival of a further name need not be clear among all effects.
         rivals = rivals_of(found, at.tested.scores, level, among_all=not at.chosen)
         return _by_evidence([*found, *self._each(rivals, at)])

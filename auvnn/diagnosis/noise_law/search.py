@@ -63,9 +63,6 @@ FIRST_COST, FURTHER_COST, FURTHER_SHARE = 0.5, 1.0, 0.1
 # Logarithm of the odds at which a name is given whatever it costs: with nothing hidden, in worlds that the model does not
 # describe, an effect that is not there has reached 758 (`thrust_overshoot` in `shaped`, of 20 logs).
 DECISIVE = 2000.0
-# What the test of a further name must promise a part of before it is fitted is no more than these odds, however large the
-# gain of the names before it.
-WORTH_ODDS = 300.0
 # Steps of the fit without any name, and how often its windows are made linear about the motion first.
 NULL_STEPS, TURNS = 25, 3
 
@@ -184,7 +181,7 @@ class ForceSearch:
             share = 0.0 if self.looks_further else FURTHER_SHARE
             odds = max(ODDS, share * (current.evidence - null.evidence))
             at = Round(tests, current, base, chosen, earlier)
-            found = self._joined(current, fits.leading(at, fitted, min(odds, WORTH_ODDS), ALPHA_NAME))
+            found = self._joined(current, fits.leading(at, fitted, odds, ALPHA_NAME))
             good = self._good(found, at, odds, len(remaining))
             if not good and not chosen:
                 found = self._joined(current, fits.wider(at, found, ALPHA_NAME))

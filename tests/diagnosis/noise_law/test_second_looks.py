@@ -7,12 +7,18 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.noise_law import search
 from auvnn.diagnosis.noise_law.leader_fits import LeaderFits, Round
+from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of
 from auvnn.models import GreyBox
+from tests.diagnosis.noise_law.wandering import wandering_log
 from tests.small_logs import small_vehicle
 
 NAME, ESTIMATE = "net_buoyancy", 6.0
@@ -88,3 +94,38 @@ def test_before_nothing_has_a_name_all_that_is_significant_is_fitted(monkeypatch
     assert len(fitted) == 3
     looks.wider(replace(at, current="another"), [known], 0.01)
     assert len(fitted) == 6
+
+
+@pytest.mark.parametrize(
+    ("odds", "gain", "fitted"),
+    [
+        # Half of the gain against 0.3 of the odds, and against 90 where these are more than 300.
+        (200.0, 118.0, False),
+        (200.0, 122.0, True),
+        (3000.0, 178.0, False),
+        (3000.0, 182.0, True),
+    ],
+)
+def test_a_further_name_is_fitted_where_its_test_promises_enough(monkeypatch, odds, gain, fitted):
+    score = SimpleNamespace(degrees=1, evidence=0.5 * gain, gain=gain, p_value=1.0)
+    asked: list[str] = []
+    looks = LeaderFits(None, None, lambda _: None)  # type: ignore[arg-type]
+    monkeypatch.setattr(LeaderFits, "_one", lambda self, name, at, known: asked.append(name))
+    tested: Any = SimpleNamespace(scores={NAME: score})
+    looks.leading(Round(tested, None, [], ["waves"]), [], odds, 0.01)  # type: ignore[arg-type]
+    assert asked == [NAME] * fitted
+
+
+def test_whether_commands_answer_is_asked_about_the_filtered_trajectories(monkeypatch):
+    model = GreyBox(small_vehicle())
+    log = wandering_log(model, np.array([4.0, 4.0, 4.0, 0.4, 0.4, 0.5]), 1.0, runs=2, duration=20.0)
+    layout, windows, about = lay_out(model, []), windows_for(model, log), []
+    first = fit_hypothesis(layout, windows, list(layout.names), (), iterations=4)
+    asked: Any = SimpleNamespace(
+        layout=layout, tolerance=None, usable=(), base=layout.names, say=lambda _: None, log=log
+    )
+    monkeypatch.setattr(search, "in_closed_loop", lambda end, _: about.append(end.around) or True)
+    beside = search.ForceSearch(asked, windows)
+    null = beside.begin(first, white(first, np.full(18, 1e-9)))
+    assert null is not None and beside.in_closed_loop
+    assert len(about) == 1 and about[0] is not None and about[0] is null.explanation.around
