@@ -13,15 +13,23 @@ from auvnn.models.linear.linearise import linearise
 
 COUNT = 200
 
+#: What sums may lose by rounding in double precision, as a share of the largest element. An element that is the
+#: difference of such terms, and nought but for their rounding, differs from one processor to the next.
+ROUNDED = 64 * float(np.finfo(float).eps)
+
 
 def relative(mine: Any, theirs: Any) -> float:
-    """Return the largest difference between two arrays (N, k), relative to the largest element of its column."""
+    """Return the largest difference between two arrays (N, k), relative to the largest element of its column.
+
+    Differences within the rounding of the largest element of all count as none.
+    """
     mine, theirs = (np.asarray(x, dtype=float) for x in (mine, theirs))
     if not mine.size:
         return 0.0
     size = np.abs(theirs).max(axis=0)
+    beyond = np.maximum(np.abs(mine - theirs) - ROUNDED * size.max(), 0.0).max(axis=0)
     # A column of nothing but rounding has no size.
-    return float((np.abs(mine - theirs).max(axis=0) / np.maximum(size, max(1e-9 * size.max(), 1e-300))).max())
+    return float((beyond / np.maximum(size, max(1e-9 * size.max(), 1e-300))).max())
 
 
 def agreement(system: System) -> dict[str, float]:

@@ -56,7 +56,10 @@ def model(name):
 
 
 def differs(mine, theirs):
-    """Return the largest difference, relative to the largest element of each column."""
+    """Return the largest difference, relative to the largest element of each column.
+
+    A column below 1e-5 of the largest element is held to that: below it 1e-9 of a column is under double precision.
+    """
     mine, theirs = np.asarray(mine, dtype=float), np.asarray(theirs, dtype=float)
     size = np.abs(theirs).max(axis=0)
-    return float((np.abs(mine - theirs).max(axis=0) / np.maximum(size, 1e-9 * max(size.max(), 1e-30))).max())
+    return float((np.abs(mine - theirs).max(axis=0) / np.maximum(size, 1e-5 * max(size.max(), 1e-30))).max())
