@@ -73,7 +73,7 @@ def _compare(
     scale = expected.detach()
     if not bool(torch.isfinite(scale).any()):
         return "", False
-    words = _difference("the right-hand side", kernel.rate(y, u, row, batch), expected.detach(), RATE)
+    words = difference("the right-hand side", kernel.rate(y, u, row, batch), expected.detach(), RATE)
     if words or not kernel.gradient:
         return words, True
     back = torch.linspace(-1.0, 1.0, expected.numel(), dtype=torch.float64).reshape(expected.shape)
@@ -100,13 +100,21 @@ def _compare(
             for name, mine, theirs in zip(numbers.wanted, by_number, slopes[inner:], strict=True)
         ]
     for name, mine, theirs in pairs:
-        words = _difference(f"the gradient in the {name}", mine, theirs, GRADIENT)
+        words = difference(f"the gradient in the {name}", mine, theirs, GRADIENT)
         if words:
             return words, True
     return "", True
 
 
-def _difference(what: str, mine: Tensor, theirs: Tensor, tolerance: float) -> str:
+def difference(what: str, mine: Tensor, theirs: Tensor, tolerance: float) -> str:
+    """Return in words how two answers differ, empty where they agree.
+
+    Args:
+        what: is compared, in words.
+        mine: of compiled code.
+        theirs: of torch.
+        tolerance: relative to the largest element.
+    """
     sound = torch.isfinite(theirs)
     if not torch.equal(sound, torch.isfinite(mine)):
         return f"compiled code and torch disagree on where {what} is finite"

@@ -105,20 +105,27 @@ class Program:
 
 
 def trace(
-    module: nn.Module, layout: Layout, numbers: Numbers, sample: Mapping[str, Tensor], gradient: bool
+    module: nn.Module,
+    layout: Layout,
+    numbers: Numbers,
+    sample: Mapping[str, Tensor],
+    gradient: bool,
+    outputs: int | None = None,
 ) -> Program:
     """Trace `module(y, *inputs)` at one state.
 
     Args:
-        module: gives the derivative (n) of the state (n).
+        module: gives the derivative (n) of the state (n), or something else of another size.
         layout: sizes.
         numbers: its parameters and buffers.
         sample: state "y" and inputs by name: values do not matter but must be admissible.
         gradient: whether the vector-Jacobian product is wanted too.
+        outputs: size of what the module gives; that of the state by default.
 
     Raises:
         CannotCompile: the module does something that is not covered.
     """
+    outputs = layout.state if outputs is None else outputs
     scalars = Scalars()
     recorder = Recorder(scalars, apply)
     values, place, fixed = {}, 0, numbers.fixed()
@@ -141,8 +148,8 @@ def trace(
     for name, size in layout.inputs:
         inputs[name] = leaf_of(name, "u", begin) if size != 0 else None
         begin += 1 if size is None else size
-    back = torch.linspace(0.3, 0.7, layout.state, dtype=torch.float64)
-    recorder.track(back, [scalars.input("ct", k) for k in range(layout.state)])
+    back = torch.linspace(0.3, 0.7, outputs, dtype=torch.float64)
+    recorder.track(back, [scalars.input("ct", k) for k in range(outputs)])
     wanted = [values[n] for n in numbers.wanted]
     followed = {n: x for n, x in inputs.items() if x is not None and x.requires_grad}
 

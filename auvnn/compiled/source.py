@@ -33,7 +33,8 @@ def constant_part(scalars: Scalars, wanted: Iterable[int]) -> tuple[list[int], l
     return scalars.needed(plain), plain
 
 
-def _function(head: str, lines: Iterable[str]) -> str:
+def function_of(head: str, lines: Iterable[str]) -> str:
+    """Return a function of C from its head and its statements."""
     return "\n".join([head + " {", *("    " + line for line in lines), "}", ""])
 
 
@@ -71,9 +72,9 @@ def write(
         if s.operation[n] == "input" and s.operands[n][0] == "u" and s.operands[n][1] in held
     )
     text = [
-        _table("NY", layout.state, "NU", layout.width, "NDRIVE", drive, "NROW", layout.width - drive - 1)
-        + _table("NB", len(edge), "NW", len(used.parameter_gradient), "STAGES", len(tableau[0]))
-        + _table("ROWS_USED", len(rows)),
+        table("NY", layout.state, "NU", layout.width, "NDRIVE", drive, "NROW", layout.width - drive - 1)
+        + table("NB", len(edge), "NW", len(used.parameter_gradient), "STAGES", len(tableau[0]))
+        + table("ROWS_USED", len(rows)),
         f"static const int ROW_USED[] = {{{', '.join(map(str, rows or [0]))}}};",
         f"static const double STAGE[] = {{{', '.join(number(c) for c in tableau[0])}}};",
         f"static const double WEIGHT[] = {{{', '.join(number(w) for w in tableau[1])}}};",
@@ -81,7 +82,7 @@ def write(
     ]
     hoist = Writer(s, {}, real=True)
     text.append(
-        _function(
+        function_of(
             "static void prologue(const double *p, double *b)",
             [*hoist.body(edge), *hoist.store("b", edge)],
         )
@@ -90,14 +91,14 @@ def write(
     body = Writer(s, places)
     outside: Callable[[str], str] = lambda name: f"static __attribute__((noinline)) void {name}"  # noqa: E731
     text.append(
-        _function(
+        function_of(
             f"{outside('rate')}({arguments}, V *restrict out)",
             [*body.body(used.rate), *body.store("out", used.rate)],
         )
     )
     after = Writer(projections[0].scalars, {})
     text.append(
-        _function(
+        function_of(
             f"{outside('project')}(const V *y, V *out)",
             [*after.body(projections[0].rate), *after.store("out", projections[0].rate)],
         )
@@ -106,7 +107,7 @@ def write(
         grads = [n for _, n in joint.parameter_gradient]
         text.append("#define GRADIENT\n")
         text.append(
-            _function(
+            function_of(
                 f"{outside('rate_back')}({arguments}, const V *restrict ct, V *restrict gy, V *restrict gu, "
                 "V *restrict gp)",
                 [
@@ -119,7 +120,7 @@ def write(
         )
         back = Writer(projections[1].scalars, {})
         text.append(
-            _function(
+            function_of(
                 f"{outside('project_back')}(const V *y, const V *ct, V *gy)",
                 [*back.body(projections[1].state_gradient), *back.store("gy", projections[1].state_gradient)],
             )
@@ -138,5 +139,6 @@ static inline double r_pick(int c, double a, double b) { return c ? a : b; }
 """
 
 
-def _table(*pairs: object) -> str:
+def table(*pairs: object) -> str:
+    """Return definitions of names, each followed by its value, one to a line."""
     return "".join(f"#define {pairs[k]} {pairs[k + 1]}\n" for k in range(0, len(pairs), 2))

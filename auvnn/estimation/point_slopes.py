@@ -8,6 +8,7 @@ from torch.func import functional_call, jacrev, vmap
 from torch.utils._pytree import register_pytree_node
 
 from auvnn.effects import Sensed
+from auvnn.estimation.compiled_slopes import compiled_slopes
 from auvnn.estimation.linear_effects import (
     Added,
     LinearEffect,
@@ -94,6 +95,9 @@ def differentiate(
         thetas: parameters by their names in the module.
         chunk: points that are differentiated at a time.
     """
+    compiled = compiled_slopes(module, what, points, thetas)
+    if compiled is not None:
+        return compiled
     members = {f"model.effects.{k}.theta": e for k, e in enumerate(module.model.members)}
     replayed = {key: e for key, e in members.items() if key in thetas and isinstance(e, LinearEffect)}
     others = {key: theta for key, theta in thetas.items() if key not in replayed}

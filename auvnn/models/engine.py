@@ -22,7 +22,7 @@ from auvnn.errors import ConfigError
 from auvnn.models.free_running.rate import SIZE
 from auvnn.models.free_running.tableaus import TABLEAUS
 from auvnn.models.inputs import Inputs
-from auvnn.models.model_kernels import _KERNELS, _made, _ready, _require_plain, _RightHandSide
+from auvnn.models.model_kernels import _KERNELS, _made, _ready, _RightHandSide, require_plain
 
 if TYPE_CHECKING:
     from auvnn.models.actuation.actuators import Drive
@@ -135,7 +135,7 @@ def _compiled(
     rows, count = times.shape[-1], batch.numel()
     given = [*state, inputs.command, inputs.fins, inputs.voltage, inputs.altitude, drive.means, drive.slopes]
     tensors = [x for x in given if x is not None]
-    _require_plain([*tensors, times])
+    require_plain([*tensors, times])
     if rows < 2 or not count:
         raise CannotCompile("there is nothing to integrate")
     gradient = torch.is_grad_enabled() and (

@@ -20,14 +20,16 @@ OWN = frozenset(
     ).split()
 )
 DEEPEST = 6
+PLAIN = (type(None), bool, int, float, str, bytes)
 
 
 class Identity:
     """A key that changes whenever something changes that compiled code has taken as constant.
 
-    Plain numbers, texts, lists and small arrays count by value, tensors by identity and version, everything else by
-    identity; what counts by identity is held, so that no other object gets its address. Not seen is what changes in
-    a module's globals, or inside an object that is frozen or callable.
+    Plain numbers, texts, lists, frozen records of them and small arrays count by value, parts of the model by name,
+    tensors by identity and version, everything else by identity; what counts by identity is held, so that no other
+    object gets its address. Not seen is what changes in a module's globals, or inside an object that is frozen or
+    callable.
 
     Args:
         model: module whose own attributes and parts count.
@@ -36,6 +38,7 @@ class Identity:
     def __init__(self, model: nn.Module) -> None:
         """Walk through the model."""
         self.held: list[Any] = []
+        self._names = {id(module): name for name, module in model.named_modules()}
         parts: list[Any] = []
         for name, module in model.named_modules():
             own = tuple((k, self._of(v, 0)) for k, v in module.__dict__.items() if k not in OWN)
@@ -56,6 +59,8 @@ class Identity:
         if value is None or isinstance(value, (bool, int, float, str, bytes, type)):
             # 1, 1.0 and True are equal, and NaN is not equal to itself.
             return (type(value), repr(value) if isinstance(value, float) else value)
+        if id(value) in self._names:
+            return ("part", self._names[id(value)])
         self.held.append(value)
         if isinstance(value, Tensor):
             return ("tensor", id(value), value._version)
@@ -77,6 +82,9 @@ class Identity:
             if isinstance(value, (set, frozenset)):
                 return (type(value), frozenset(self._of(v, depth + 1) for v in value))
             frozen = dataclasses.is_dataclass(value) and value.__dataclass_params__.frozen  # type: ignore[attr-defined]
+            if frozen and all(_plain(v) for v in vars(value).values()):
+                # A copied effect's description of a parameter is a copy too.
+                return (type(value), tuple((k, self._of(v, depth + 1)) for k, v in vars(value).items()))
             if (
                 not frozen
                 and not isinstance(value, nn.Module)
@@ -85,6 +93,10 @@ class Identity:
             ):
                 return (id(value), self._of(vars(value), depth + 1))
         return id(value)
+
+
+def _plain(value: Any) -> bool:
+    return isinstance(value, PLAIN) or (isinstance(value, tuple) and all(isinstance(v, PLAIN) for v in value))
 
 
 def has_hooks(model: nn.Module) -> bool:

@@ -74,7 +74,7 @@ _MOST = 64
 """Kernels and situations that are remembered; the oldest are forgotten."""
 
 
-def _require_plain(tensors: list[Tensor]) -> None:
+def require_plain(tensors: list[Tensor]) -> None:
     """Refuse tensors that are more than numbers in memory, and calls that somebody watches."""
     transforms: Any = torch._C._functorch  # type: ignore[attr-defined]
     tracing: Any = torch.jit
@@ -110,7 +110,7 @@ def _made(model: GreyBox, inputs: Inputs, gradient: bool, tableau: tuple) -> _Ma
         raise CannotCompile("a hook is registered on a part of the model")
     side = _RightHandSide(model)
     numbers = Numbers.of(side)
-    _require_plain(list(numbers.tensors))
+    require_plain(list(numbers.tensors))
     identity = Identity(model)
     layout = _layout(model, inputs)
     key = (identity.key, layout, gradient, tableau)
