@@ -19,7 +19,7 @@ from auvnn.compiled import disk_cache
 from auvnn.compiled.recorder import CannotCompile
 
 FLAGS = ("-O2", "-std=gnu11", "-march=native", "-fPIC", "-shared", "-fno-math-errno", "-fno-trapping-math")
-MOST = 256
+MOST = 512
 """Kernels that are kept; the ones that were not used for longest make room."""
 LEFT = 86400.0
 """Seconds after which what a killed process left in the folder goes."""

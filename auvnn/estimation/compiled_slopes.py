@@ -20,11 +20,13 @@ from auvnn.models.identity import Identity, has_hooks
 from auvnn.models.inputs import Inputs
 from auvnn.models.model_kernels import require_plain
 
-WORTH = 3000
-"""Moments below which nothing is compiled: half a second of compiling is 25,000 of them in torch, and a fit takes ten
-steps. It depends on nothing that happened before, so that an answer does not either."""
+WORTH = 200
+"""Moments below which nothing is compiled: half a second of compiling are ten times 200 moments in torch, and fits take
+more steps than that. It depends on nothing that happened before, so that an answer does not either."""
 MOST_PARAMETERS = 80
 """Parameters beyond which nothing is compiled: score tests of all candidates ask once, and the code is long."""
+PARTED = 5000
+"""Moments from which threads share them, where torch has more than one."""
 KEPT = 128
 """Codes that are remembered; the oldest are forgotten."""
 CHECKED, DISAGREES = 3, 1e-9
@@ -144,7 +146,7 @@ def _columns(numbers: Numbers) -> list[int | None]:
 
 
 def _threads(count: int) -> int:
-    return torch.get_num_threads() if count >= 2 * WORTH else 1
+    return torch.get_num_threads() if count >= PARTED else 1
 
 
 def _code(
