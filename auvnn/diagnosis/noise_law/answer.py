@@ -252,7 +252,8 @@ def exceeds_actuators(asked: Setting, state: State, law: ForceLaw | None) -> boo
 def negligible(asked: Setting, state: State, law: ForceLaw | None, uncertain: UncertainWrench) -> bool:
     """Whether a stochastic force is within the tolerance, by its upper limit as a share of the actuators' force.
 
-    What the commands between samples leave uncertain is no lack of the model, however much it is.
+    Its mean over a second counts: a force that changes from sample to sample moves a vehicle little. What the commands
+    between samples leave uncertain is no lack of the model, however much it is.
 
     Args:
         asked: tolerance and layout.
@@ -269,7 +270,8 @@ def negligible(asked: Setting, state: State, law: ForceLaw | None, uncertain: Un
     # Of a process of correlation time T, a span of 2 T is worth one independent value.
     independent = np.maximum(whole / (2.0 * np.maximum(law.time, 1e-9)), 1.0)
     upper = law.rms * (1.0 + ONE_SIDED / np.sqrt(2.0 * independent))
-    beyond = np.where(upper > COVERING * uncertain.over(law.time), upper, 0.0)
+    lasting = upper * law.mean_over(SECOND) / np.maximum(law.rms, 1e-300)
+    beyond = np.where(upper > COVERING * uncertain.over(law.time), lasting, 0.0)
     share = share_of(beyond, actuators_of(asked.layout.model, state.windows))[beyond > 0.0]
     return bool(np.isfinite(share).all() and (share < asked.tolerance.force).all())
 

@@ -68,6 +68,29 @@ def test_what_commands_leave_uncertain_is_no_reason_against_adequate(share, unce
 
 
 @pytest.mark.parametrize(
+    ("share", "time", "expected"),
+    [
+        # 2 % of the actuators' are tolerated. White over 0.02 s, a force keeps a fifth of its rms over a second.
+        (0.05, 0.02, True),
+        (0.05, 0.4, False),
+        (0.2, 0.02, False),
+        (0.015, 5.0, True),
+    ],
+)
+def test_what_changes_from_sample_to_sample_matters_by_its_mean_over_a_second(share, time, expected):
+    model = GreyBox(small_vehicle())
+    windows = windows_for(model, make_log(model))
+    # The log is so short that limits of slow forces are wide: ten hours of the same.
+    windows = windows.pick(np.tile(np.arange(len(windows)), 2000))
+    drive = actuators_of(model, windows)
+    asked: Any = SimpleNamespace(layout=SimpleNamespace(model=model), tolerance=Tolerance())
+    state: Any = SimpleNamespace(windows=windows)
+    law = ForceLaw(np.array([0.0, 0.0, share * drive[2], 0.0, 0.0, 0.0]), np.full(6, time), 0.2, 5.0)
+    none = UncertainWrench(np.zeros(6), np.zeros(6), 0.1)
+    assert negligible(asked, state, law, none) is expected
+
+
+@pytest.mark.parametrize(
     ("names", "left", "before", "expected"),
     [
         (["a", "b"], 0.4, ["a"], True),
