@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -62,13 +61,13 @@ class _Made:
         return torch.equal(row[self.fixed], self.values)
 
 
-_MADE: weakref.WeakKeyDictionary[nn.Module, dict[Any, _Made]] = weakref.WeakKeyDictionary()
+_MADE: dict[Any, _Made] = {}
 
 
 _KERNELS: dict[str, Kernel] = {}
 
 
-_MOST = 64
+_MOST = 128
 
 
 """Kernels and situations that are remembered; the oldest are forgotten."""
@@ -114,9 +113,8 @@ def _made(model: GreyBox, inputs: Inputs, gradient: bool, tableau: tuple) -> _Ma
     identity = Identity(model)
     layout = _layout(model, inputs)
     key = (identity.key, layout, gradient, tableau)
-    known = _MADE.setdefault(model, {})
     row = numbers.row().detach()
-    made = known.get(key)
+    made = _MADE.get(key)
     if made is not None and made.holds(row):
         return made
     try:
@@ -127,10 +125,10 @@ def _made(model: GreyBox, inputs: Inputs, gradient: bool, tableau: tuple) -> _Ma
         made = _Made(identity.held, kernel, "", places, row[places].clone())
     except CannotCompile as no:
         made = _Made(identity.held, None, str(no))
-    known.pop(key, None)
-    known[key] = made
-    while len(known) > _MOST:
-        known.pop(next(iter(known)))
+    _MADE.pop(key, None)
+    _MADE[key] = made
+    while len(_MADE) > _MOST:
+        _MADE.pop(next(iter(_MADE)))
     return made
 
 

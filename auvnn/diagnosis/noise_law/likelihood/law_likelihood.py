@@ -167,11 +167,30 @@ class Likelihood:
         )
         if start is None:
             start = self._start(axes)
+        start = np.clip(start, low, high)
+        unit = 1.0 / np.sqrt(self._information(start))
+
+        def scaled(z: Array) -> tuple[float, Array]:
+            value, slope = self.sloped(axes, z * unit)
+            return value, slope * unit
+
         found = minimize(
-            lambda x: self.sloped(axes, x), np.clip(start, low, high), jac=True, method="L-BFGS-B",
-            bounds=list(zip(low, high, strict=True)), options={"maxiter": most, "ftol": 1e-7},
+            scaled, start / unit, jac=True, method="L-BFGS-B",
+            bounds=list(zip(low / unit, high / unit, strict=True)), options={"maxiter": most, "ftol": 1e-7},
         )  # fmt: skip
-        return float(found.fun), np.asarray(found.x)
+        # Scaled back and forth, a bound may be missed by a rounding.
+        return float(found.fun), np.clip(np.asarray(found.x) * unit, low, high)
+
+    def _information(self, x: Array) -> Array:
+        """Return roughly how curved minus twice the log likelihood is in log rms and log time, (2 A,).
+
+        Of a process of correlation time T, a span of 2 T is worth one independent value; each adds 4 to the curvature in
+        the logarithm of their rms, and about 1 to that of the time. A search in these units needs a quarter fewer steps.
+        """
+        count = len(x) // 2
+        whole = len(self.sums.statistics.cost) * self.sums.span
+        independent = np.maximum(0.5 * whole / np.exp(x[count:]), 10.0)
+        return np.concatenate([4.0 * independent, independent])
 
     def _start(self, axes: list[int]) -> Array:
         """Return the best of a few sizes, one degree of freedom after the other."""
