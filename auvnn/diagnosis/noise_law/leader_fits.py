@@ -55,12 +55,41 @@ class LeaderFits:
         say: called with what is being done, in words.
         known: what was fitted beside an explanation, by that and the effect's name: a search that passes there again asks
             for the same.
+        beside: all of that, by the explanation alone.
     """
 
     layout: Layout
     fits: LawFits
     say: Callable[[str], None]
     known: dict[tuple[int, str], tuple[Hypothesis, Hypothesis | None]] = field(default_factory=dict)
+    beside: dict[int, list[Hypothesis]] = field(default_factory=dict)
+
+    def fitted(
+        self, at: Round, alone: Sequence[FittedHypothesis], odds: float, level: float,
+        good: Callable[[list[Hypothesis], float], list[Hypothesis]],
+    ) -> tuple[list[Hypothesis], list[Hypothesis]]:  # fmt: skip
+        """Return what has been fitted in a round, and what of it may be named, both the most evident first.
+
+        Args:
+            at: the round.
+            alone: explanations of one effect that the first search has fitted.
+            odds: logarithm of the odds that a name needs.
+            level: at which chance among all effects is rejected.
+            good: returns what of such explanations may be named at such odds.
+        """
+        found = self._joined(at, self.leading(at, alone, odds, level))
+        named = good(found, odds)
+        # A small lead is none before more of those whose tests are significant have been fitted.
+        if not at.chosen and not (named and named[0].evidence > at.current.evidence + LARGE_ODDS):
+            found = self._joined(at, self.wider(at, found, level))
+            named = good(found, odds)
+        return found, named
+
+    def _joined(self, at: Round, found: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return what was fitted beside an explanation, now and by an earlier search, the most evident first."""
+        known = {h.name: h for h in [*self.beside.get(id(at.current), []), *found]}
+        self.beside[id(at.current)] = _by_evidence(known.values())
+        return list(self.beside[id(at.current)])
 
     def leading(
         self, at: Round, fitted: Sequence[FittedHypothesis], odds: float, level: float
@@ -110,7 +139,9 @@ class LeaderFits:
         """Return the effects that lead under the law, without those that are known."""
         scores = {n: s for n, s in at.tested.scores.items() if s.degrees}
         order = sorted(scores, key=lambda n: -scores[n].evidence)[:LEADERS]
-        by_gain = sorted(scores, key=lambda n: scores[n].degrees - scores[n].gain)[:1]
+        # Where few windows tell of an effect (drag that grows with time), its evidence is small and its gain is not.
+        by_gain = sorted(scores, key=lambda n: scores[n].degrees - scores[n].gain)
+        by_gain = by_gain[: 1 if at.chosen else LEADERS]
         # A further name must bring much: what promises a small part of that is not worth a fit.
         worth = [n for n in dict.fromkeys([*order, *by_gain]) if not at.chosen or 0.5 * scores[n].gain > odds]
         return [n for n in worth if n not in {*known}]

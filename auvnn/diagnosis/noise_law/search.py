@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,10 +86,9 @@ class ForceSearch:
         self.response: Array | None = None
         self.ignores_cost = self.looks_further = False
         self.in_closed_loop = False
-        # What was asked at an explanation, for a second search that passes there: its tests, what was fitted beside it,
-        # and where an explanation went with a law of its own.
+        # What was asked at an explanation, for a second search that passes there: its tests, and where it went with a law
+        # of its own.
         self._tests: dict[int, Tested] = {}
-        self._found: dict[int, list[Hypothesis]] = {}
         self._gone_on: dict[int, Hypothesis] = {}
         self._leaders: LeaderFits | None = None
 
@@ -181,11 +181,7 @@ class ForceSearch:
             share = 0.0 if self.looks_further else FURTHER_SHARE
             odds = max(ODDS, share * (current.evidence - null.evidence))
             at = Round(tests, current, base, chosen, earlier)
-            found = self._joined(current, fits.leading(at, fitted, odds, ALPHA_NAME))
-            good = self._good(found, at, odds, len(remaining))
-            if not good and not chosen:
-                found = self._joined(current, fits.wider(at, found, ALPHA_NAME))
-                good = self._good(found, at, odds, len(remaining))
+            found, good = fits.fitted(at, fitted, odds, ALPHA_NAME, partial(self._good, at, len(remaining)))
             sure = {h.name: _sure(self.layout, h, at, len(remaining)) for h in found}
             if not chosen:
                 earlier = {h.name: parameters_of(h.explanation.fitted.model, [h.name]) for h in found}
@@ -238,20 +234,14 @@ class ForceSearch:
             self._tests[id(current)] = tests(current.weighed, remaining, base, chosen)
         return self._tests[id(current)]
 
-    def _joined(self, current: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Return what was fitted beside an explanation, now and by an earlier search, the most evident first."""
-        known = {h.name: h for h in [*self._found.get(id(current), []), *found]}
-        self._found[id(current)] = sorted(known.values(), key=lambda h: -h.evidence)
-        return list(self._found[id(current)])
-
-    def _good(self, found: Sequence[Hypothesis], at: Round, odds: float, among: int) -> list[Hypothesis]:
+    def _good(self, at: Round, among: int, found: Sequence[Hypothesis], odds: float) -> list[Hypothesis]:
         """Return those explanations that may be named, the most evident first.
 
         Args:
-            found: explanations that were judged.
             at: the round.
-            odds: logarithm of the odds that a name needs.
             among: how many effects were asked for.
+            found: explanations that were judged.
+            odds: logarithm of the odds that a name needs.
         """
         level, least = (ALPHA_FURTHER, GAIN_FURTHER) if at.chosen else (ALPHA_NAME, GAIN)
         likely = [

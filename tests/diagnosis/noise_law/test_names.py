@@ -164,9 +164,9 @@ def test_a_further_name_brings_much_of_the_gain_or_takes_the_force_of_an_axis(rm
     asked = Search(tolerance=Tolerance.of(0), layout=None)
     at = Round(None, with_law((2.0, 2.0)), [], ["tether"])  # type: ignore[arg-type]
     found = with_law(rms, 50.0, "waves")
-    assert [h.name for h in asked._good([found], at, 100.0, 10)] == expected  # type: ignore[list-item]
+    assert [h.name for h in asked._good(at, 10, [found], 100.0)] == expected  # type: ignore[list-item]
     # As much evidence as was asked for is enough by itself.
-    assert asked._good([found], at, 40.0, 10) == [found]  # type: ignore[list-item]
+    assert asked._good(at, 10, [found], 40.0) == [found]  # type: ignore[list-item]
 
 
 def test_in_open_loop_free_running_must_not_get_worse(monkeypatch):

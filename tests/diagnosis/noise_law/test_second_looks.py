@@ -116,6 +116,36 @@ def test_a_further_name_is_fitted_where_its_test_promises_enough(monkeypatch, od
     assert asked == [NAME] * fitted
 
 
+@pytest.mark.parametrize(("chosen", "fitted"), [([], "abcghi"), (["waves"], "abcg")])
+def test_effects_that_few_windows_tell_of_are_fitted_by_their_gain(monkeypatch, chosen, fitted):
+    # The evidence falls from "a" to "i", the gain is largest for "g", then "h", "i" and "a".
+    gains = dict(zip("abcdefghi", (300, 250, 240, 230, 220, 210, 900, 800, 700), strict=True))
+    scores = {
+        n: SimpleNamespace(degrees=1, evidence=-float(k), gain=float(gains[n]), p_value=1.0)
+        for k, n in enumerate(gains)
+    }
+    asked: list[str] = []
+    looks = LeaderFits(None, None, lambda _: None)  # type: ignore[arg-type]
+    monkeypatch.setattr(LeaderFits, "_one", lambda self, name, at, known: asked.append(name))
+    looks.leading(Round(SimpleNamespace(scores=scores), None, [], chosen), [], 10.0, 0.01)  # type: ignore[arg-type]
+    assert "".join(sorted(asked)) == fitted
+
+
+@pytest.mark.parametrize(
+    ("lead", "chosen", "more"),
+    [(250.0, [], True), (350.0, [], False), (None, [], True), (250.0, ["waves"], False)],
+)
+def test_a_small_lead_is_none_before_more_effects_are_fitted(monkeypatch, lead, chosen, more):
+    first = [] if lead is None else [SimpleNamespace(name="payload", evidence=-1000.0 + lead)]
+    rival = SimpleNamespace(name="biofouling", evidence=-600.0)
+    monkeypatch.setattr(LeaderFits, "leading", lambda *_: first)
+    monkeypatch.setattr(LeaderFits, "wider", lambda self, at, found, level: [*found, rival])
+    looks = LeaderFits(None, None, lambda _: None)  # type: ignore[arg-type]
+    at: Any = Round(None, SimpleNamespace(evidence=-1000.0), [], chosen)  # type: ignore[arg-type]
+    found, good = looks.fitted(at, [], 4.6, 0.01, lambda found, odds: found)
+    assert found == good == ([rival, *first] if more else first)
+
+
 def test_whether_commands_answer_is_asked_about_the_filtered_trajectories(monkeypatch):
     model = GreyBox(small_vehicle())
     log = wandering_log(model, np.array([4.0, 4.0, 4.0, 0.4, 0.4, 0.5]), 1.0, runs=2, duration=20.0)
