@@ -16,16 +16,17 @@ from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.commands.holding import Holding, cost_at_best, holding
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncertain_wrench
-from auvnn.diagnosis.noise_law.hypothesis import SECOND, WithForce, shares_left
+from auvnn.diagnosis.noise_law.hypothesis import WithForce, shares_left
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
+from auvnn.diagnosis.noise_law.left_force import exceeds_actuators, negligible
 from auvnn.diagnosis.noise_law.likelihood.estimate_law import ALPHA_BOUNDARY
 from auvnn.diagnosis.noise_law.noise_colour import Colour, noise_colour
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.diagnosis.noise_law.split_windows import fitted_over_parts
+from auvnn.diagnosis.noise_law.standing_names import beside_names, stand
 from auvnn.diagnosis.noise_law.words import left
-from auvnn.diagnosis.residuals.forces import actuators_of, share_of
 from auvnn.diagnosis.residuals.variance_component_test import variance_component_test, white
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.state import Setting, State
@@ -35,17 +36,12 @@ from auvnn.metrics.force_law import ForceLaw
 Array = NDArray[np.float64]
 # Share of the force beyond which a name has left most of it.
 MOST = 0.5
-# A stochastic force beyond this share of the actuators' is no disturbance: the model lacks what moves the vehicle. A name
-# that leaves less than this share of what there was has explained that.
-LARGEST, EXPLAINED = 0.5, 0.25
+# A name that leaves less than this share of what there was has explained a force that is too large for a disturbance.
+EXPLAINED = 0.25
 UNDECIDED = (
     "names were not compared together with a stochastic force: with one, free running grows without bound; "
     "choose shorter windows with window="
 )
-# Standard errors of a one-sided limit that holds in 19 of 20 logs.
-ONE_SIDED = 1.645
-# Standard deviations of what commands between samples leave uncertain within which a force is no more than that.
-COVERING = 2.0
 
 
 def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, Any], list[str]]:
@@ -84,7 +80,8 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         # With all names nothing significant is left: those that predict alone decide whether there is.
         state = settled(asked, state)
     try:
-        beside = _with_force(asked, state, uncertain)
+        ask = beside_names if stand(state, colour) else _with_force
+        beside = ask(asked, state, uncertain)
     except UNSOLVED:
         # The first answer stands: it did not need what could not be solved here.
         return state, told, [UNDECIDED]
@@ -230,50 +227,6 @@ def refuted(asked: Setting, state: State, law: ForceLaw | None, share: float, *,
     if not chance and share > MOST:
         return True
     return share > EXPLAINED and exceeds_actuators(asked, state, law)
-
-
-def exceeds_actuators(asked: Setting, state: State, law: ForceLaw | None) -> bool:
-    """Whether the stochastic force is so large beside the actuators' that no cause can be told from the motion.
-
-    Args:
-        asked: layout.
-        state: windows over which the force was sought.
-        law: root mean square, N and N m, and correlation time, s, of the force; None where none was found.
-    """
-    if law is None:
-        return False
-    mean = law.mean_over(SECOND)
-    drive = actuators_of(asked.layout.model, state.windows)
-    # Fins and a vehicle's own balance hold what thrusters do not: the largest of forces, and of moments, is the measure.
-    most = np.repeat([drive[:3].max(), drive[3:].max()], 3)
-    return bool((mean[most > 0.0] > LARGEST * most[most > 0.0]).any())
-
-
-def negligible(asked: Setting, state: State, law: ForceLaw | None, uncertain: UncertainWrench) -> bool:
-    """Whether a stochastic force is within the tolerance, by its upper limit as a share of the actuators' force.
-
-    Its mean over a second counts: a force that changes from sample to sample moves a vehicle little. What the commands
-    between samples leave uncertain is no lack of the model, however much it is.
-
-    Args:
-        asked: tolerance and layout.
-        state: windows over which the force was sought.
-        law: root mean square, N and N m, and correlation time, s, of the force; None where none was found.
-        uncertain: what commands between samples leave uncertain.
-    """
-    if asked.tolerance.strict:
-        return False
-    if law is None:
-        return True
-    times = state.windows.times[:, state.windows.warmup :]
-    whole = float((times[:, -1] - times[:, 0]).sum())
-    # Of a process of correlation time T, a span of 2 T is worth one independent value.
-    independent = np.maximum(whole / (2.0 * np.maximum(law.time, 1e-9)), 1.0)
-    upper = law.rms * (1.0 + ONE_SIDED / np.sqrt(2.0 * independent))
-    lasting = upper * law.mean_over(SECOND) / np.maximum(law.rms, 1e-300)
-    beyond = np.where(upper > COVERING * uncertain.over(law.time), lasting, 0.0)
-    share = share_of(beyond, actuators_of(asked.layout.model, state.windows))[beyond > 0.0]
-    return bool(np.isfinite(share).all() and (share < asked.tolerance.force).all())
 
 
 def _words(predicted: InputPrediction) -> str:

@@ -92,12 +92,13 @@ class ForceSearch:
         self._gone_on: dict[int, Hypothesis] = {}
         self._leaders: LeaderFits | None = None
 
-    def begin(self, first: FittedHypothesis, sigma: Array) -> Hypothesis | None:
-        """Return the explanation without any name under the law of the force; None where no variance is above zero.
+    def begin(self, first: FittedHypothesis, sigma: Array, steps: int = NULL_STEPS) -> Hypothesis | None:
+        """Return an explanation under the law of the force; None where no variance is above zero.
 
         Args:
-            first: the fit without any effect.
+            first: the fit without any effect, beside which names are sought; or one with names that stand.
             sigma: (18,) the sensors' white noise.
+            steps: of its fit under the law; with none its parameters stay.
         """
         self.say("estimating the law of the force that is left")
         # Fits without the force weigh errors as the first one did.
@@ -123,7 +124,7 @@ class ForceSearch:
                 return None
         assert found.law is not None
         # All names are compared with it: it must not gain by steps that names take first.
-        null = self._fits().settled(self.judged(first, found.law), NULL_STEPS)
+        null = self._fits().settled(self.judged(first, found.law), steps)
         with suppress(*UNSOLVED):
             self.in_closed_loop = in_closed_loop(null.explanation, self.windows)
         return null
@@ -212,10 +213,10 @@ class ForceSearch:
             [under_law.told(h.explanation) for h in tried],
             whole,
             in_newtons(null.estimate.law, null.explanation),
-            self._predicted(current),
+            self.predicted(current),
         )
 
-    def _predicted(self, found: Hypothesis) -> InputPrediction | None:
+    def predicted(self, found: Hypothesis) -> InputPrediction | None:
         """Return what measured inputs predict of the force that an explanation leaves; None where that is little."""
         self.say("asking how much of the force measured inputs predict")
         about, law = self._about(found.explanation), found.estimate.law
@@ -275,7 +276,7 @@ class ForceSearch:
         still predict the force, is no further cause.
         """
         known = any(confused(further.name, name) for name in chosen)
-        return known and self._predicted(further) is not None
+        return known and self.predicted(further) is not None
 
 
 def _sure(layout: Layout, found: Hypothesis, at: Round, among: int) -> float:

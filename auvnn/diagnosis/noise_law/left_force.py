@@ -1,0 +1,62 @@
+"""Whether a stochastic force that is left is too large for a disturbance, or too small to matter."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench
+from auvnn.diagnosis.noise_law.hypothesis import SECOND
+from auvnn.diagnosis.residuals.forces import actuators_of, share_of
+from auvnn.diagnosis.stages.state import Setting, State
+from auvnn.metrics.force_law import ForceLaw
+
+# A stochastic force beyond this share of the actuators' is no disturbance: the model lacks what moves the vehicle.
+LARGEST = 0.5
+# Standard errors of a one-sided limit that holds in 19 of 20 logs.
+ONE_SIDED = 1.645
+# Standard deviations of what commands between samples leave uncertain within which a force is no more than that.
+COVERING = 2.0
+
+
+def exceeds_actuators(asked: Setting, state: State, law: ForceLaw | None) -> bool:
+    """Whether the stochastic force is so large beside the actuators' that no cause can be told from the motion.
+
+    Args:
+        asked: layout.
+        state: windows over which the force was sought.
+        law: root mean square, N and N m, and correlation time, s, of the force; None where none was found.
+    """
+    if law is None:
+        return False
+    mean = law.mean_over(SECOND)
+    drive = actuators_of(asked.layout.model, state.windows)
+    # Fins and a vehicle's own balance hold what thrusters do not: the largest of forces, and of moments, is the measure.
+    most = np.repeat([drive[:3].max(), drive[3:].max()], 3)
+    return bool((mean[most > 0.0] > LARGEST * most[most > 0.0]).any())
+
+
+def negligible(asked: Setting, state: State, law: ForceLaw | None, uncertain: UncertainWrench) -> bool:
+    """Whether a stochastic force is within the tolerance, by its upper limit as a share of the actuators' force.
+
+    Its mean over a second counts: a force that changes from sample to sample moves a vehicle little. What the commands
+    between samples leave uncertain is no lack of the model, however much it is.
+
+    Args:
+        asked: tolerance and layout.
+        state: windows over which the force was sought.
+        law: root mean square, N and N m, and correlation time, s, of the force; None where none was found.
+        uncertain: what commands between samples leave uncertain.
+    """
+    if asked.tolerance.strict:
+        return False
+    if law is None:
+        return True
+    times = state.windows.times[:, state.windows.warmup :]
+    whole = float((times[:, -1] - times[:, 0]).sum())
+    # Of a process of correlation time T, a span of 2 T is worth one independent value.
+    independent = np.maximum(whole / (2.0 * np.maximum(law.time, 1e-9)), 1.0)
+    upper = law.rms * (1.0 + ONE_SIDED / np.sqrt(2.0 * independent))
+    lasting = upper * law.mean_over(SECOND) / np.maximum(law.rms, 1e-300)
+    beyond = np.where(upper > COVERING * uncertain.over(law.time), lasting, 0.0)
+    share = share_of(beyond, actuators_of(asked.layout.model, state.windows))[beyond > 0.0]
+    return bool(np.isfinite(share).all() and (share < asked.tolerance.force).all())

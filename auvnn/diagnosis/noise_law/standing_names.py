@@ -1,0 +1,76 @@
+"""Names that leave so little that a stochastic force cannot refute them: they stand, and what is left is estimated."""
+
+from __future__ import annotations
+
+from auvnn.answer_types import SearchStep
+from auvnn.diagnosis.hypotheses.measured_start import noise_share
+from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench
+from auvnn.diagnosis.noise_law.hypothesis import in_newtons
+from auvnn.diagnosis.noise_law.left_force import negligible
+from auvnn.diagnosis.noise_law.likelihood.estimate_law import ALPHA_BOUNDARY
+from auvnn.diagnosis.noise_law.noise_colour import Colour
+from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
+from auvnn.diagnosis.noise_law.search import ForceSearch
+from auvnn.diagnosis.noise_law.split_windows import fitted_over_parts
+from auvnn.diagnosis.residuals.variance_component_test import variance_component_test, white
+from auvnn.diagnosis.stages.state import Setting, State
+from auvnn.metrics.force_law import ForceLaw
+
+# Names stand that leave less than such a share of the noise's square above it, and less than such a share of what was
+# above it before. A force that moves the vehicle leaves more than the noise.
+LITTLE, MOST_LEFT = 0.2, 1.0 / 3.0
+
+
+def stand(state: State, colour: Colour) -> bool:
+    """Whether the names of the first search leave so little of the error that they stand whatever the rest is.
+
+    Sensors whose noise is not white leave errors that a test takes for a force, small beside the noise. Each part of a
+    window then begins with a state of its own, and the likelihood beside such a force knows less of names than free
+    running over whole windows, which they explain down to the noise.
+
+    Args:
+        state: where the first search ended.
+        colour: of the sensors' noise.
+    """
+    if colour.noise is None or not state.chosen or state.refuted is not None:
+        return False
+    before, after = (1.0 / max(noise_share(e.fitted), 1e-12) - 1.0 for e in (state.first, state.current))
+    return after < LITTLE and after < MOST_LEFT * before
+
+
+def beside_names(
+    asked: Setting, state: State, uncertain: UncertainWrench
+) -> tuple[State, ForceLaw | None, InputPrediction | None] | None:
+    """Return the state with its names and what is left beside them, the law of that, and what inputs predict of it.
+
+    None where there is no such force.
+
+    Args:
+        asked: what is asked.
+        state: where the first search ended.
+        uncertain: what commands between samples leave uncertain.
+    """
+    noise = white(state.current, asked.floor)
+    if not variance_component_test(state.current, state.windows, noise).p_value < ALPHA_BOUNDARY:
+        return None
+    end, windows = fitted_over_parts(asked, state.current, state.windows)
+    beside = ForceSearch(asked, windows)
+    found = beside.begin(end, white(end, asked.floor), 0)
+    if found is None:
+        return None
+    predicted = beside.predicted(found)
+    law = in_newtons(found.estimate.law, found.explanation)
+    small = predicted is None and negligible(asked, state, law, uncertain)
+    steps = [s for s in state.steps if s["effects"]]
+    end_step: SearchStep = {
+        "verdict": "adequate" if small else "unknown",
+        "effects": [],
+        "p_value": state.p_value,
+    }
+    # As beside names that were found together with the force: what is stochastic is reported, and is no riddle.
+    steps += [end_step] if small or predicted is not None else []
+    return (
+        state.but(steps=tuple(steps), negligible=small, left=None, traced=None, remainder=None),
+        law,
+        predicted,
+    )

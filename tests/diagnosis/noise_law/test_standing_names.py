@@ -1,0 +1,68 @@
+"""Names that leave next to nothing beside noise that is not white stand, and what is left beside them is told."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.noise_law import answer, standing_names
+from auvnn.diagnosis.noise_law.noise_colour import Colour
+from auvnn.diagnosis.noise_law.standing_names import stand
+from auvnn.models import GreyBox
+from tests.diagnosis.noise_law.wandering import wandering_log
+from tests.small_logs import small_vehicle
+
+COLOURED: Any = Colour(SimpleNamespace(), 10.0)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "expected"),
+    [
+        # Above the noise's square as shares of it: of 1.85 a twentieth is left, or of 0.10 a fifth.
+        (1.85, 0.10, True),
+        (0.104, 0.019, True),
+        # Most of it is left, or a force that moves the vehicle is.
+        (0.10, 0.05, False),
+        (6.0, 0.3, False),
+        (6.0, 1.5, False),
+    ],
+)
+def test_what_names_leave_decides(monkeypatch, before, after, expected):
+    monkeypatch.setattr(standing_names, "noise_share", lambda fitted: 1.0 / (1.0 + fitted))
+    state: Any = SimpleNamespace(
+        chosen=("payload",),
+        refuted=None,
+        first=SimpleNamespace(fitted=before),
+        current=SimpleNamespace(fitted=after),
+    )
+    assert stand(state, COLOURED) is expected
+    # Where the noise is white the comparison beside a force decides, and where nothing is named nothing stands.
+    assert not stand(state, Colour(None, 0.0))
+    state.chosen = ()
+    assert not stand(state, COLOURED)
+    state.chosen, state.refuted = ("payload",), SimpleNamespace()
+    assert not stand(state, COLOURED)
+
+
+@pytest.mark.long
+def test_names_that_stand_keep_their_values_and_the_force_beside_them_is_told(monkeypatch):
+    model, rms = GreyBox(small_vehicle()), np.array([4.0, 4.0, 4.0, 0.4, 0.4, 0.5])
+    plant = model.with_effects({"net_buoyancy": {"force": 40.0}})
+    log = wandering_log(plant, rms, 1.0, runs=2, duration=40.0, seed=4)
+    ask = lambda stochastic: diagnose(  # noqa: E731
+        model, log, ["net_buoyancy"], advice=False, whiteness=False, stochastic=stochastic
+    )
+    monkeypatch.setattr(answer, "stand", lambda state, colour: bool(state.chosen))
+    plain, found = ask(False), ask(True)
+    assert plain.missing == found.missing == ["net_buoyancy"] and found.verdict == "named"
+    (one,), (other,) = plain.candidates, found.candidates
+    assert one["parameters"] == other["parameters"]
+    # What is left is no riddle, but a force with a law.
+    assert [s["verdict"] for s in plain.steps] == ["named", "unknown"]
+    assert [s["verdict"] for s in found.steps] == ["named"]
+    for axis in "XYZ":
+        assert found.stochastic["force"][axis]["rms"] == pytest.approx(4.0, rel=0.3)
