@@ -25,6 +25,7 @@ SAMPLES = {
     "rows-6.jsonl": 5,
     "rows-7.jsonl": 6,
     "rows-8.jsonl": 7,
+    "rows-9.jsonl": 8,
 }
 
 
