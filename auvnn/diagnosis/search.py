@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.measured_start import GROSS, noise_share
+from auvnn.diagnosis.hypotheses.measured_start import GROSS, above_noise, noise_share
 from auvnn.diagnosis.residuals.variance_component_test import variance_component_test, white
 from auvnn.diagnosis.stages.search_round import ALPHA_UNKNOWN, fit_null, regroup, search_round
 from auvnn.diagnosis.stages.state import Setting, State
@@ -83,6 +83,5 @@ def _takes_little(before: FittedHypothesis, after: FittedHypothesis) -> bool:
         before: explanation without it.
         after: explanation with it.
     """
-    share = noise_share(after.fitted)
-    excess = [1.0 / max(s, 1e-12) - 1.0 for s in (noise_share(before.fitted), share)]
-    return share < GROSS and excess[1] > (1.0 - EACH) * excess[0]
+    most_is_left = noise_share(after.fitted) < GROSS
+    return most_is_left and above_noise(after.fitted) > (1.0 - EACH) * above_noise(before.fitted)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import replace
 
 import torch
 from torch import Tensor, nn
@@ -12,6 +11,7 @@ from torch.func import functional_call, jacrev
 
 from auvnn.compiled import toolchain
 from auvnn.compiled.check import difference
+from auvnn.compiled.known_code import KnownCode, Made
 from auvnn.compiled.point_jacobian import PointJacobian
 from auvnn.compiled.program import Layout, Numbers, trace
 from auvnn.compiled.recorder import CannotCompile
@@ -33,15 +33,7 @@ CHECKED, DISAGREES = 3, 1e-9
 """Moments at which code is compared with torch, and the largest difference relative to the largest slope."""
 
 
-@dataclass
-class _Made:
-    held: list[Any]
-    code: PointJacobian | None
-    fixed: Tensor = field(default_factory=lambda: torch.zeros(0, dtype=torch.int64))
-    values: Tensor = field(default_factory=lambda: torch.zeros(0, dtype=torch.float64))
-
-
-_MADE: dict[Any, _Made] = {}
+_MADE: KnownCode[PointJacobian] = KnownCode(KEPT)
 
 
 class _Side(nn.Module):
@@ -158,25 +150,22 @@ def _code(
     identity = Identity(side.model)
     key = (side.what, identity.key, layout, numbers.wanted)
     row = numbers.row()
-    made = _MADE.get(key)
-    if made is not None and torch.equal(row[made.fixed], made.values):
-        return made.code
     fixed = torch.nonzero(numbers.fixed()).squeeze(-1)
-    try:
-        with torch.inference_mode(False):
-            toolchain.key("", 1)  # Without a compiler there is no need to trace.
-            sample = {"y": y[0], **{name: x[0] for name, x in parts.items()}}
-            program = trace(side, layout, numbers, sample, True, _rows(side, sample))
-            code = PointJacobian(program, layout)
-            code.load()
-            _check(code, side, numbers, layout, y, u, fixed)
-    except CannotCompile:
-        code = None
-    _MADE.pop(key, None)
-    _MADE[key] = _Made(identity.held, code, fixed, row[fixed].clone())
-    while len(_MADE) > KEPT:
-        _MADE.pop(next(iter(_MADE)))
-    return code
+
+    def make() -> Made[PointJacobian]:
+        try:
+            with torch.inference_mode(False):
+                toolchain.key("", 1)  # Without a compiler there is no need to trace.
+                sample = {"y": y[0], **{name: x[0] for name, x in parts.items()}}
+                program = trace(side, layout, numbers, sample, True, _rows(side, sample))
+                code = PointJacobian(program, layout)
+                code.load()
+                _check(code, side, numbers, layout, y, u, fixed)
+        except CannotCompile as no:
+            return Made(identity.held, None, str(no))
+        return Made(identity.held, code, "", fixed, row[fixed].clone())
+
+    return _MADE.get(key, row, make).code
 
 
 def _rows(side: _Side, sample: Mapping[str, Tensor]) -> int:

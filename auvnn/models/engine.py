@@ -73,7 +73,7 @@ def why_not(
     inputs = inputs or Inputs(torch.zeros(1, model.actuators.size, dtype=torch.float64))
     try:
         made = _made(model, inputs, gradient, TABLEAUS[solver])
-        if made.kernel is None:
+        if made.code is None:
             return made.reason
         _ready(made, model, inputs, 1)
     except CannotCompile as no:
@@ -150,16 +150,16 @@ def _compiled(
         if cost < QUICK or spent < WORTH_TRACING:
             return None
     made = _made(model, inputs, gradient, tableau)
-    if made.kernel is None:
+    if made.code is None:
         raise CannotCompile(made.reason)
-    if choosing and not made.kernel.is_ready(count) and spent < _compiling(gradient):
+    if choosing and not made.code.is_ready(count) and spent < _compiling(gradient):
         return None
     _ready(made, model, inputs, count)
     numbers = Numbers.of(_RightHandSide(model)).row()
     y0 = torch.cat([x.reshape(count, x.shape[-1]) for x in state], dim=-1)
     slopes = None if drive.slopes is None else _flat(drive.slopes, 3, batch)
     means = _flat(drive.means if drive.slopes is None else drive.means.expand(drive.slopes.shape), 3, batch)
-    run = made.kernel.run(y0, means, slopes, _held(inputs, batch), _flat(times, 1, batch), numbers, substeps)
+    run = made.code.run(y0, means, slopes, _held(inputs, batch), _flat(times, 1, batch), numbers, substeps)
     run = run.reshape(*batch, rows, SIZE)
     return run[..., :7], run[..., 7:]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +11,7 @@ from torch import Tensor, nn
 from auvnn.compiled import toolchain
 from auvnn.compiled.check import disagreement
 from auvnn.compiled.kernel import Kernel
+from auvnn.compiled.known_code import KnownCode, Made
 from auvnn.compiled.program import Layout, Numbers, Program, trace, trace_plain
 from auvnn.compiled.recorder import CannotCompile
 from auvnn.compiled.source import write
@@ -45,32 +45,10 @@ class _RightHandSide(nn.Module):
         return state_rate(self.model, y, thrust, row, time, prepared)
 
 
-@dataclass
-class _Made:
-    """What came of one model in one situation."""
-
-    held: list[Any]
-    kernel: Kernel | None
-    reason: str
-    fixed: Tensor = field(default_factory=lambda: torch.zeros(0, dtype=torch.int64))
-    values: Tensor = field(default_factory=lambda: torch.zeros(0, dtype=torch.float64))
-    checked: set[int] = field(default_factory=set)
-
-    def holds(self, row: Tensor) -> bool:
-        """Return whether the numbers that went into the code are what they were."""
-        return torch.equal(row[self.fixed], self.values)
-
-
-_MADE: dict[Any, _Made] = {}
-
-
-_KERNELS: dict[str, Kernel] = {}
-
-
 _MOST = 128
-
-
 """Kernels and situations that are remembered; the oldest are forgotten."""
+_MADE: KnownCode[Kernel] = KnownCode(_MOST)
+_KERNELS: dict[str, Kernel] = {}
 
 
 def require_plain(tensors: list[Tensor]) -> None:
@@ -103,7 +81,7 @@ def _layout(model: GreyBox, inputs: Inputs) -> Layout:
     return Layout(SIZE, (("thrust", size), ("command", size), ("fins", fins), *plain, ("time", None)))
 
 
-def _made(model: GreyBox, inputs: Inputs, gradient: bool, tableau: tuple) -> _Made:
+def _made(model: GreyBox, inputs: Inputs, gradient: bool, tableau: tuple) -> Made[Kernel]:
     """Return the kernel of a model, traced if need be but not compiled, or why there is none."""
     if has_hooks(model):
         raise CannotCompile("a hook is registered on a part of the model")
@@ -114,22 +92,18 @@ def _made(model: GreyBox, inputs: Inputs, gradient: bool, tableau: tuple) -> _Ma
     layout = _layout(model, inputs)
     key = (identity.key, layout, gradient, tableau)
     row = numbers.row().detach()
-    made = _MADE.get(key)
-    if made is not None and made.holds(row):
-        return made
-    try:
-        # In inference mode some operations would show as wholes and not as what they are made of.
-        with torch.inference_mode(False):
-            kernel, fixed = _traced(side, layout, numbers, gradient, tableau)
+
+    def make() -> Made[Kernel]:
+        try:
+            # In inference mode some operations would show as wholes and not as what they are made of.
+            with torch.inference_mode(False):
+                kernel, fixed = _traced(side, layout, numbers, gradient, tableau)
+        except CannotCompile as no:
+            return Made(identity.held, None, str(no))
         places = torch.nonzero(fixed).squeeze(-1)
-        made = _Made(identity.held, kernel, "", places, row[places].clone())
-    except CannotCompile as no:
-        made = _Made(identity.held, None, str(no))
-    _MADE.pop(key, None)
-    _MADE[key] = made
-    while len(_MADE) > _MOST:
-        _MADE.pop(next(iter(_MADE)))
-    return made
+        return Made(identity.held, kernel, "", places, row[places].clone())
+
+    return _MADE.get(key, row, make)
 
 
 def _traced(
@@ -174,13 +148,13 @@ def _samples(layout: Layout, count: int, seed: int) -> dict[str, Tensor]:
     return found
 
 
-def _ready(made: _Made, model: GreyBox, inputs: Inputs, batch: int) -> None:
+def _ready(made: Made[Kernel], model: GreyBox, inputs: Inputs, batch: int) -> None:
     """Compile, and compare with torch at other states and parameters than those that were traced.
 
     Raises:
         CannotCompile: it cannot be compiled, or says something else than torch.
     """
-    kernel = made.kernel
+    kernel = made.code
     assert kernel is not None
     code = id(kernel.load(batch))
     if code in made.checked:
@@ -189,6 +163,6 @@ def _ready(made: _Made, model: GreyBox, inputs: Inputs, batch: int) -> None:
     numbers = Numbers.of(side)
     different = disagreement(kernel, side, numbers, _samples(kernel.layout, 5, seed=2), made.fixed, batch)
     if different:
-        made.kernel, made.reason = None, different
+        made.code, made.reason = None, different
         raise CannotCompile(different)
     made.checked.add(code)

@@ -1,6 +1,7 @@
 """Everything that is claimed about speed, measured side by side in one process with one thread.
 
-    python experiments/benchmarks/run.py OUT [only=free,windows,many,training,imports,compile] [repeats=20] [seeds=10]
+    python experiments/benchmarks/run.py OUT [only=free,windows,many,training,imports,compile,slopes] [repeats=20]
+        [seeds=10]
 
 Prints tables and writes OUT/benchmarks.json. Peers that are not installed are skipped, and named.
 """
@@ -20,12 +21,13 @@ import torch
 from imports import imports
 from measure import once, table
 from rollouts import Ours, agreement, free_runs, jax_peer, many, windows
+from slopes import MOMENTS, slopes
 from standard import Work, standard_work
 from training import training
 
 torch.set_num_threads(1)
 
-PARTS = ("free", "windows", "many", "training", "imports", "compile")
+PARTS = ("free", "windows", "many", "training", "imports", "compile", "slopes")
 
 
 def machine() -> dict[str, Any]:
@@ -109,6 +111,15 @@ def main(out: str, *options: str) -> None:
         if name in only:
             answer[name] = measured(work, seeds) if name == "training" else measured(work)
             print(f"### {name}\n", *(f"{row}" for row in answer[name]), "", sep="\n", flush=True)
+    if "slopes" in only:
+        answer["slopes"] = found = slopes(repeats)
+        title = f"slopes of the acceleration at {MOMENTS} moments in state, thrust and {found['parameters']} parameters"
+        print(
+            table(title, found["rows"]),
+            f"largest difference {found['difference']:.1g}\n",
+            sep="\n",
+            flush=True,
+        )
     if "imports" in only:
         answer["imports"] = imports(max(3, repeats // 4))
         print("### imports\n", *(f"{row}" for row in answer["imports"]), "", sep="\n", flush=True)

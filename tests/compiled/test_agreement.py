@@ -133,13 +133,13 @@ def test_the_derivative_agrees_at_many_states_and_other_weights(compiler, case):
         other = random_model(case, seed)
         made = kernels._made(other, inputs, False, engines_tableau())
         side = kernels._RightHandSide(other)
-        samples = kernels._samples(made.kernel.layout, 40, seed=10 + seed)
-        y, given = samples["y"], [samples.get(n) for n, _ in made.kernel.layout.inputs]
+        samples = kernels._samples(made.code.layout, 40, seed=10 + seed)
+        y, given = samples["y"], [samples.get(n) for n, _ in made.code.layout.inputs]
         u = torch.cat([x.reshape(40, -1) for x in given if x is not None], -1)
         with torch.no_grad():
             expected = side(y, *given)
         for lot in (slice(0, 40), slice(0, 1)):  # side by side, and one alone
-            assert relative(made.kernel.rate(y[lot], u[lot], Numbers.of(side).row()), expected[lot]) < 1e-12
+            assert relative(made.code.rate(y[lot], u[lot], Numbers.of(side).row()), expected[lot]) < 1e-12
 
 
 def engines_tableau():

@@ -6,6 +6,7 @@ import pytest
 import torch
 
 from auvnn.compiled import toolchain
+from auvnn.compiled.known_code import KnownCode
 from auvnn.damping.bank import DampingBank
 from auvnn.effects import EFFECTS
 from auvnn.estimation import compiled_slopes as slopes_module
@@ -28,7 +29,7 @@ def always(monkeypatch):
     """However few moments there are, they are worth it."""
     monkeypatch.setenv("AUVNN_ENGINE", "auto")
     monkeypatch.setattr(slopes_module, "WORTH", 1)
-    monkeypatch.setattr(slopes_module, "_MADE", {})
+    monkeypatch.setattr(slopes_module, "_MADE", KnownCode(16))
 
 
 def model_with(names, damping=None):
@@ -180,7 +181,7 @@ def test_torch_finds_them_where_code_is_not_worth_it_or_not_possible(always, mon
         assert ask() is None
     with monkeypatch.context() as patch:
         patch.setenv("AUVNN_CC", "none")
-        patch.setattr(slopes_module, "_MADE", {})
+        patch.setattr(slopes_module, "_MADE", KnownCode(16))
         assert ask() is None
     assert ask() is not None
     handle = model.members[0].register_forward_hook(lambda *given: None)

@@ -43,6 +43,15 @@ def noise_share(found: Fitted) -> float:
     return float(np.mean(np.minimum(noise / np.maximum(left, 1e-300), 1.0)))
 
 
+def above_noise(found: Fitted) -> float:
+    """Return what is left of the squared error above the sensors' white noise, as a share of that.
+
+    Args:
+        found: a fit.
+    """
+    return 1.0 / max(noise_share(found), 1e-12) - 1.0
+
+
 def better_from_measured(
     best: Fitted,
     model: GreyBox,

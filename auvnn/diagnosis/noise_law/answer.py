@@ -19,15 +19,14 @@ from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncert
 from auvnn.diagnosis.noise_law.hypothesis import WithForce, shares_left
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.noise_law.leaders import fitted_alone
-from auvnn.diagnosis.noise_law.left_force import exceeds_actuators, negligible
-from auvnn.diagnosis.noise_law.likelihood.estimate_law import ALPHA_BOUNDARY
+from auvnn.diagnosis.noise_law.left_force import exceeds_actuators, leaves_force, negligible
 from auvnn.diagnosis.noise_law.noise_colour import Colour, noise_colour
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.diagnosis.noise_law.split_windows import fitted_over_parts
 from auvnn.diagnosis.noise_law.standing_names import beside_names, stand
 from auvnn.diagnosis.noise_law.words import left
-from auvnn.diagnosis.residuals.variance_component_test import variance_component_test, white
+from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.diagnosis.stages.what_is_left import settled
@@ -76,7 +75,7 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
     }
     if not state.leaves_something:
         return state, told, []
-    if state.refuted is not None and not _leaves_force(asked, state, state.refuted):
+    if state.refuted is not None and not leaves_force(asked, state, state.refuted):
         # With all names nothing significant is left: those that predict alone decide whether there is.
         state = settled(asked, state)
     try:
@@ -124,7 +123,7 @@ def _with_force(
     None where there is no such force.
     """
     windows, floor, first = state.windows, asked.floor, state.first
-    if not _leaves_force(asked, state, state.refuted or state.current):
+    if not leaves_force(asked, state, state.refuted or state.current):
         return None
     alone = fitted_alone(asked, state)
     first, windows = fitted_over_parts(asked, first, windows)
@@ -157,11 +156,6 @@ def goes_further(again: WithForce, before: WithForce) -> bool:
     """
     same = [s["effects"] for s in again.steps[: len(before.steps)]] == [s["effects"] for s in before.steps]
     return bool(before.steps) and same and _share_left(before) > MOST >= _share_left(again)
-
-
-def _leaves_force(asked: Setting, state: State, end: FittedHypothesis) -> bool:
-    noise = white(end, asked.floor)
-    return variance_component_test(end, state.windows, noise).p_value < ALPHA_BOUNDARY
 
 
 def _state(

@@ -55,14 +55,12 @@ class LeaderFits:
         say: called with what is being done, in words.
         known: what was fitted beside an explanation, by that and the effect's name: a search that passes there again asks
             for the same.
-        beside: all of that, by the explanation alone.
     """
 
     layout: Layout
     fits: LawFits
     say: Callable[[str], None]
     known: dict[tuple[int, str], tuple[Hypothesis, Hypothesis | None]] = field(default_factory=dict)
-    beside: dict[int, list[Hypothesis]] = field(default_factory=dict)
 
     def fitted(
         self, at: Round, alone: Sequence[FittedHypothesis], odds: float, level: float,
@@ -77,19 +75,21 @@ class LeaderFits:
             level: at which chance among all effects is rejected.
             good: returns what of such explanations may be named at such odds.
         """
-        found = self._joined(at, self.leading(at, alone, odds, level))
+        self.leading(at, alone, odds, level)
+        found = self._beside(at)
         named = good(found, odds)
         # A small lead is none before more of those whose tests are significant have been fitted.
         if not at.chosen and not (named and named[0].evidence > at.current.evidence + LARGE_ODDS):
-            found = self._joined(at, self.wider(at, found, level))
+            self.wider(at, found, level)
+            found = self._beside(at)
             named = good(found, odds)
         return found, named
 
-    def _joined(self, at: Round, found: Sequence[Hypothesis]) -> list[Hypothesis]:
+    def _beside(self, at: Round) -> list[Hypothesis]:
         """Return what was fitted beside an explanation, now and by an earlier search, the most evident first."""
-        known = {h.name: h for h in [*self.beside.get(id(at.current), []), *found]}
-        self.beside[id(at.current)] = _by_evidence(known.values())
-        return list(self.beside[id(at.current)])
+        return _by_evidence(
+            h for (where, _), (_, h) in self.known.items() if where == id(at.current) and h is not None
+        )
 
     def leading(
         self, at: Round, fitted: Sequence[FittedHypothesis], odds: float, level: float

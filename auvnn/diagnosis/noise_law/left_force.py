@@ -1,12 +1,15 @@
-"""Whether a stochastic force that is left is too large for a disturbance, or too small to matter."""
+"""Whether a stochastic force is left, and whether it is too large for a disturbance, or too small to matter."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench
 from auvnn.diagnosis.noise_law.hypothesis import SECOND
+from auvnn.diagnosis.noise_law.likelihood.estimate_law import ALPHA_BOUNDARY
 from auvnn.diagnosis.residuals.forces import actuators_of, share_of
+from auvnn.diagnosis.residuals.variance_component_test import variance_component_test, white
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.metrics.force_law import ForceLaw
 
@@ -16,6 +19,18 @@ LARGEST = 0.5
 ONE_SIDED = 1.645
 # Standard deviations of what commands between samples leave uncertain within which a force is no more than that.
 COVERING = 2.0
+
+
+def leaves_force(asked: Setting, state: State, end: FittedHypothesis) -> bool:
+    """Whether a test says that an explanation leaves a stochastic force.
+
+    Args:
+        asked: what the sensors' noise is at least.
+        state: windows.
+        end: the explanation.
+    """
+    noise = white(end, asked.floor)
+    return variance_component_test(end, state.windows, noise).p_value < ALPHA_BOUNDARY
 
 
 def exceeds_actuators(asked: Setting, state: State, law: ForceLaw | None) -> bool:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from auvnn.answer_types import SearchStep
-from auvnn.diagnosis.hypotheses.measured_start import noise_share
+from auvnn.diagnosis.hypotheses.measured_start import above_noise
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench
 from auvnn.diagnosis.noise_law.hypothesis import in_newtons
-from auvnn.diagnosis.noise_law.left_force import negligible
-from auvnn.diagnosis.noise_law.likelihood.estimate_law import ALPHA_BOUNDARY
+from auvnn.diagnosis.noise_law.left_force import leaves_force, negligible
 from auvnn.diagnosis.noise_law.noise_colour import Colour
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.diagnosis.noise_law.split_windows import fitted_over_parts
-from auvnn.diagnosis.residuals.variance_component_test import variance_component_test, white
+from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.metrics.force_law import ForceLaw
 
@@ -34,7 +32,7 @@ def stand(state: State, colour: Colour) -> bool:
     """
     if colour.noise is None or not state.chosen or state.refuted is not None:
         return False
-    before, after = (1.0 / max(noise_share(e.fitted), 1e-12) - 1.0 for e in (state.first, state.current))
+    before, after = above_noise(state.first.fitted), above_noise(state.current.fitted)
     return after < LITTLE and after < MOST_LEFT * before
 
 
@@ -50,8 +48,7 @@ def beside_names(
         state: where the first search ended.
         uncertain: what commands between samples leave uncertain.
     """
-    noise = white(state.current, asked.floor)
-    if not variance_component_test(state.current, state.windows, noise).p_value < ALPHA_BOUNDARY:
+    if not leaves_force(asked, state, state.current):
         return None
     end, windows = fitted_over_parts(asked, state.current, state.windows)
     beside = ForceSearch(asked, windows)
@@ -61,16 +58,9 @@ def beside_names(
     predicted = beside.predicted(found)
     law = in_newtons(found.estimate.law, found.explanation)
     small = predicted is None and negligible(asked, state, law, uncertain)
-    steps = [s for s in state.steps if s["effects"]]
-    end_step: SearchStep = {
-        "verdict": "adequate" if small else "unknown",
-        "effects": [],
-        "p_value": state.p_value,
-    }
+    named = tuple(s for s in state.steps if s["effects"])
+    told = state.but(steps=named, negligible=small, left=None, traced=None, remainder=None)
     # As beside names that were found together with the force: what is stochastic is reported, and is no riddle.
-    steps += [end_step] if small or predicted is not None else []
-    return (
-        state.but(steps=tuple(steps), negligible=small, left=None, traced=None, remainder=None),
-        law,
-        predicted,
-    )
+    if small or predicted is not None:
+        told = told.step("adequate" if small else "unknown", [], state.p_value)
+    return told, law, predicted

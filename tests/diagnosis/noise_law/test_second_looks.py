@@ -12,7 +12,7 @@ import pytest
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.noise_law import search
+from auvnn.diagnosis.noise_law import leader_fits, search
 from auvnn.diagnosis.noise_law.leader_fits import LeaderFits, Round
 from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.estimation.prediction_error import FitError
@@ -133,17 +133,31 @@ def test_effects_that_few_windows_tell_of_are_fitted_by_their_gain(monkeypatch, 
 
 @pytest.mark.parametrize(
     ("lead", "chosen", "more"),
-    [(250.0, [], True), (350.0, [], False), (None, [], True), (250.0, ["waves"], False)],
+    [(250.0, [], True), (350.0, [], False), (-1.0, [], True), (250.0, ["waves"], False)],
 )
 def test_a_small_lead_is_none_before_more_effects_are_fitted(monkeypatch, lead, chosen, more):
-    first = [] if lead is None else [SimpleNamespace(name="payload", evidence=-1000.0 + lead)]
-    rival = SimpleNamespace(name="biofouling", evidence=-600.0)
-    monkeypatch.setattr(LeaderFits, "leading", lambda *_: first)
-    monkeypatch.setattr(LeaderFits, "wider", lambda self, at, found, level: [*found, rival])
+    # Of ten significant effects the first three by evidence, which are so by gain too, lead; the likeliest is the last.
+    scores: Any = {
+        n: SimpleNamespace(degrees=1, evidence=-float(k), gain=900.0 - k, p_value=1e-9)
+        for k, n in enumerate("abcdefghij")
+    }
+    worth = {"a": lead, "g": 500.0}
+
+    def one(self, name, at, known):
+        return SimpleNamespace(name=name, evidence=-1000.0 + worth.get(name, -5.0))
+
+    monkeypatch.setattr(LeaderFits, "_one", one)
+    monkeypatch.setattr(leader_fits, "rivals_of", lambda *given, **more: [])
     looks = LeaderFits(None, None, lambda _: None)  # type: ignore[arg-type]
-    at: Any = Round(None, SimpleNamespace(evidence=-1000.0), [], chosen)  # type: ignore[arg-type]
-    found, good = looks.fitted(at, [], 4.6, 0.01, lambda found, odds: found)
-    assert found == good == ([rival, *first] if more else first)
+    at: Any = Round(SimpleNamespace(scores=scores), SimpleNamespace(evidence=-1000.0), [], chosen)  # type: ignore[arg-type]
+    ahead = lambda found, odds: [h for h in found if h.evidence > -1000.0 + odds]  # noqa: E731
+    found, good = looks.fitted(at, [], 4.6, 0.01, ahead)
+    assert len(found) == (8 if more else 3)
+    assert [h.name for h in good] == ["g"] * more + ["a"] * (lead > 0)
+    # What was fitted beside another explanation is not among them.
+    assert len(looks.fitted(at, [], 4.6, 0.01, ahead)[0]) == len(found)
+    other = replace(at, current=SimpleNamespace(evidence=5000.0))
+    assert {h.name for h in looks.fitted(other, [], 4.6, 0.01, ahead)[0]} >= {"a", "b", "c"}
 
 
 def test_whether_commands_answer_is_asked_about_the_filtered_trajectories(monkeypatch):

@@ -16,7 +16,7 @@ from auvnn.models import GreyBox
 from tests.diagnosis.noise_law.wandering import wandering_log
 from tests.small_logs import small_vehicle
 
-COLOURED: Any = Colour(SimpleNamespace(), 10.0)  # type: ignore[arg-type]
+COLOURED = Colour(SimpleNamespace(), 10.0)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ COLOURED: Any = Colour(SimpleNamespace(), 10.0)  # type: ignore[arg-type]
     ],
 )
 def test_what_names_leave_decides(monkeypatch, before, after, expected):
-    monkeypatch.setattr(standing_names, "noise_share", lambda fitted: 1.0 / (1.0 + fitted))
+    monkeypatch.setattr(standing_names, "above_noise", lambda fitted: fitted)
     state: Any = SimpleNamespace(
         chosen=("payload",),
         refuted=None,
