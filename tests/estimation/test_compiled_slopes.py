@@ -93,6 +93,8 @@ def test_what_sensors_report_is_differentiated_alike(always, what):
     names = [str(e.name) for e in model.using("sense")]
     assert len(names) > 3
     points, thetas = moments(model, 6), thetas_of(model, names)
+    # The acceleration's code is known already, and not taken for it.
+    assert compiled_slopes(OperatingPoint(model), "rate", points, thetas) is not None
     mine = compiled_slopes(OperatingPoint(model), what, points, thetas)
     assert mine is not None
     same(mine, by_torch(model, what, points, thetas))
@@ -143,6 +145,10 @@ def test_a_copy_is_not_traced_again_and_another_vehicle_is_not_taken_for_it(alwa
     model = model_with(["ocean_current", "added_mass"])
     points, thetas = moments(model, 6), thetas_of(model, ["ocean_current"])
     compiled_slopes(OperatingPoint(model), "rate", points, thetas)
+    # By other parameters it is another function.
+    others = thetas_of(model, ["added_mass"])
+    mine = compiled_slopes(OperatingPoint(model), "rate", points, others)
+    same(mine, by_torch(model, "rate", points, others))
     traced = []
     trace = slopes_module.trace
     monkeypatch.setattr(slopes_module, "trace", lambda *given: traced.append(1) or trace(*given))

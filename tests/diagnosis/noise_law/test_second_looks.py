@@ -157,7 +157,7 @@ def test_a_small_lead_is_none_before_more_effects_are_fitted(monkeypatch, lead, 
     # What was fitted beside another explanation is not among them.
     assert len(looks.fitted(at, [], 4.6, 0.01, ahead)[0]) == len(found)
     other = replace(at, current=SimpleNamespace(evidence=5000.0))
-    assert {h.name for h in looks.fitted(other, [], 4.6, 0.01, ahead)[0]} >= {"a", "b", "c"}
+    assert len(looks.fitted(other, [], 4.6, 0.01, ahead)[0]) == (3 if chosen else 8)
 
 
 def test_whether_commands_answer_is_asked_about_the_filtered_trajectories(monkeypatch):

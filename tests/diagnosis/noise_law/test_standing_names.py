@@ -57,6 +57,9 @@ def test_names_that_stand_keep_their_values_and_the_force_beside_them_is_told(mo
         model, log, ["net_buoyancy"], advice=False, whiteness=False, stochastic=stochastic
     )
     monkeypatch.setattr(answer, "stand", lambda state, colour: bool(state.chosen))
+    # The law goes with the stated inertia; told is the force of the fitted one, which here is the same.
+    told, newtons = [], standing_names.in_newtons
+    monkeypatch.setattr(standing_names, "in_newtons", lambda *given: told.append(newtons(*given)) or told[-1])
     plain, found = ask(False), ask(True)
     assert plain.missing == found.missing == ["net_buoyancy"] and found.verdict == "named"
     (one,), (other,) = plain.candidates, found.candidates
@@ -64,5 +67,7 @@ def test_names_that_stand_keep_their_values_and_the_force_beside_them_is_told(mo
     # What is left is no riddle, but a force with a law.
     assert [s["verdict"] for s in plain.steps] == ["named", "unknown"]
     assert [s["verdict"] for s in found.steps] == ["named"]
+    (law,) = told
+    assert [found.stochastic["force"][axis]["rms"] for axis in "XYZ"] == pytest.approx(law.rms[:3])
     for axis in "XYZ":
         assert found.stochastic["force"][axis]["rms"] == pytest.approx(4.0, rel=0.3)
