@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 from auvnn.diagnosis.noise_law.likelihood.estimate_law import boundary_p_value, estimate
 from auvnn.diagnosis.noise_law.likelihood.law_likelihood import Likelihood
@@ -75,6 +76,27 @@ def test_the_gradient_is_that_of_the_value():
         step[k] = 1e-4
         numeric = (likelihood.sloped([1, 4], x + step)[0] - likelihood.sloped([1, 4], x - step)[0]) / 2e-4
         assert slope[k] == pytest.approx(numeric, rel=1e-3, abs=1e-4)
+
+
+def test_the_likeliest_law_is_where_another_search_ends_too():
+    rms, time = np.array([2.0, 0.1, 1.0, 3.0, 1.0, 1.5]), np.array([0.2, 5.0, 1.0, 2.0, 1.0, 1.2])
+    likelihood = Likelihood(linear_windows(rms, time, windows=30, cells=6))
+    axes, asked, sloped = [0, 1, 3], [], likelihood.sloped
+    likelihood.sloped = lambda *given: asked.append(1) or sloped(*given)  # type: ignore[method-assign]
+    start = np.zeros(6)
+    value, x = likelihood.best(axes, start)
+    steps = len(asked)
+    # In plain logarithms by a simplex within the same bounds: neither units nor slopes.
+    low = np.log([*1e-4 * likelihood.sums.sizes[axes], *[likelihood.sums.times[0]] * 3])
+    high = np.log([*1e2 * likelihood.sums.sizes[axes], *[likelihood.sums.times[1]] * 3])
+    other = minimize(
+        lambda z: sloped(axes, z)[0], start, method="Nelder-Mead",
+        bounds=list(zip(low, high, strict=True)),
+        options={"maxiter": 2000, "maxfev": 2000, "xatol": 1e-4, "fatol": 1e-4, "adaptive": True},
+    )  # fmt: skip
+    assert value == pytest.approx(other.fun, abs=0.02)
+    assert value == pytest.approx(sloped(axes, x)[0], abs=1e-9)
+    assert steps < 40
 
 
 def test_the_likelihood_is_that_of_the_full_covariance():
