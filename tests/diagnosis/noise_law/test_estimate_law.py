@@ -80,15 +80,15 @@ def test_the_gradient_is_that_of_the_value():
 
 def test_the_likeliest_law_is_where_another_search_ends_too():
     rms, time = np.array([2.0, 0.1, 1.0, 3.0, 1.0, 1.5]), np.array([0.2, 5.0, 1.0, 2.0, 1.0, 1.2])
-    likelihood = Likelihood(linear_windows(rms, time, windows=30, cells=6))
-    axes, asked, sloped = [0, 1, 3], [], likelihood.sloped
+    likelihood = Likelihood(linear_windows(rms, time, windows=30, cells=4))
+    axes, asked, sloped = [0, 3], [], likelihood.sloped
     likelihood.sloped = lambda *given: asked.append(1) or sloped(*given)  # type: ignore[method-assign]
-    start = np.zeros(6)
+    start = np.zeros(4)
     value, x = likelihood.best(axes, start)
     steps = len(asked)
     # In plain logarithms by a simplex within the same bounds: neither units nor slopes.
-    low = np.log([*1e-4 * likelihood.sums.sizes[axes], *[likelihood.sums.times[0]] * 3])
-    high = np.log([*1e2 * likelihood.sums.sizes[axes], *[likelihood.sums.times[1]] * 3])
+    low = np.log([*1e-4 * likelihood.sums.sizes[axes], *[likelihood.sums.times[0]] * 2])
+    high = np.log([*1e2 * likelihood.sums.sizes[axes], *[likelihood.sums.times[1]] * 2])
     other = minimize(
         lambda z: sloped(axes, z)[0], start, method="Nelder-Mead",
         bounds=list(zip(low, high, strict=True)),
