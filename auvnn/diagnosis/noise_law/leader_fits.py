@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 # of those whose tests are significant where none of these stands.
 LEADERS, FURTHER_LEADERS = 3, 5
 # Share of the odds that a further name needs, which its test must promise before it is fitted; of no more than these
-# odds, however large the gain of the names before it.
+# odds, however large the gain of the names before it. A first name that is ahead by less is compared with more effects.
 WORTH_A_FIT, LARGE_ODDS = 0.3, 300.0
 
 
