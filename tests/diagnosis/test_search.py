@@ -14,15 +14,22 @@ from auvnn.diagnosis.diagnose import beside_a_force
 from auvnn.diagnosis.search import a_force_stays
 
 
+def fit(share: float) -> SimpleNamespace:
+    """Return a fit in which the noise, of 0.1 in one channel, has such a share of the squared error that is left."""
+    noise, count = np.full(18, np.nan), np.zeros((1, 18))
+    noise[0], count[0, 0] = 0.1, 100.0
+    sums = SimpleNamespace(count=count, channel=count * 0.1**2 / share, noise=lambda: noise)
+    return SimpleNamespace(sigma=np.where(count[0] > 0, 1.0, np.inf), statistics=sums)
+
+
 def state(rounds: int, shares: Any = None) -> Any:
     """Return a search after so many rounds, and of the noise's share in the error at first and after each."""
-    first, *path = [SimpleNamespace(fitted=s) for s in shares or (1.0,) * (rounds + 1)]
+    first, *path = [SimpleNamespace(fitted=fit(s)) for s in shares or (1.0,) * (rounds + 1)]
     return SimpleNamespace(path=tuple(path), first=first, current=[first, *path][-1], windows=None)
 
 
 def stays(monkeypatch, rounds, share, p_value=1e-9, shares=None):
     left = SimpleNamespace(p_value=p_value, left_of=lambda before: share)
-    monkeypatch.setattr(search, "noise_share", lambda fitted: fitted)
     monkeypatch.setattr(search, "white", lambda *_: None)
     monkeypatch.setattr(search, "variance_component_test", lambda *_: left)
     asked: Any = SimpleNamespace(floor=0.0)
