@@ -36,12 +36,13 @@ class Payload(Effect):
     cause = "a load is picked up at some time"
     symbol = "m_p"
     reference = "Van de Ven et al. (2004), section 5; Fossen (2011), section 3.3"
-    confused_with = ("net_buoyancy", "cg_offset", "flooding")
+    # Water that is trapped is a load whose buoyancy bears its weight, at the centre of gravity.
+    confused_with = ("net_buoyancy", "cg_offset", "flooding", "trapped_water")
     manoeuvre = "multisine"
     told_apart_by = "the same motion before and after the load is taken, turning included"
     levers = PLACES
     carried = ("mass", "buoyancy")
-    plainer = ("net_buoyancy",)
+    plainer = ("net_buoyancy", "trapped_water")
     time_varying = True
 
     @classmethod

@@ -18,10 +18,10 @@ from auvnn.diagnosis.noise_law.commands.holding import Holding, cost_at_best, ho
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncertain_wrench
 from auvnn.diagnosis.noise_law.hypothesis import WithForce, shares_left
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
-from auvnn.diagnosis.noise_law.leaders import fitted_alone
 from auvnn.diagnosis.noise_law.left_force import exceeds_actuators, leaves_force, negligible
 from auvnn.diagnosis.noise_law.noise_colour import Colour, noise_colour
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
+from auvnn.diagnosis.noise_law.rounds.leaders import fitted_alone
 from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.diagnosis.noise_law.split_windows import fitted_over_parts
 from auvnn.diagnosis.noise_law.standing_names import beside_names, stand
@@ -135,7 +135,7 @@ def _with_force(
     predicted = result.predicted
     if predicted is not None and not asked.tolerance.strict:
         # What inputs predict has a cause: one that costs little is taken where nothing is predicted beside it.
-        beside.ignores_cost = beside.looks_further = True
+        beside.names.ignores_cost = beside.looks_further = True
         again = beside.run(null, alone, asked.most)
         if again.predicted is None or goes_further(again, result):
             result, predicted = again, again.predicted

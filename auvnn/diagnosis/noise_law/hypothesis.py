@@ -198,7 +198,8 @@ def tied(layout: Layout, good: list[Hypothesis], before: Hypothesis) -> list[Hyp
     """Return the best and those that the log cannot tell from it, the plainer one first.
 
     The law of the force is no more than near the truth, and what it gets wrong grows with what is explained: of two
-    effects that the catalogue knows to be confused, one that explains nearly as much as the best is not refuted.
+    effects that the catalogue knows to be confused, one that explains nearly as much as the best is not refuted, nor is
+    one that is as likely: more parameters also take up what no effect explains.
 
     Args:
         layout: for the number of an effect's parameters.
@@ -216,10 +217,10 @@ def tied(layout: Layout, good: list[Hypothesis], before: Hypothesis) -> list[Hyp
     for h in good:
         if h is best:
             continue
-        worse = h.misfit - best.misfit
-        if best.evidence - h.evidence < ODDS and worse < chi2.isf(ALPHA_REFUTED, mine):
+        worse, likely = h.misfit - best.misfit, best.evidence - h.evidence < ODDS
+        if likely and worse < chi2.isf(ALPHA_REFUTED, mine):
             alike.append(h)
-        elif confused(best.name, h.name) and worse < CLOSE * (before.misfit - best.misfit):
+        elif confused(best.name, h.name) and (likely or worse < CLOSE * (before.misfit - best.misfit)):
             near.append(h)
     # Those that are only nearly as good never make a group too large to be given.
     rest = [*alike, *near[: max(GROUP - 1 - len(alike), 0)]]

@@ -21,27 +21,24 @@ from numpy.typing import NDArray
 
 from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.commands.uncertain import in_closed_loop
-from auvnn.diagnosis.noise_law.free_running_cost import free_running_cost, paying
 from auvnn.diagnosis.noise_law.hypothesis import (
     GROUP,
     Hypothesis,
     WithForce,
-    explains_an_axis,
     in_newtons,
     judged,
-    p_value_of,
-    predicts_better,
     tied,
 )
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
-from auvnn.diagnosis.noise_law.leader_fits import LeaderFits, Round
 from auvnn.diagnosis.noise_law.likelihood.about_motion import linear_about_its_own
 from auvnn.diagnosis.noise_law.likelihood.estimate_law import estimate
 from auvnn.diagnosis.noise_law.likelihood.law_likelihood import STEPS, Likelihood
 from auvnn.diagnosis.noise_law.likelihood.sums import CELL, ForceSums, force_sums, whole_cells
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction, predicted_by_inputs
+from auvnn.diagnosis.noise_law.rounds.leader_fits import Asked, LeaderFits, Round
+from auvnn.diagnosis.noise_law.rounds.looking_ahead import Branch, decided, shared, worth_following
+from auvnn.diagnosis.noise_law.rounds.names_given import ALPHA_NAME, NamesGiven
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
@@ -53,17 +50,8 @@ from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
-# A name is given where chance would seldom do as well among all effects that were asked for; a further one on
-# stronger grounds, because each time chance gets another turn.
-ALPHA_NAME, ALPHA_FURTHER = 0.01, 0.001
-# Standard errors by which runs left out must be predicted better.
-GAIN, GAIN_FURTHER = 1.0, 2.0
-# What the first name and a further one must cost in free running, as shares of the tolerance (a force is always there
-# and makes errors that no name takes away), and the share of the gain of all names that a further one must bring.
-FIRST_COST, FURTHER_COST, FURTHER_SHARE = 0.5, 1.0, 0.1
-# Logarithm of the odds at which a name is given whatever it costs: with nothing hidden, in worlds that the model does not
-# describe, an effect that is not there has reached 758 (`thrust_overshoot` in `shaped`, of 20 logs).
-DECISIVE = 2000.0
+# Share of the gain of all names that a further one must bring.
+FURTHER_SHARE = 0.1
 # Steps of the fit without any name, and how often its windows are made linear about the motion first.
 NULL_STEPS, TURNS = 25, 3
 
@@ -78,19 +66,20 @@ class ForceSearch:
 
     def __init__(self, asked: Setting, windows: Windows) -> None:
         """Begin without a law."""
-        self.layout, self.windows, self.tolerance = asked.layout, windows, asked.tolerance
+        self.layout, self.windows = asked.layout, windows
         self.usable, self.base, self.say = list(asked.usable), list(asked.base), asked.say
-        self.log, self.scale = asked.log, scale_of(asked.log)
+        self.names = NamesGiven(asked.layout, asked.log, scale_of(asked.log), asked.tolerance)
         self.sigma = self.weights = np.full(18, np.inf)
         self.cell = CELL
         self.response: Array | None = None
-        self.ignores_cost = self.looks_further = False
-        self.in_closed_loop = False
+        self.looks_further = False
         # What was asked at an explanation, for a second search that passes there: its tests, and where it went with a law
         # of its own.
         self._tests: dict[int, Tested] = {}
-        self._gone_on: dict[int, Hypothesis] = {}
+        self._gone_on: dict[int, tuple[Hypothesis, Hypothesis]] = {}
         self._leaders: LeaderFits | None = None
+        # Values of effects that were fitted when nothing was chosen.
+        self._earlier: dict[str, Array] = {}
 
     def begin(self, first: FittedHypothesis, sigma: Array, steps: int = NULL_STEPS) -> Hypothesis | None:
         """Return an explanation under the law of the force; None where no variance is above zero.
@@ -126,7 +115,7 @@ class ForceSearch:
         # All names are compared with it: it must not gain by steps that names take first.
         null = self._fits().settled(self.judged(first, found.law), steps)
         with suppress(*UNSOLVED):
-            self.in_closed_loop = in_closed_loop(null.explanation, self.windows)
+            self.names.in_closed_loop = in_closed_loop(null.explanation, self.windows)
         return null
 
     def _about(self, explanation: FittedHypothesis, law: ForceLaw | None = None) -> Windows:
@@ -160,47 +149,34 @@ class ForceSearch:
             fitted: explanations of one effect that the first search has fitted.
             most: look for at most this many.
         """
-        current, chosen = null, []
+        current, chosen = null, list[str]()
         steps: list[SearchStep] = []
         groups: list[list[FittedHypothesis]] = []
         tried: list[Hypothesis] = []
-        whole, earlier = 1.0, dict[str, Array]()
-        under_law = self._fits()
-        fits = self._leaders = self._leaders or LeaderFits(self.layout, under_law, self.say)
+        whole = 1.0
         while len(chosen) < most:
-            law = current.estimate.law
-            assert law is not None
-            grouped = {e.effects[-1] for g in groups for e in g}
-            remaining = [n for n in self.usable if n not in chosen and n not in grouped]
-            if not remaining:
+            grouped = [e.effects[-1] for g in groups for e in g]
+            asked = self._round(null, current, chosen, grouped, fitted)
+            if asked is None:
                 break
-            base = [*self.base, *[c for c in chosen if c not in self.base]]
-            tests = self._tested(current, remaining, base, chosen)
-            # Beside what was found the variance is no longer inflated by it: the tests say whether to go on.
-            if chosen and tests.p_value >= ALPHA:
-                break
-            share = 0.0 if self.looks_further else FURTHER_SHARE
-            odds = max(ODDS, share * (current.evidence - null.evidence))
-            at = Round(tests, current, base, chosen, earlier)
-            found, good = fits.fitted(at, fitted, odds, ALPHA_NAME, partial(self._good, at, len(remaining)))
-            sure = {h.name: _sure(self.layout, h, at, len(remaining)) for h in found}
             if not chosen:
-                earlier = {h.name: parameters_of(h.explanation.fitted.model, [h.name]) for h in found}
-                tried, whole = found, min([tests.p_value, *sure.values()], default=1.0)
+                tried, whole = asked.found, min([asked.at.tested.p_value, *asked.sure.values()], default=1.0)
+            good = asked.good
             if not good or (chosen and self._takes_up(good[0], chosen)):
                 break
+            if not chosen and most > 1:
+                good = self._looking_ahead(null, good, fitted)
             group = tied(self.layout, good, current)
             if len(group) > GROUP:
                 break
             names = [h.name for h in group]
             verdict = "ambiguous" if len(group) > 1 else "named"
-            steps.append({"verdict": verdict, "effects": names, "p_value": sure[group[0].name]})
-            if id(group[0]) not in self._gone_on:
-                self._gone_on[id(group[0])] = under_law.settled(group[0])
-            current = self._gone_on[id(group[0])]
+            steps.append({"verdict": verdict, "effects": names, "p_value": asked.sure[group[0].name]})
+            current = self._settled(group[0])
             if len(group) > 1:
                 groups.append([current.explanation, *(h.explanation for h in group[1:])])
             chosen.append(group[0].name)
+        under_law = self._fits()
         law = current.estimate.law
         assert law is not None
         # From here on free running counts again.
@@ -210,17 +186,78 @@ class ForceSearch:
             under_law.told(current.explanation),
             self._about(current.explanation, law),
             replace(current.estimate, law=in_newtons(law, current.explanation)),
-            [under_law.told(h.explanation) for h in tried],
+            self._told(tried),
             whole,
             in_newtons(null.estimate.law, null.explanation),
             self.predicted(current),
         )
 
+    def _round(
+        self,
+        null: Hypothesis,
+        current: Hypothesis,
+        chosen: Sequence[str],
+        grouped: Sequence[str],
+        fitted: Sequence[FittedHypothesis],
+    ) -> Asked | None:
+        """Return what a round has found beside an explanation; None where nothing significant is left."""
+        remaining = [n for n in self.usable if n not in chosen and n not in grouped]
+        if not remaining:
+            return None
+        base = [*self.base, *[c for c in chosen if c not in self.base]]
+        tests = self._tested(current, remaining, base, list(chosen))
+        # Beside what was found the variance is no longer inflated by it: the tests say whether to go on.
+        if chosen and tests.p_value >= ALPHA:
+            return None
+        share = 0.0 if self.looks_further else FURTHER_SHARE
+        odds = max(ODDS, share * (current.evidence - null.evidence))
+        at = Round(tests, current, base, list(chosen), self._earlier if chosen else {})
+        good_of = partial(self.names.good, at, len(remaining))
+        self._leaders = self._leaders or LeaderFits(self.layout, self._fits(), self.say)
+        found, good = self._leaders.fitted(at, fitted, odds, ALPHA_NAME, good_of)
+        if not chosen:
+            self._earlier = {h.name: parameters_of(h.explanation.fitted.model, [h.name]) for h in found}
+        sure = {h.name: self.names.sure(h, at, len(remaining)) for h in found}
+        return Asked(at, found, good, sure, len(remaining))
+
+    def _looking_ahead(
+        self, null: Hypothesis, good: list[Hypothesis], fitted: Sequence[FittedHypothesis]
+    ) -> list[Hypothesis]:
+        """Return the first names that may be given, the one to begin with first, see `looking_ahead`."""
+        branches: list[Branch] = []
+        for h in worth_following(good, null):
+            after = self._settled(h)
+            asked = self._round(null, after, [h.name], [], fitted)
+            further = [] if asked is None else self.names.likely(asked.at, asked.among, asked.found, ODDS)
+            branches.append(Branch(h, after, further))
+            if not further and len(branches) == 1:
+                # Beside the first name nothing is left that another one could explain.
+                return good
+        assert self._leaders is not None
+        for branch, pair in shared(branches):
+            self._leaders.take(branch.after, pair)
+        return decided(good, branches, null)
+
+    def _settled(self, found: Hypothesis) -> Hypothesis:
+        """Return an explanation beside which further names are sought."""
+        if id(found) not in self._gone_on:
+            # Kept with what it came from: no other explanation can have its place then.
+            self._gone_on[id(found)] = found, self._fits().settled(found)
+        return self._gone_on[id(found)][1]
+
+    def _told(self, tried: Sequence[Hypothesis]) -> list[FittedHypothesis]:
+        """Return explanations with their errors of free running, those aside whose free running grows without bound."""
+        told = []
+        for h in tried:
+            with suppress(*UNSOLVED):
+                told.append(self._fits().told(h.explanation))
+        return told
+
     def predicted(self, found: Hypothesis) -> InputPrediction | None:
         """Return what measured inputs predict of the force that an explanation leaves; None where that is little."""
         self.say("asking how much of the force measured inputs predict")
         about, law = self._about(found.explanation), found.estimate.law
-        sums, closed = self._sums(found.explanation), self.in_closed_loop
+        sums, closed = self._sums(found.explanation), self.names.in_closed_loop
         told = predicted_by_inputs(found.weighed, about, sums, law, closed_loop=closed)
         return told if told is not None and told.matters else None
 
@@ -235,39 +272,6 @@ class ForceSearch:
             self._tests[id(current)] = tests(current.weighed, remaining, base, chosen)
         return self._tests[id(current)]
 
-    def _good(self, at: Round, among: int, found: Sequence[Hypothesis], odds: float) -> list[Hypothesis]:
-        """Return those explanations that may be named, the most evident first.
-
-        Args:
-            at: the round.
-            among: how many effects were asked for.
-            found: explanations that were judged.
-            odds: logarithm of the odds that a name needs.
-        """
-        level, least = (ALPHA_FURTHER, GAIN_FURTHER) if at.chosen else (ALPHA_NAME, GAIN)
-        likely = [
-            h
-            for h in found
-            if h.evidence > at.current.evidence + (ODDS if explains_an_axis(h, at.current) else odds)
-            and _sure(self.layout, h, at, among) < level
-            and predicts_better(h, at.current, least)
-        ]
-        return self._paying(likely, at.current, FURTHER_COST if at.chosen else FIRST_COST)
-
-    def _paying(self, likely: Sequence[Hypothesis], current: Hypothesis, share: float) -> list[Hypothesis]:
-        """Return what costs so large a share of the tolerance in free running, and what goes with it."""
-        if self.tolerance.strict:
-            return list(likely)
-        enough = 0.0 if self.ignores_cost else share * self.tolerance.cost
-        costs = []
-        for h in likely:
-            if h.evidence > current.evidence + DECISIVE:
-                costs.append(np.inf)
-                continue
-            cost = free_running_cost(h, current, self.log, self.scale)
-            costs.append(max(cost) if self.in_closed_loop else cost[0])
-        return paying(likely, costs, enough)
-
     def _takes_up(self, further: Hypothesis, chosen: Sequence[str]) -> bool:
         """Whether a further effect only takes up what the shape of an earlier one gets wrong.
 
@@ -277,8 +281,3 @@ class ForceSearch:
         """
         known = any(confused(further.name, name) for name in chosen)
         return known and self.predicted(further) is not None
-
-
-def _sure(layout: Layout, found: Hypothesis, at: Round, among: int) -> float:
-    """Return the p-value of an effect among so many that were asked for, by the likelihood ratio."""
-    return min(1.0, among * p_value_of(layout, found, at.current))

@@ -11,10 +11,12 @@ import pytest
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.noise_law import search
-from auvnn.diagnosis.noise_law.free_running_cost import free_running_cost
 from auvnn.diagnosis.noise_law.hypothesis import explains_an_axis, predicts_better, shares_left, tied
-from auvnn.diagnosis.noise_law.leader_fits import Round
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
+from auvnn.diagnosis.noise_law.rounds import names_given
+from auvnn.diagnosis.noise_law.rounds.free_running_cost import free_running_cost
+from auvnn.diagnosis.noise_law.rounds.leader_fits import Round
+from auvnn.diagnosis.noise_law.rounds.names_given import NamesGiven
 from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.rollouts import roll, scale_of
@@ -86,6 +88,14 @@ def test_what_is_known_to_be_confused_and_explains_nearly_as_much_is_tied():
     assert names_of([best, hypothesis("net_buoyancy", 5000.5)]) == ["added_mass", "net_buoyancy"]
 
 
+def test_what_is_as_likely_and_known_to_be_confused_is_tied_however_much_more_parameters_fit():
+    best = hypothesis("added_mass", 5000.0, -2600.0)
+    # Worse by more than a tenth of the gain, and as likely for its fewer parameters.
+    assert names_of([best, hypothesis("trapped_water", 5600.0, -2604.0)]) == ["added_mass", "trapped_water"]
+    assert names_of([best, hypothesis("trapped_water", 5600.0, -2605.0)]) == ["added_mass"]
+    assert names_of([best, hypothesis("net_buoyancy", 5600.0, -2604.0)]) == ["added_mass"]
+
+
 def test_the_nearly_as_good_do_not_make_a_group_too_large():
     good = [hypothesis("added_mass", 5000.0), hypothesis("net_buoyancy", 5000.5)]
     assert names_of([*good, hypothesis("trapped_water", 5100.0), hypothesis("thruster_lag", 5150.0)]) == [
@@ -95,31 +105,20 @@ def test_the_nearly_as_good_do_not_make_a_group_too_large():
     ]
 
 
-class Search(ForceSearch):
-    """As much of a search as decides which of the likely explanations cost enough."""
-
-    def __init__(self, **given: Any) -> None:
-        """Look at the cost unless told otherwise."""
-        vars(self).update(
-            {
-                "ignores_cost": False,
-                "in_closed_loop": False,
-                "tolerance": Tolerance(),
-                "log": None,
-                "scale": None,
-                **given,
-            }
-        )
+def given(**changes: Any) -> NamesGiven:
+    """Return what decides which of the likely explanations cost enough."""
+    at: dict[str, Any] = {"layout": None, "log": None, "scale": None, "tolerance": Tolerance(), **changes}
+    return NamesGiven(**at)
 
 
-def paying(costs, monkeypatch, without=1e3, **given):
+def paying(costs, monkeypatch, without=1e3, **changes):
     """Return which of some explanations, each ten in evidence after the one before it, are taken at these costs.
 
     The first is ahead of the explanation without any by 450.
     """
     likely = [hypothesis(name, 100.0 + 20.0 * k) for k, name in enumerate(costs)]
-    monkeypatch.setattr(search, "free_running_cost", lambda h, *_: costs[h.name])
-    return [h.name for h in Search(**given)._paying(likely, hypothesis("", without), 0.5)]
+    monkeypatch.setattr(names_given, "free_running_cost", lambda h, *_: costs[h.name])
+    return [h.name for h in given(**changes).paying(likely, hypothesis("", without), 0.5)]
 
 
 def test_a_name_must_cost_enough_by_the_errors(monkeypatch):
@@ -135,7 +134,7 @@ def test_a_name_must_cost_enough_by_the_errors(monkeypatch):
 def test_what_is_beyond_doubt_is_named_whatever_it_costs(monkeypatch):
     """The first has a misfit of 100 and the second one of 120: twice the log odds are what they are below `without`."""
     one, both = {"waves": (-0.2, 0.0)}, {"waves": (-0.2, 0.0), "tether": (0.01, 0.0)}
-    enough = 100.0 + 2.0 * search.DECISIVE
+    enough = 100.0 + 2.0 * names_given.DECISIVE
     assert paying(one, monkeypatch, without=enough + 1.0) == ["waves"]
     assert paying(one, monkeypatch, without=enough - 1.0) == []
     assert paying(both, monkeypatch, without=enough + 19.0) == ["waves"]
@@ -159,14 +158,14 @@ def test_a_force_left_is_that_of_the_mean_over_a_second():
 
 @pytest.mark.parametrize(("rms", "expected"), [((0.3, 2.0), ["waves"]), ((0.7, 2.0), [])])
 def test_a_further_name_brings_much_of_the_gain_or_takes_the_force_of_an_axis(rms, expected, monkeypatch):
-    monkeypatch.setattr(search, "predicts_better", lambda *_: True)
-    monkeypatch.setattr(search, "p_value_of", lambda *_: 1e-12)
-    asked = Search(tolerance=Tolerance.of(0), layout=None)
+    monkeypatch.setattr(names_given, "predicts_better", lambda *_: True)
+    monkeypatch.setattr(names_given, "p_value_of", lambda *_: 1e-12)
+    asked = given(tolerance=Tolerance.of(0))
     at = Round(None, with_law((2.0, 2.0)), [], ["tether"])  # type: ignore[arg-type]
     found = with_law(rms, 50.0, "waves")
-    assert [h.name for h in asked._good(at, 10, [found], 100.0)] == expected  # type: ignore[list-item]
+    assert [h.name for h in asked.good(at, 10, [found], 100.0)] == expected  # type: ignore[list-item]
     # As much evidence as was asked for is enough by itself.
-    assert asked._good(at, 10, [found], 40.0) == [found]  # type: ignore[list-item]
+    assert asked.good(at, 10, [found], 40.0) == [found]  # type: ignore[list-item]
 
 
 def test_in_open_loop_free_running_must_not_get_worse(monkeypatch):
@@ -235,7 +234,8 @@ def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_ends_the_se
     further, predicted, expected, monkeypatch
 ):
     told = None if predicted is None else InputPrediction("X", "u", 0.5, predicted)
-    asked = Search(windows=None, in_closed_loop=True)
+    asked = ForceSearch.__new__(ForceSearch)
+    asked.names = given(in_closed_loop=True)
     monkeypatch.setattr(search, "predicted_by_inputs", lambda *_, **__: told)
     monkeypatch.setattr(asked, "say", lambda _: None, raising=False)
     monkeypatch.setattr(asked, "_about", lambda _: None)

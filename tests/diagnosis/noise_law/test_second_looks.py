@@ -12,8 +12,9 @@ import pytest
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.noise_law import leader_fits, search
-from auvnn.diagnosis.noise_law.leader_fits import LeaderFits, Round
+from auvnn.diagnosis.noise_law import search
+from auvnn.diagnosis.noise_law.rounds import leader_fits
+from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round
 from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of
@@ -171,5 +172,5 @@ def test_whether_commands_answer_is_asked_about_the_filtered_trajectories(monkey
     monkeypatch.setattr(search, "in_closed_loop", lambda end, _: about.append(end.around) or True)
     beside = search.ForceSearch(asked, windows)
     null = beside.begin(first, white(first, np.full(18, 1e-9)))
-    assert null is not None and beside.in_closed_loop
+    assert null is not None and beside.names.in_closed_loop
     assert len(about) == 1 and about[0] is not None and about[0] is null.explanation.around

@@ -13,7 +13,7 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, shapes
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
-from auvnn.diagnosis.noise_law.leaders import rivals_of
+from auvnn.diagnosis.noise_law.rounds.leaders import rivals_of
 from auvnn.diagnosis.score_tests.null_tests import Tested
 from auvnn.estimation.priors import parameters_of, set_parameters
 
@@ -43,6 +43,25 @@ class Round:
     base: list[str]
     chosen: list[str]
     earlier: Mapping[str, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a round has found.
+
+    Attributes:
+        at: where it stood.
+        found: what was fitted, the most evident first.
+        good: what of it may be named.
+        sure: p-value of each.
+        among: how many effects were asked for.
+    """
+
+    at: Round
+    found: list[Hypothesis]
+    good: list[Hypothesis]
+    sure: dict[str, float]
+    among: int
 
 
 @dataclass(frozen=True)
@@ -90,6 +109,17 @@ class LeaderFits:
         return _by_evidence(
             h for (where, _), (_, h) in self.known.items() if where == id(at.current) and h is not None
         )
+
+    def take(self, current: Hypothesis, found: Hypothesis) -> None:
+        """Keep a fit that another search made, where it is likelier than what was fitted here.
+
+        Args:
+            current: the explanation beside which it is a further name.
+            found: the explanation with it.
+        """
+        _, known = self.known.get((id(current), found.name), (current, None))
+        if known is None or known.evidence < found.evidence:
+            self.known[id(current), found.name] = current, found
 
     def leading(
         self, at: Round, fitted: Sequence[FittedHypothesis], odds: float, level: float

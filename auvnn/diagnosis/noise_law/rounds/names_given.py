@@ -1,0 +1,113 @@
+"""Which of the explanations of a round may be named: by evidence, by what is left out, and by what a name costs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from auvnn.diagnosis.answers.tolerance import Tolerance
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
+from auvnn.diagnosis.noise_law.hypothesis import (
+    Hypothesis,
+    explains_an_axis,
+    p_value_of,
+    predicts_better,
+)
+from auvnn.diagnosis.noise_law.rounds.free_running_cost import free_running_cost, paying
+from auvnn.diagnosis.noise_law.rounds.leader_fits import Round
+from auvnn.diagnosis.selection.model_comparison import ODDS
+from auvnn.logs import Log
+from auvnn.metrics.rollouts import Scale
+
+# A name is given where chance would seldom do as well among all effects that were asked for; a further one on
+# stronger grounds, because each time chance gets another turn.
+ALPHA_NAME, ALPHA_FURTHER = 0.01, 0.001
+# Standard errors by which runs left out must be predicted better.
+GAIN, GAIN_FURTHER = 1.0, 2.0
+# What the first name and a further one must cost in free running, as shares of the tolerance (a force is always there
+# and makes errors that no name takes away).
+FIRST_COST, FURTHER_COST = 0.5, 1.0
+# Logarithm of the odds at which a name is given whatever it costs: with nothing hidden, in worlds that the model does not
+# describe, an effect that is not there has reached 758 (`thrust_overshoot` in `shaped`, of 20 logs).
+DECISIVE = 2000.0
+
+
+@dataclass
+class NamesGiven:
+    """Says which explanations may be named, of one log.
+
+    Attributes:
+        layout: stated values.
+        log: on which models run freely.
+        scale: of the errors there.
+        tolerance: what does not matter.
+        ignores_cost: whether a name may cost little.
+        in_closed_loop: whether commands answer the motion.
+    """
+
+    layout: Layout
+    log: Log
+    scale: Scale
+    tolerance: Tolerance
+    ignores_cost: bool = False
+    in_closed_loop: bool = False
+
+    def good(self, at: Round, among: int, found: Sequence[Hypothesis], odds: float) -> list[Hypothesis]:
+        """Return those explanations that may be named, the most evident first.
+
+        Args:
+            at: the round.
+            among: how many effects were asked for.
+            found: explanations that were judged.
+            odds: logarithm of the odds that a name needs.
+        """
+        likely = self.likely(at, among, found, odds)
+        return self.paying(likely, at.current, FURTHER_COST if at.chosen else FIRST_COST)
+
+    def likely(self, at: Round, among: int, found: Sequence[Hypothesis], odds: float) -> list[Hypothesis]:
+        """Return those explanations that the data prefer by so much, whatever they cost, the most evident first.
+
+        Args:
+            at: the round.
+            among: how many effects were asked for.
+            found: explanations that were judged.
+            odds: logarithm of the odds that a name needs.
+        """
+        level, least = (ALPHA_FURTHER, GAIN_FURTHER) if at.chosen else (ALPHA_NAME, GAIN)
+        return [
+            h
+            for h in found
+            if h.evidence > at.current.evidence + (ODDS if explains_an_axis(h, at.current) else odds)
+            and self.sure(h, at, among) < level
+            and predicts_better(h, at.current, least)
+        ]
+
+    def sure(self, found: Hypothesis, at: Round, among: int) -> float:
+        """Return the p-value of an effect among so many that were asked for, by the likelihood ratio.
+
+        Args:
+            found: explanation with the effect.
+            at: the round.
+            among: how many effects were asked for.
+        """
+        return min(1.0, among * p_value_of(self.layout, found, at.current))
+
+    def paying(self, likely: Sequence[Hypothesis], current: Hypothesis, share: float) -> list[Hypothesis]:
+        """Return what costs so large a share of the tolerance in free running, and what goes with it.
+
+        Args:
+            likely: explanations, the most evident first.
+            current: the explanation without any of the names.
+            share: of the tolerance.
+        """
+        if self.tolerance.strict:
+            return list(likely)
+        enough = 0.0 if self.ignores_cost else share * self.tolerance.cost
+        costs = []
+        for h in likely:
+            if h.evidence > current.evidence + DECISIVE:
+                costs.append(float("inf"))
+                continue
+            cost = free_running_cost(h, current, self.log, self.scale)
+            costs.append(max(cost) if self.in_closed_loop else cost[0])
+        return paying(likely, costs, enough)
