@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from auvnn.diagnosis.noise_law import search as module
 from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import Branch, decided, shared, worth_following
 from auvnn.diagnosis.noise_law.search import ForceSearch
@@ -20,6 +21,14 @@ class Effects:
     """What an explanation supposes."""
 
     effects: tuple[str, ...]
+    fitted: Any = field(default_factory=lambda: SimpleNamespace(model=None), compare=False)
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """An estimate, as far as it is looked at."""
+
+    law: Any = field(default_factory=lambda: SimpleNamespace(axes=None), compare=False)
 
 
 @dataclass(frozen=True)
@@ -28,6 +37,7 @@ class Found:
 
     evidence: float
     explanation: Effects
+    estimate: Estimated = field(default_factory=Estimated)
 
     @property
     def name(self) -> str:
@@ -118,6 +128,13 @@ def test_a_rival_that_leads_nowhere_is_dropped():
     good = [found(10.0, "tether"), found(0.0, "waves"), found(-400.0, "payload")]
     branches = [branch(good[0], (200.0, "cg_offset")), branch(good[1])]
     assert names(decided(good, branches, NULL)) == ["tether"]
+    # Of three, the one that is in no pair as likely as the best is dropped.
+    branches = [
+        branch(good[0], (60.0, "flooding")),
+        branch(good[1], (60.0, "gyro_bias")),
+        branch(good[2], (9.0, "payload")),
+    ]
+    assert names(decided(good, branches, NULL)) == ["tether", "waves"]
     # By less than the law may be wrong by, a tenth of what is explained, nothing is dropped.
     branches = [branch(good[0], (60.0, "cg_offset")), branch(good[1], (30.0, "payload"))]
     assert names(decided(good, branches, NULL)) == ["tether", "waves", "payload"]
@@ -178,6 +195,67 @@ def test_pairs_found_from_their_other_name_are_not_fitted_again():
     asked._leaders.take(uneven, found(381.0, "thrust_asymmetry", "payload"))
     asked._leaders.take(uneven, found(379.0, "thrust_asymmetry", "payload"))
     assert asked._leaders.known[key][1].evidence == 381.0
+
+
+def scripted(monkeypatch, further: dict[tuple[str, ...], list[Any]]) -> tuple[Any, list[Any]]:
+    """Return a search whose tests and fits are given, and the rounds that it asks for, as they come."""
+    rounds: list[Any] = []
+
+    def fitted(at: Any, *_: Any) -> tuple[list[Any], list[Any]]:
+        rounds.append(at)
+        more = further.get(tuple(at.chosen), [])
+        return more, more
+
+    asked: Any = ForceSearch.__new__(ForceSearch)
+    asked.layout, asked.usable, asked.base, asked.looks_further, asked._earlier = (
+        None,
+        ["payload", "thrust_asymmetry", "trapped_water", "waves"],
+        [],
+        False,
+        {},
+    )
+    asked.names = SimpleNamespace(
+        good=print, sure=lambda *_: 1e-9, likely=lambda at, among, given, odds: given
+    )
+    asked._leaders = SimpleNamespace(fitted=fitted, take=lambda *_: None)
+    asked._tested = lambda *_: SimpleNamespace(p_value=0.0)
+    asked._settled = lambda h: h
+    asked._takes_up = lambda *_: False
+    asked._fits = lambda: SimpleNamespace(told=lambda e: diverging(e))
+    asked._about = lambda *_: None
+    asked.predicted = lambda _: None
+    monkeypatch.setattr(module, "tied", lambda _, good, before: good[:1])
+    monkeypatch.setattr(module, "in_newtons", lambda law, _: law)
+    monkeypatch.setattr(module, "parameters_of", lambda model, chosen: chosen)
+    return asked, rounds
+
+
+def diverging(explanation: Any) -> Any:
+    if explanation.effects == ("waves",):
+        raise np.linalg.LinAlgError("SVD did not converge")
+    return explanation
+
+
+def test_the_search_begins_with_what_the_likeliest_pairs_have_in_common(monkeypatch):
+    payload, uneven, waves = found(10.0, "payload"), found(8.0, "thrust_asymmetry"), found(-900.0, "waves")
+    further = {
+        (): [payload, uneven, waves],
+        ("payload",): [found(380.0, "payload", "thrust_asymmetry")],
+        ("thrust_asymmetry",): [found(379.0, "thrust_asymmetry", "trapped_water")],
+        ("thrust_asymmetry", "trapped_water"): [],
+    }
+    asked, rounds = scripted(monkeypatch, further)
+    ended = asked.run(found(-1000.0), [], 4)
+    assert [s["effects"] for s in ended.steps] == [["thrust_asymmetry"], ["trapped_water"]]
+    # The third of those that were fitted at first runs off: it is not told, and costs nothing.
+    assert [e.effects for e in ended.tried] == [("payload",), ("thrust_asymmetry",)]
+    # A further name is fitted from where it was as the first one, too.
+    first, second = ["payload"], ["thrust_asymmetry"]
+    assert [at.chosen for at in rounds] == [[], first, second, second, [*second, "trapped_water"]]
+    assert rounds[0].earlier == {} and [*rounds[-1].earlier] == ["payload", "thrust_asymmetry", "waves"]
+    # Of one name alone no pair is asked for.
+    asked, rounds = scripted(monkeypatch, further)
+    assert [s["effects"] for s in asked.run(found(-1000.0), [], 1).steps] == [["payload"]]
 
 
 def test_an_explanation_whose_free_running_diverges_costs_no_answer():
