@@ -26,6 +26,7 @@ SAMPLES = {
     "rows-7.jsonl": 6,
     "rows-8.jsonl": 7,
     "rows-9.jsonl": 8,
+    "rows-10.jsonl": 9,
 }
 
 
