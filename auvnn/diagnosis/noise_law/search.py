@@ -36,7 +36,7 @@ from auvnn.diagnosis.noise_law.likelihood.estimate_law import estimate
 from auvnn.diagnosis.noise_law.likelihood.law_likelihood import STEPS, Likelihood
 from auvnn.diagnosis.noise_law.likelihood.sums import CELL, ForceSums, force_sums, whole_cells
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction, predicted_by_inputs
-from auvnn.diagnosis.noise_law.rounds.leader_fits import Asked, LeaderFits, Round
+from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round, RoundResult
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import Branch, decided, shared, worth_following
 from auvnn.diagnosis.noise_law.rounds.names_given import ALPHA_NAME, NamesGiven
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
@@ -156,12 +156,15 @@ class ForceSearch:
         whole = 1.0
         while len(chosen) < most:
             grouped = [e.effects[-1] for g in groups for e in g]
-            asked = self._round(null, current, chosen, grouped, fitted)
-            if asked is None:
+            result = self._round(null, current, chosen, grouped, fitted)
+            if result is None:
                 break
             if not chosen:
-                tried, whole = asked.found, min([asked.at.tested.p_value, *asked.sure.values()], default=1.0)
-            good = asked.good
+                tried, whole = (
+                    result.found,
+                    min([result.at.tested.p_value, *result.sure.values()], default=1.0),
+                )
+            good = result.good
             if not good or (chosen and self._takes_up(good[0], chosen)):
                 break
             if not chosen and most > 1:
@@ -171,7 +174,7 @@ class ForceSearch:
                 break
             names = [h.name for h in group]
             verdict = "ambiguous" if len(group) > 1 else "named"
-            steps.append({"verdict": verdict, "effects": names, "p_value": asked.sure[group[0].name]})
+            steps.append({"verdict": verdict, "effects": names, "p_value": result.sure[group[0].name]})
             current = self._settled(group[0])
             if len(group) > 1:
                 groups.append([current.explanation, *(h.explanation for h in group[1:])])
@@ -199,7 +202,7 @@ class ForceSearch:
         chosen: Sequence[str],
         grouped: Sequence[str],
         fitted: Sequence[FittedHypothesis],
-    ) -> Asked | None:
+    ) -> RoundResult | None:
         """Return what a round has found beside an explanation; None where nothing significant is left."""
         remaining = [n for n in self.usable if n not in chosen and n not in grouped]
         if not remaining:
@@ -218,7 +221,7 @@ class ForceSearch:
         if not chosen:
             self._earlier = {h.name: parameters_of(h.explanation.fitted.model, [h.name]) for h in found}
         sure = {h.name: self.names.sure(h, at, len(remaining)) for h in found}
-        return Asked(at, found, good, sure, len(remaining))
+        return RoundResult(at, found, good, sure, len(remaining))
 
     def _looking_ahead(
         self, null: Hypothesis, good: list[Hypothesis], fitted: Sequence[FittedHypothesis]
@@ -227,8 +230,8 @@ class ForceSearch:
         branches: list[Branch] = []
         for h in worth_following(good, null):
             after = self._settled(h)
-            asked = self._round(null, after, [h.name], [], fitted)
-            further = [] if asked is None else self.names.likely(asked.at, asked.among, asked.found, ODDS)
+            result = self._round(null, after, [h.name], [], fitted)
+            further = [] if result is None else self.names.likely(result.at, result.among, result.found, ODDS)
             branches.append(Branch(h, after, further))
             if not further and len(branches) == 1:
                 # Beside the first name nothing is left that another one could explain.

@@ -46,7 +46,7 @@ class Round:
 
 
 @dataclass(frozen=True)
-class Asked:
+class RoundResult:
     """What a round has found.
 
     Attributes:
