@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from auvnn.answer_types import ByEffect
 from auvnn.diagnosis.answers.describe_parameters import describe_parameters
 from auvnn.diagnosis.full_data.map_reduce import LinearisationPoint, MapReduce
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, is_possible
 from auvnn.diagnosis.hypotheses.stated_priors import DETERMINED, Layout
 from auvnn.diagnosis.residuals.autocorrelation import slower_than_white
 from auvnn.diagnosis.score_tests.few_windows import are_few
@@ -171,7 +171,7 @@ def refit(
         step = known.bounded(low - theta, high - theta)
         done = float(step @ known.square @ step) < ENOUGH
         theta, steps = theta + step, steps + 1
-    std = _errors(passes, point, sums, priors, list(layout.places(names).values()))
+    std = _errors(passes, point, sums, priors, theta, list(layout.places(names).values()))
     slow = slower_than_white(sums.channel, sums.count, sums.rough, sums.pairs, sums.windows, floor)
     return Refit(names, parameters_of(model, names), std, sums, steps, done or not len(theta), slow)
 
@@ -181,6 +181,7 @@ def _errors(
     point: LinearisationPoint,
     sums: WindowSums,
     priors: Priors,
+    theta: Array,
     blocks: Sequence[NDArray[np.int64]],
 ) -> Array:
     """Return standard errors as `fit.standard_errors` does, for each effect's columns at a time."""
@@ -200,5 +201,6 @@ def _errors(
     for own, spread, information in zip(blocks, spreads, informations, strict=True):
         variance = np.maximum(np.diag(covariance)[own], 0.0)
         known = variance * priors.precision[own] < DETERMINED**2
+        known &= is_possible(variance, np.diag(whole.square)[own], theta[own])
         std[own] = np.where(known, np.sqrt(variance * ratio(spread, information, sums.windows)), np.nan)
     return std

@@ -30,6 +30,10 @@ from auvnn.metrics.windows import Windows
 Array = NDArray[np.float64]
 # Runs left out at a time where there are many, and stretches where there is one run only.
 FOLDS = 5
+# Share by which rounding may take a variance below what it must be, and the relative standard error below which no log
+# determines a value.
+ROUNDING, RESOLVED = 1e-3, 1e-9
+TINY = 1e-300
 
 
 @dataclass(frozen=True)
@@ -205,7 +209,7 @@ def log_evidence(layout: Layout, explanation: FittedHypothesis, factor: float) -
 
 
 def determined(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return whether the log says more of some parameters than their priors do.
+    """Return whether the log says more of some parameters than their priors do, by sums that can be right.
 
     Args:
         explanation: a fit.
@@ -213,13 +217,15 @@ def determined(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> NDA
     """
     fitted = explanation.under_law or explanation.fitted
     variance = np.diag(fitted.covariance())[columns]
-    return variance * fitted.priors.precision[columns] < DETERMINED**2
+    known = np.diag(fitted.statistics.total + fitted.priors.square)[columns]
+    told = variance * fitted.priors.precision[columns] < DETERMINED**2
+    return told & is_possible(variance, known, fitted.theta[columns])
 
 
 def standard_errors(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> tuple[Array, float]:
     """Return standard errors of some parameters, and the inflation that went into them.
 
-    A parameter of which the log says no more than its prior has none: NaN.
+    A parameter that is not `determined` has none: NaN.
 
     Args:
         explanation: a fit.
@@ -235,3 +241,19 @@ def standard_errors(explanation: FittedHypothesis, columns: NDArray[np.int64]) -
     factor = variance_inflation(by_window, left.equations.square, statistics.run)
     std = np.sqrt(np.maximum(np.diag(covariance)[columns], 0.0) * factor)
     return np.where(determined(explanation, columns), std, np.nan), factor
+
+
+def is_possible(variance: Array, information: Array, value: Array) -> NDArray[np.bool_]:
+    """Return whether variances can be those of estimates.
+
+    A variance is never less than the inverse of what is known with all other parameters given. Where sums are singular,
+    their generalised inverse is; and where a stiff model lets slopes grow from step to step, they say that a value is
+    known to the last digits.
+
+    Args:
+        variance: of the estimates, (p,).
+        information: on the diagonal of the normal equations, (p,).
+        value: of the estimates, (p,).
+    """
+    least = np.maximum((1.0 - ROUNDING) / np.maximum(information, TINY), (RESOLVED * value) ** 2)
+    return (variance > least) & (information > TINY)

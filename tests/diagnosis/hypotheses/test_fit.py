@@ -15,6 +15,7 @@ from auvnn.diagnosis.hypotheses.fit import (
     determined,
     fit_hypothesis,
     folds,
+    is_possible,
     left_out,
     log_evidence,
     plausible,
@@ -295,3 +296,33 @@ def test_an_explanation_of_a_real_log_equals_a_refit_without_each_run():
         alone = fit_hypothesis(guess, out, [], [], sigma=found.fitted.sigma)
         np.testing.assert_allclose(found.left_out[windows.run == r], alone.fitted.statistics.cost, rtol=0.02)
     assert 0.9 < found.cv < 1.1
+
+
+def test_what_sums_cannot_have_told_is_not_possible():
+    """The inverse of a regular matrix passes; a generalised one of a singular matrix and slopes that explode do not."""
+    rng = np.random.default_rng(4)
+    rows = rng.normal(size=(30, 4))
+    square = rows.T @ rows
+    value = np.array([1.0, -2.0, 0.0, 3.0])
+    assert is_possible(np.diag(np.linalg.inv(square)), np.diag(square), value).all()
+    alike = rows.copy()
+    alike[:, 1] = alike[:, 0]
+    square = alike.T @ alike
+    told = is_possible(np.diag(np.linalg.pinv(square, hermitian=True)), np.diag(square), value)
+    assert told.tolist() == [False, False, True, True]
+    steep = np.diag([1e30, 1.0, 1.0, 0.0])
+    told = is_possible(np.array([1e-30, 1.0, 1.0, 1.0]), np.diag(steep), value)
+    assert told.tolist() == [False, True, True, False]
+
+
+def test_a_fit_whose_slopes_explode_has_no_standard_errors(world):
+    found, _ = fitted(world, drawn(world, 2, net_buoyancy=30.0), ["net_buoyancy"])
+    at = found.names.index("net_buoyancy")
+    columns = np.array([sum(len(world.layout.columns[n]) for n in found.names[:at])])
+    assert np.isfinite(standard_errors(found, columns)[0]).all()
+    sums = found.fitted.statistics
+    hessian = sums.hessian.copy()
+    hessian[3, columns[0]] *= 1e15
+    hessian[3, :, columns[0]] *= 1e15
+    blown = replace(found, fitted=replace(found.fitted, statistics=replace(sums, hessian=hessian)))
+    assert np.isnan(standard_errors(blown, columns)[0]).all()

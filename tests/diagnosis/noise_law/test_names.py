@@ -117,7 +117,7 @@ def paying(costs, monkeypatch, without=1e3, **changes):
     The first is ahead of the explanation without any by 450.
     """
     likely = [hypothesis(name, 100.0 + 20.0 * k) for k, name in enumerate(costs)]
-    monkeypatch.setattr(names_given, "free_running_cost", lambda h, *_: costs[h.name])
+    monkeypatch.setattr(names_given, "cost_of_name", lambda _, h, *__: costs[h.name])
     return [h.name for h in given(**changes).paying(likely, hypothesis("", without), 0.5)]
 
 
@@ -193,13 +193,8 @@ def test_the_cost_is_that_of_errors_and_of_predictions_that_move():
     log = wandering_log(truth, 0.2 * RMS, TIME, runs=2, duration=20.0)
     scale = scale_of(log)
 
-    def found(force):
-        at = model.with_effects({"net_buoyancy": {"force": force}})
-        explanation = SimpleNamespace(fitted=SimpleNamespace(model=at), effects=("net_buoyancy",))
-        return SimpleNamespace(explanation=explanation)
-
-    before, after = found(0.0), found(8.0)
-    cost, size = free_running_cost(after, before, log, scale)  # type: ignore[arg-type]
+    before, after = (model.with_effects({"net_buoyancy": {"force": force}}) for force in (0.0, 8.0))
+    cost, size = free_running_cost(after, before, log, scale)
     predicted = []
     for force in (0.0, 8.0):
         rolled = roll(model.with_effects({"net_buoyancy": {"force": force}}), log, "5", scale)
@@ -217,7 +212,7 @@ def test_the_cost_is_that_of_errors_and_of_predictions_that_move():
     assert size == pytest.approx(np.sqrt(1.0 + away**2) - 1.0, rel=1e-6)
     # The force does not know of the commands here: both figures say much the same.
     assert size == pytest.approx(cost, rel=0.5)
-    assert free_running_cost(after, after, log, scale) == (0.0, 0.0)  # type: ignore[arg-type]
+    assert free_running_cost(after, after, log, scale) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(

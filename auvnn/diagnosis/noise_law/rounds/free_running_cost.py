@@ -8,18 +8,70 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
+from auvnn.estimation.nuisance_elimination import NormalEquations
+from auvnn.estimation.priors import limits, set_parameters
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import Rolled, Scale, roll
 from auvnn.metrics.windows import VELOCITY
+from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
 HORIZON = "5"
 
 
-def free_running_cost(after: Hypothesis, before: Hypothesis, log: Log, scale: Scale) -> tuple[float, float]:
-    """Return what a name costs in free running over 5 s: by the errors, and by how far predictions move.
+def cost_of_name(
+    layout: Layout, after: Hypothesis, before: Hypothesis, log: Log, scale: Scale
+) -> tuple[float, float]:
+    """Return what a name costs in free running, see `free_running_cost`, everything else refitted.
+
+    Where the effect is a coefficient group that is uncertain anyway, the hypothesis without the name has taken up a part of
+    it: there that group stays as it was stated, and the other parameters follow it by one Newton step under the law, or
+    stay as they are with the name, whichever predicts better.
+
+    Args:
+        layout: stated values.
+        after: hypothesis with a name more.
+        before: hypothesis without it.
+        log: on which both run freely.
+        scale: of the errors, as `rollouts.scale_of` has it.
+    """
+    with_name = _whole(after)
+    if after.name not in before.explanation.names:
+        return free_running_cost(with_name, _whole(before), log, scale)
+    costs = [free_running_cost(with_name, model, log, scale) for model in _as_stated(layout, after)]
+    return min(costs, key=lambda cost: cost[0])
+
+
+def _whole(found: Hypothesis) -> GreyBox:
+    """Return the model that a hypothesis says."""
+    return found.explanation.fitted.model.without_absent(found.explanation.effects)
+
+
+def _as_stated(layout: Layout, after: Hypothesis) -> tuple[GreyBox, GreyBox]:
+    """Return the model with what its last effect varies as stated, the others refitted, and left where they are."""
+    fitted = after.weighed.fitted
+    names, theta = after.explanation.names, fitted.theta
+    own = layout.places(names)[after.name]
+    others = np.setdiff1d(np.arange(len(theta)), own)
+    stated = theta.copy()
+    stated[own] = layout.means[after.name]
+    whole = NormalEquations(fitted.statistics.total + fitted.priors.square, np.zeros(len(theta)))
+    followed = stated.copy()
+    followed[others] -= whole.eliminate(own, others, rcond=1e-12).carry.T @ (stated - theta)[own]
+    low, high = limits(fitted.model, names, fitted.priors)
+    models = []
+    for values in (np.clip(followed, low, high), stated):
+        model = fitted.model.rebuilt(fitted.model.copied_effects())
+        set_parameters(model, names, values)
+        models.append(model.without_absent(after.explanation.effects))
+    return models[0], models[1]
+
+
+def free_running_cost(after: GreyBox, before: GreyBox, log: Log, scale: Scale) -> tuple[float, float]:
+    """Return what an effect costs in free running over 5 s: by the errors, and by how far predictions move.
 
     The first is by what share the error is larger before than after. Under a controller the commands answer the force, so
     that the error of free running is least at wrong values, and a right name may make it larger. The second is what the
@@ -27,16 +79,12 @@ def free_running_cost(after: Hypothesis, before: Hypothesis, log: Log, scale: Sc
     over the error that is left.
 
     Args:
-        after: hypothesis with a name more.
-        before: hypothesis without it.
+        after: the model with the effect.
+        before: the model without it.
         log: on which both run freely.
         scale: of the errors, as `rollouts.scale_of` has it.
     """
-    rolled = [
-        roll(h.explanation.fitted.model.without_absent(h.explanation.effects), log, HORIZON, scale)
-        for h in (before, after)
-    ]
-    first, last = rolled
+    first, last = (roll(model, log, HORIZON, scale) for model in (before, after))
     if first is None or last is None:
         return float("inf"), float("inf")
     errors = [r.total(scale) for r in (first, last)]

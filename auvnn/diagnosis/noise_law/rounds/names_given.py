@@ -13,7 +13,7 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     p_value_of,
     predicts_better,
 )
-from auvnn.diagnosis.noise_law.rounds.free_running_cost import free_running_cost, paying
+from auvnn.diagnosis.noise_law.rounds.free_running_cost import cost_of_name, paying
 from auvnn.diagnosis.noise_law.rounds.leader_fits import Round
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.logs import Log
@@ -108,6 +108,6 @@ class NamesGiven:
             if h.evidence > current.evidence + DECISIVE:
                 costs.append(float("inf"))
                 continue
-            cost = free_running_cost(h, current, self.log, self.scale)
+            cost = cost_of_name(self.layout, h, current, self.log, self.scale)
             costs.append(max(cost) if self.in_closed_loop else cost[0])
         return paying(likely, costs, enough)
