@@ -27,9 +27,9 @@ def cost_of_name(
 ) -> tuple[float, float]:
     """Return what a name costs in free running, see `free_running_cost`, everything else refitted.
 
-    Where the effect is a coefficient group that is uncertain anyway, the hypothesis without the name has taken up a part of
-    it: there that group stays as it was stated, and the other parameters follow it by one Newton step under the law, or
-    stay as they are with the name, whichever predicts better.
+    Where the effect is a coefficient group that is uncertain anyway, the hypothesis without the name has taken up a part
+    of it: there that group stays as it was stated, and the other parameters follow it by one Newton step under the law,
+    or stay as they are with the name, whichever predicts better.
 
     Args:
         layout: stated values.
