@@ -1,6 +1,6 @@
 """What a diagnosis asks where its first search leaves a force: of commands between samples, and of a stochastic force.
 
-Where the first search leaves nothing, its answer stands as it is.
+Where the first search leaves nothing, its answer stands, but for names that another law of the commands replaces.
 """
 
 from __future__ import annotations
@@ -15,6 +15,12 @@ from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.commands.holding import Holding, cost_at_best, holding
+from auvnn.diagnosis.noise_law.commands.in_place_of_names import (
+    asked_without_timed,
+    in_place_of_names,
+    replaces,
+    without_timed,
+)
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncertain_wrench
 from auvnn.diagnosis.noise_law.hypothesis import WithForce, shares_left
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
@@ -51,8 +57,12 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         state: where the first search ended.
     """
     if not state.leaves_something:
-        return state, {}, []
+        return _with_fewer_names(asked, state)
     least, held = _held(state)
+    untimed = without_timed(asked, state, least)
+    law = None if untimed is None else replaces(untimed, least, held, state.windows)
+    if untimed is not None and law is not None:
+        asked, least, held = asked_without_timed(asked, untimed, least), untimed, law
     windows = held.applied(state.windows)
     try:
         uncertain = uncertain_wrench(least, state.windows, held)
@@ -88,6 +98,24 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         return state, told, []
     state, law, predicted = beside
     return state, {**told, "force": left(law)}, [] if predicted is None else [_words(predicted)]
+
+
+def _with_fewer_names(asked: Setting, state: State) -> tuple[State, dict[str, Any], list[str]]:
+    """Return where the search stands where names leave nothing: without those that only take up what commands do.
+
+    Args:
+        asked: what is asked.
+        state: where the first search ended.
+    """
+    found = in_place_of_names(asked, state) if state.chosen else None
+    if found is None:
+        return state, {}, []
+    fewer, law = found
+    asked.say(f"commands change between samples ({law.name}): searching again")
+    again = search(asked_without_timed(asked, fewer, state.current), law.applied(state.windows))
+    if again.leaves_something or len(again.chosen) >= len(state.chosen):
+        return state, {}, []
+    return again, {"commands": law.to_dict()}, []
 
 
 def _held(state: State) -> tuple[FittedHypothesis, Holding]:

@@ -228,7 +228,7 @@ def tied(layout: Layout, good: list[Hypothesis], before: Hypothesis) -> list[Hyp
     return sorted([best, *rest], key=lambda h: h.name not in plainer)
 
 
-def predicts_better(after: Hypothesis, before: Hypothesis, least: float) -> bool:
+def predicts_better(after: Hypothesis, before: Hypothesis, least: float, *, ranks: bool = True) -> bool:
     """Whether runs left out are predicted better: in the mean by so many standard errors of the gain, or in most windows.
 
     An effect that shows in few windows has a mean gain and none in most of them. One that shows in most may have a mean
@@ -238,11 +238,14 @@ def predicts_better(after: Hypothesis, before: Hypothesis, least: float) -> bool
         after: hypothesis that is to predict better.
         before: hypothesis that it is compared with.
         least: standard errors that the mean gain must exceed.
+        ranks: whether most windows are enough.
 
     Reference: Wilcoxon (1945), Biometrics Bulletin 1(6), for the signed-rank test.
     """
     gain = gain_by_window(after.weighed, before.weighed)
     if float(gain.sum()) > least * float(np.sqrt(len(gain)) * gain.std(ddof=1)):
         return True
+    if not ranks:
+        return False
     finite = bool(np.isfinite(gain).all()) and bool((gain != 0.0).any())
     return finite and float(np.asarray(wilcoxon(gain, alternative="greater"))[1]) < ALPHA_RANKS

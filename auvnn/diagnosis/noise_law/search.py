@@ -69,6 +69,7 @@ class ForceSearch:
         self.layout, self.windows = asked.layout, windows
         self.usable, self.base, self.say = list(asked.usable), list(asked.base), asked.say
         self.names = NamesGiven(asked.layout, asked.log, scale_of(asked.log), asked.tolerance)
+        self.names.white_noise = windows.noise is None
         self.sigma = self.weights = np.full(18, np.inf)
         self.cell = CELL
         self.response: Array | None = None

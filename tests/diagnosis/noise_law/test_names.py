@@ -79,6 +79,24 @@ def names_of(good, before=10000.0):
     return [h.name for h in tied(COLUMNS, good, hypothesis("", before))]
 
 
+def test_a_further_name_must_be_sure_in_the_mean_where_the_noise_is_white(monkeypatch):
+    """A first name, and one beside noise that is not white, may also predict most windows better."""
+    asked_for: list[tuple[float, bool]] = []
+
+    def better(after, before, least, *, ranks):
+        asked_for.append((least, ranks))
+        return True
+
+    monkeypatch.setattr(names_given, "predicts_better", better)
+    monkeypatch.setattr(names_given, "p_value_of", lambda *_: 1e-12)
+    for chosen, white in (([], True), (["tether"], True), (["tether"], False)):
+        asked = given(tolerance=Tolerance.of(0), white_noise=white)
+        at = Round(None, with_law((2.0, 2.0)), [], chosen)  # type: ignore[arg-type]
+        asked.likely(at, 10, [with_law((0.1, 0.1), 50.0, "waves")], 4.0)  # type: ignore[list-item]
+    further = names_given.GAIN_FURTHER
+    assert asked_for == [(names_given.GAIN, True), (further, False), (further, True)] and further == 3.0
+
+
 def test_what_is_known_to_be_confused_and_explains_nearly_as_much_is_tied():
     best, other = hypothesis("added_mass", 5000.0), hypothesis("trapped_water", 5200.0)
     assert names_of([best, other]) == ["added_mass", "trapped_water"]
@@ -158,7 +176,7 @@ def test_a_force_left_is_that_of_the_mean_over_a_second():
 
 @pytest.mark.parametrize(("rms", "expected"), [((0.3, 2.0), ["waves"]), ((0.7, 2.0), [])])
 def test_a_further_name_brings_much_of_the_gain_or_takes_the_force_of_an_axis(rms, expected, monkeypatch):
-    monkeypatch.setattr(names_given, "predicts_better", lambda *_: True)
+    monkeypatch.setattr(names_given, "predicts_better", lambda *_, **__: True)
     monkeypatch.setattr(names_given, "p_value_of", lambda *_: 1e-12)
     asked = given(tolerance=Tolerance.of(0))
     at = Round(None, with_law((2.0, 2.0)), [], ["tether"])  # type: ignore[arg-type]
@@ -244,16 +262,17 @@ def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_ends_the_se
 def test_runs_left_out_are_predicted_better_in_the_mean_or_in_most_windows(monkeypatch):
     random = np.random.default_rng(0)
 
-    def better(gain, least=1.0):
+    def better(gain, least=1.0, **how):
         monkeypatch.setattr("auvnn.diagnosis.noise_law.hypothesis.gain_by_window", lambda *_: gain)
         nothing = SimpleNamespace(weighed=None)
-        return predicts_better(nothing, nothing, least)  # type: ignore[arg-type]
+        return predicts_better(nothing, nothing, least, **how)  # type: ignore[arg-type]
 
     # An effect in few windows, and one in most of them whose mean three windows decide in which sensors are wrong.
     few = np.concatenate([0.1 * random.normal(size=90), 30.0 + random.normal(size=10)])
     most = np.concatenate([20.0 + 15.0 * random.normal(size=90), [-1700.0, -1500.0, -700.0]])
     assert better(few) and better(few, 2.0) and better(most) and better(most, 2.0)
     assert most.sum() < np.sqrt(len(most)) * most.std(ddof=1)
+    assert better(few, ranks=False) and not better(most, ranks=False)
     # Of what explains nothing one in a thousand does by its ranks.
     worse = [better(random.normal(size=100) - 0.1, 3.0) for _ in range(200)]
     assert sum(worse) <= 2

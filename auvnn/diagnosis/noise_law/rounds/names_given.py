@@ -23,7 +23,7 @@ from auvnn.metrics.rollouts import Scale
 # stronger grounds, because each time chance gets another turn.
 ALPHA_NAME, ALPHA_FURTHER = 0.01, 0.001
 # Standard errors by which runs left out must be predicted better.
-GAIN, GAIN_FURTHER = 1.0, 2.0
+GAIN, GAIN_FURTHER = 1.0, 3.0
 # What the first name and a further one must cost in free running, as shares of the tolerance (a force is always there
 # and makes errors that no name takes away).
 FIRST_COST, FURTHER_COST = 0.5, 1.0
@@ -43,6 +43,7 @@ class NamesGiven:
         tolerance: what does not matter.
         ignores_cost: whether a name may cost little.
         in_closed_loop: whether commands answer the motion.
+        white_noise: whether the sensors' noise is white; a further name must then be sure in the mean.
     """
 
     layout: Layout
@@ -51,6 +52,7 @@ class NamesGiven:
     tolerance: Tolerance
     ignores_cost: bool = False
     in_closed_loop: bool = False
+    white_noise: bool = True
 
     def good(self, at: Round, among: int, found: Sequence[Hypothesis], odds: float) -> list[Hypothesis]:
         """Return those explanations that may be named, the most evident first.
@@ -79,7 +81,7 @@ class NamesGiven:
             for h in found
             if h.evidence > at.current.evidence + (ODDS if explains_an_axis(h, at.current) else odds)
             and self.sure(h, at, among) < level
-            and predicts_better(h, at.current, least)
+            and predicts_better(h, at.current, least, ranks=not (at.chosen and self.white_noise))
         ]
 
     def sure(self, found: Hypothesis, at: Round, among: int) -> float:

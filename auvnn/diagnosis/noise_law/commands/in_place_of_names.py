@@ -1,0 +1,122 @@
+"""Whether names only take up what commands do between samples.
+
+A name that was fitted to commands as they are logged may stand for nothing but their way from one sample to the next: an
+overshoot of the thrust comes earlier than a held command, as the straight line does. Where names leave nothing, no
+force is there to ask; so explanations with fewer names are asked whether another law of the commands alone does what the
+other names did.
+
+Reference: Akaike (1974), IEEE Transactions on Automatic Control 19(6), for what a further parameter costs.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.noise_law.commands.holding import Holding, cost_at_best, holding
+from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
+from auvnn.diagnosis.stages.state import Setting, State
+from auvnn.effects import effect_class
+from auvnn.estimation.prediction_error import FitError
+from auvnn.metrics.windows import Windows
+
+# What a further parameter costs, in units of the squared error.
+PARAMETER = 2.0
+# Share of what names do beyond which it counts that they do more than a law: no law is exact, and they take up the rest.
+REST = 0.05
+# Hooks of effects that change when a command acts, or how much of it.
+OF_COMMANDS = {"command", "delay", "respond", "steer"}
+HELD = Holding("held", 0.0, 0.0, 0.0)
+
+
+def in_place_of_names(asked: Setting, state: State) -> tuple[FittedHypothesis, Holding] | None:
+    """Return an explanation with fewer names, and a law of the commands with which it does what all do with held ones.
+
+    That with the fewest names is taken; None where there is none.
+
+    Args:
+        asked: what is asked.
+        state: where a search with held commands has ended, with names.
+    """
+    end = state.current
+    known = {frozenset(e.effects): e for e in (state.first, *state.path) if {*e.effects} < {*end.effects}}
+    untimed = without_timed(asked, state, end)
+    if untimed is not None:
+        known.setdefault(frozenset(untimed.effects), untimed)
+    for before in sorted(known.values(), key=lambda e: len(e.effects)):
+        law = replaces(before, end, HELD, state.windows)
+        if law is not None:
+            return before, law
+    return None
+
+
+def asked_without_timed(asked: Setting, before: FittedHypothesis, end: FittedHypothesis) -> Setting:
+    """Return what is asked without those names that change when a command acts and that a law has replaced.
+
+    Args:
+        asked: what was asked.
+        before: the explanation that is left.
+        end: the explanation with these names.
+    """
+    gone = {*timed(end)} - {*before.effects}
+    return replace(asked, usable=tuple(n for n in asked.usable if n not in gone))
+
+
+def timed(explanation: FittedHypothesis) -> list[str]:
+    """Return the names that change when a command acts, or how much of it."""
+    return [n for n in explanation.effects if OF_COMMANDS & {*effect_class(n).hooks()}]
+
+
+def without_timed(asked: Setting, state: State, end: FittedHypothesis) -> FittedHypothesis | None:
+    """Return an explanation refitted without those names that change when a command acts; None where it has none.
+
+    Args:
+        asked: what is asked.
+        state: of the search, whose explanations are taken where one is the same.
+        end: the explanation.
+    """
+    gone = timed(end)
+    if not gone:
+        return None
+    left = {*end.effects} - {*gone}
+    for known in (state.first, *state.path, *state.tried):
+        if {*known.effects} == left:
+            return known
+    with suppress(FitError):
+        return asked.chooser(state.windows).without(end, asked.base, gone)
+    return None
+
+
+def replaces(
+    before: FittedHypothesis, end: FittedHypothesis, held: Holding, windows: Windows
+) -> Holding | None:
+    """Return the law of the commands with which an explanation does as well as one with more names, or None.
+
+    A law counts as one parameter, and those of the names that it would replace count, too. Names that change when a
+    command acts must do more by a twentieth of what they do with held commands.
+
+    Args:
+        before: the explanation with fewer names.
+        end: that with more.
+        held: the law of the commands with that.
+        windows: of commands that are held.
+    """
+    sums = end.fitted.statistics
+    factor = variance_inflation(sums.slope, sums.total, sums.run)
+    sigma = end.fitted.sigma
+    with suppress(np.linalg.LinAlgError):
+        law = holding(before, windows)
+        if law.odds <= 0.0:
+            return None
+        alone = cost_at_best(before, law.applied(windows), sigma)
+        with_names = cost_at_best(end, held.applied(windows), sigma)
+        spared = len(end.fitted.theta) - len(before.fitted.theta) - (held.odds <= 0.0)
+        least = PARAMETER * spared * factor
+        if {*end.effects} - {*before.effects} <= {*timed(end)}:
+            least = max(least, REST * (cost_at_best(before, windows, sigma) - with_names))
+        if alone - with_names <= least:
+            return law
+    return None

@@ -1,0 +1,80 @@
+"""Names that only take up what commands do between samples, told from names of what is there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.noise_law.commands.in_place_of_names import in_place_of_names
+from auvnn.diagnosis.selection.choose import Chooser
+from auvnn.diagnosis.stages.state import State
+from auvnn.logs import Log
+from auvnn.models import GreyBox
+from tests.small_logs import make_log, small_vehicle
+
+NAMES = ["net_buoyancy", "thrust_overshoot"]
+STEP = 5
+
+
+def thinned(log: Log, step: int) -> Log:
+    """Return every so many-th sample of a log: its commands have changed in between."""
+    runs = []
+    for run in log.runs:
+        arrays = {n: getattr(run, n) for n in ("t", "quaternion", "nu", "position", "thrusters")}
+        runs.append(replace(run, **{n: x[::step].copy() for n, x in arrays.items()}))
+    return Log.from_runs(runs, name=log.name)
+
+
+def of(hidden: dict[str, dict[str, float]], *, held: bool) -> tuple[GreyBox, Log]:
+    """Return a model, and a log of it with what is hidden, at 5 Hz, its commands held or changed at 25 Hz."""
+    model = GreyBox(small_vehicle())
+    plant = model.with_effects(hidden) if hidden else model
+    rate = 5.0 if held else 5.0 * STEP
+    log = make_log(plant, runs=3, duration=30.0, rate=rate, noise=0.3, max_step=0.04)
+    return model, log if held else thinned(log, STEP)
+
+
+def ended(model: GreyBox, log: Log, order: list[str]) -> tuple[Any, State]:
+    """Return what is asked, and a search that has ended with both names, found in some order."""
+    windows, layout = windows_for(model, log), lay_out(model, NAMES)
+    base = list(layout.nuisance)
+    first = fit_hypothesis(layout, windows, base, ())
+    path = tuple(fit_hypothesis(layout, windows, base, order[: k + 1]) for k in range(2))
+    asked = SimpleNamespace(base=tuple(base), chooser=lambda w: Chooser(layout, w, lambda _: None))
+    return asked, State(windows, first, path[-1], chosen=tuple(order), path=path)
+
+
+def overshoot(model: GreyBox) -> dict[str, float]:
+    described = model.with_effects({"thrust_overshoot": {}}).effect("thrust_overshoot").parameters_of
+    return {p.name: p.null + 3.0 * p.scale for p in described if not p.shape}
+
+
+@pytest.mark.parametrize("order", [NAMES, NAMES[::-1]])
+def test_an_overshoot_that_stands_for_commands_between_samples_gives_way(order):
+    """Whichever comes first: then the explanation with the buoyancy alone is fitted."""
+    found = in_place_of_names(*ended(*of({"net_buoyancy": {"force": 6.0}}, held=False), order))
+    assert found is not None and found[0].effects == ("net_buoyancy",)
+    assert found[1].name in ("ahead", "linear", "smooth") and found[1].share == pytest.approx(0.4, abs=0.15)
+
+
+def test_names_of_what_is_there_stay():
+    model = GreyBox(small_vehicle())
+    both = {"net_buoyancy": {"force": 6.0}, "thrust_overshoot": overshoot(model)}
+    assert in_place_of_names(*ended(*of(both, held=True), NAMES)) is None
+    # Nor is the buoyancy given up for a law: it is in the explanation that is asked.
+    assert in_place_of_names(*ended(*of({"net_buoyancy": {"force": 6.0}}, held=True), NAMES)) is None
+
+
+@pytest.mark.long
+def test_the_answer_has_the_name_of_what_is_there_alone():
+    model, log = of({"net_buoyancy": {"force": 6.0}}, held=False)
+    found = diagnose(model, log, NAMES, advice=False, whiteness=False)
+    assert found.verdict == "named" and found.missing == ["net_buoyancy"]
+    assert found.stochastic["commands"]["between_samples"] != "held"
