@@ -52,6 +52,8 @@ class FittedHypothesis:
         under_law: the fit with sums under the law of a stochastic force, in the sensors' white noise; standard errors
             follow from these. None without a force.
         around: trajectories (B, L, 13) about which its windows are linear under a law; None for free running.
+        between: (P,) how far explanations that the data prefer, and that are not named, would move its parameters; None
+            where there are none.
     """
 
     effects: tuple[str, ...]
@@ -64,6 +66,7 @@ class FittedHypothesis:
     judged: Priors | None = None
     under_law: Fitted | None = None
     around: Tensor | None = None
+    between: Array | None = None
 
     @property
     def cv(self) -> float:
@@ -225,7 +228,7 @@ def determined(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> NDA
 def standard_errors(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> tuple[Array, float]:
     """Return standard errors of some parameters, and the inflation that went into them.
 
-    A parameter that is not `determined` has none: NaN.
+    A parameter that is not `determined` has none: NaN. What lies between explanations is part of them.
 
     Args:
         explanation: a fit.
@@ -239,8 +242,10 @@ def standard_errors(explanation: FittedHypothesis, columns: NDArray[np.int64]) -
     left = whole.eliminate(columns, others, rcond=1e-12)
     by_window = left.scores(statistics.slope[:, columns], statistics.slope[:, others])
     factor = variance_inflation(by_window, left.equations.square, statistics.run)
-    std = np.sqrt(np.maximum(np.diag(covariance)[columns], 0.0) * factor)
-    return np.where(determined(explanation, columns), std, np.nan), factor
+    variance = np.maximum(np.diag(covariance)[columns], 0.0) * factor
+    if explanation.between is not None:
+        variance = variance + explanation.between[columns] ** 2
+    return np.where(determined(explanation, columns), np.sqrt(variance), np.nan), factor
 
 
 def is_possible(variance: Array, information: Array, value: Array) -> NDArray[np.bool_]:

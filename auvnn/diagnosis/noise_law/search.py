@@ -35,6 +35,7 @@ from auvnn.diagnosis.noise_law.likelihood.about_motion import linear_about_its_o
 from auvnn.diagnosis.noise_law.likelihood.estimate_law import estimate
 from auvnn.diagnosis.noise_law.likelihood.law_likelihood import STEPS, Likelihood
 from auvnn.diagnosis.noise_law.likelihood.sums import CELL, ForceSums, force_sums, whole_cells
+from auvnn.diagnosis.noise_law.model_average import averaged
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction, predicted_by_inputs
 from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round, RoundResult
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import Branch, decided, shared, worth_following
@@ -154,7 +155,7 @@ class ForceSearch:
         steps: list[SearchStep] = []
         groups: list[list[FittedHypothesis]] = []
         tried: list[Hypothesis] = []
-        whole = 1.0
+        whole, rivals = 1.0, list[Hypothesis]()
         while len(chosen) < most:
             grouped = [e.effects[-1] for g in groups for e in g]
             result = self._round(null, current, chosen, grouped, fitted)
@@ -167,6 +168,7 @@ class ForceSearch:
                 )
             good = result.good
             if not good or (chosen and self._takes_up(good[0], chosen)):
+                rivals = result.found if chosen else []
                 break
             if not chosen and most > 1:
                 good = self._looking_ahead(null, good, fitted)
@@ -187,7 +189,7 @@ class ForceSearch:
         return WithForce(
             steps,
             [[under_law.told(e) for e in group] for group in groups],
-            under_law.told(current.explanation),
+            under_law.told(averaged(self.layout, current, rivals)),
             self._about(current.explanation, law),
             replace(current.estimate, law=in_newtons(law, current.explanation)),
             self._told(tried),
