@@ -97,6 +97,22 @@ def test_a_further_name_must_be_sure_in_the_mean_where_the_noise_is_white(monkey
     assert asked_for == [(names_given.GAIN, True), (further, False), (further, True)] and further == 3.0
 
 
+def test_what_is_likelier_and_known_to_be_confused_comes_first_though_it_predicts_less_surely(monkeypatch):
+    sure = {"munk_moment", "tether"}
+    monkeypatch.setattr(names_given, "predicts_better", lambda after, *_, **__: after.name in sure)
+    monkeypatch.setattr(names_given, "p_value_of", lambda *_: 1e-12)
+    at = Round(None, with_law((2.0, 2.0)), [], ["drag_curve"])  # type: ignore[arg-type]
+
+    def said(*names):
+        found: Any = [with_law((1.0, 1.0), 90.0 - k, name) for k, name in enumerate(names)]
+        return [h.name for h in given().likely(at, 10, found, 4.0)]
+
+    # What is not known to be confused with it, or is less likely, does not count.
+    assert said("payload", "body_lift", "munk_moment", "tether") == ["body_lift", "munk_moment", "tether"]
+    assert said("munk_moment", "body_lift") == ["munk_moment"]
+    assert said("payload", "body_lift") == []
+
+
 def test_what_is_known_to_be_confused_and_explains_nearly_as_much_is_tied():
     best, other = hypothesis("added_mass", 5000.0), hypothesis("trapped_water", 5200.0)
     assert names_of([best, other]) == ["added_mass", "trapped_water"]

@@ -15,7 +15,7 @@ from auvnn.diagnosis.noise_law.hypothesis import (
 )
 from auvnn.diagnosis.noise_law.rounds.free_running_cost import cost_of_name, paying
 from auvnn.diagnosis.noise_law.rounds.leader_fits import Round
-from auvnn.diagnosis.selection.model_comparison import ODDS
+from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import Scale
 
@@ -69,6 +69,9 @@ class NamesGiven:
     def likely(self, at: Round, among: int, found: Sequence[Hypothesis], odds: float) -> list[Hypothesis]:
         """Return those explanations that the data prefer by so much, whatever they cost, the most evident first.
 
+        What is likelier than the first of them, and known to be confused with it, is compared with it, though it predicts
+        runs left out less surely.
+
         Args:
             at: the round.
             among: how many effects were asked for.
@@ -76,12 +79,21 @@ class NamesGiven:
             odds: logarithm of the odds that a name needs.
         """
         level, least = (ALPHA_FURTHER, GAIN_FURTHER) if at.chosen else (ALPHA_NAME, GAIN)
-        return [
+        likely = [
             h
             for h in found
             if h.evidence > at.current.evidence + (ODDS if explains_an_axis(h, at.current) else odds)
             and self.sure(h, at, among) < level
-            and predicts_better(h, at.current, least, ranks=not (at.chosen and self.white_noise))
+        ]
+        ranks = not (at.chosen and self.white_noise)
+        better = [k for k, h in enumerate(likely) if predicts_better(h, at.current, least, ranks=ranks)]
+        if not better:
+            return []
+        first = better[0]
+        return [
+            h
+            for k, h in enumerate(likely)
+            if k in better or (k < first and confused(h.name, likely[first].name))
         ]
 
     def sure(self, found: Hypothesis, at: Round, among: int) -> float:
