@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Mapping
 from typing import Any
 
 from auvnn.cli.runs.folder import WORK
@@ -48,14 +49,22 @@ def _run(job: Job) -> Answering:
     for aim in data["targets"]:
         met = {None: "not measured", True: "met", False: "missed"}[aim["met"]]
         bounds = " ".join(f"{word} {aim[word]:g}" for word in ("least", "most") if aim[word] is not None)
-        of = f" of {aim['count']}" if aim["count"] else ""
-        job.say(f"target    {aim['part']}: {aim['rate']} {_shown(aim['share'])}{of}, wanted {bounds}: {met}")
+        job.say(f"target    {aim['part']}: {aim['rate']} {_counted(aim)}, wanted {bounds}: {met}")
     return answer
 
 
 def _files(given: Any) -> list[str]:
     """Return one file or several as a list."""
     return [] if given is None else [str(x) for x in ([given] if isinstance(given, str) else given)]
+
+
+def _counted(aim: Mapping[str, Any]) -> str:
+    """Return a rate as so many of so many, with its share; of a mean or median, over how many."""
+    if aim["share"] is None:
+        return "unknown"
+    if aim["hits"] is None:
+        return f"{_shown(aim['share'])} (over {aim['count']})"
+    return f"{aim['hits']} of {aim['count']} ({100.0 * aim['share']:.3g} %)"
 
 
 def _shown(value: Any) -> Any:

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from auvnn.cli.main import VERBS
-from auvnn.cli.verbs.benchmark import TAKEN
+from auvnn.cli.verbs.benchmark import TAKEN, _counted
 from auvnn.config import config_dir, read_yaml
 from auvnn.studies.benchmark import cases
 from auvnn.studies.benchmark.cases import apart
@@ -103,3 +103,16 @@ def test_every_option_that_says_which_logs_reaches_the_benchmark():
     own = {"plan", "any_code", "rows", "only_done", "defaults", "hydra"}
     options = read_yaml(config_dir() / "benchmark.yaml")
     assert {*options} - own == {*TAKEN}
+
+
+@pytest.mark.parametrize(
+    ("aim", "words"),
+    [
+        ({"share": 1.0, "hits": 4, "count": 4}, "4 of 4 (100 %)"),
+        ({"share": 1 / 3, "hits": 10, "count": 30}, "10 of 30 (33.3 %)"),
+        ({"share": 1.0183, "hits": None, "count": 5}, "1.018 (over 5)"),
+        ({"share": None, "hits": None, "count": 0}, "unknown"),
+    ],
+)
+def test_a_rate_is_told_as_a_count(aim, words):
+    assert _counted(aim) == words
