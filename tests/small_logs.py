@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -131,3 +132,12 @@ def make_log(
             )
         )
     return Log.from_runs(made, name=f"made-{seed}")
+
+
+def thinned(log: Log, step: int) -> Log:
+    """Return every so many-th sample of a log: its commands have changed in between."""
+    runs = []
+    for run in log.runs:
+        arrays = {n: getattr(run, n) for n in ("t", "quaternion", "nu", "position", "thrusters")}
+        runs.append(replace(run, **{n: x[::step].copy() for n, x in arrays.items()}))
+    return Log.from_runs(runs, name=log.name)

@@ -261,4 +261,4 @@ def is_possible(variance: Array, information: Array, value: Array) -> NDArray[np
         value: of the estimates, (p,).
     """
     least = np.maximum((1.0 - ROUNDING) / np.maximum(information, TINY), (RESOLVED * value) ** 2)
-    return (variance > least) & (information > TINY)
+    return variance > least

@@ -22,9 +22,8 @@ from auvnn.diagnosis.noise_law.commands.holding import (
     cubic_weights,
     holding,
 )
-from auvnn.logs import Log
 from auvnn.models import GreyBox
-from tests.small_logs import make_log, sines, small_vehicle
+from tests.small_logs import make_log, sines, small_vehicle, thinned
 
 STEP = 5
 
@@ -32,15 +31,6 @@ STEP = 5
 @pytest.fixture(scope="module")
 def model():
     return GreyBox(small_vehicle())
-
-
-def thinned(log: Log, step: int) -> Log:
-    """Return every so many-th sample of a log."""
-    runs = []
-    for run in log.runs:
-        arrays = {n: getattr(run, n) for n in ("t", "quaternion", "nu", "position", "thrusters")}
-        runs.append(replace(run, **{n: x[::step].copy() for n, x in arrays.items()}))
-    return Log.from_runs(runs, name=log.name)
 
 
 def asked(model, log):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,19 +16,10 @@ from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.diagnosis.stages.state import State
 from auvnn.logs import Log
 from auvnn.models import GreyBox
-from tests.small_logs import make_log, small_vehicle
+from tests.small_logs import make_log, small_vehicle, thinned
 
 NAMES = ["net_buoyancy", "thrust_overshoot"]
 STEP = 5
-
-
-def thinned(log: Log, step: int) -> Log:
-    """Return every so many-th sample of a log: its commands have changed in between."""
-    runs = []
-    for run in log.runs:
-        arrays = {n: getattr(run, n) for n in ("t", "quaternion", "nu", "position", "thrusters")}
-        runs.append(replace(run, **{n: x[::step].copy() for n, x in arrays.items()}))
-    return Log.from_runs(runs, name=log.name)
 
 
 def of(hidden: dict[str, dict[str, float]], *, held: bool) -> tuple[GreyBox, Log]:
