@@ -197,14 +197,19 @@ def test_pairs_found_from_their_other_name_are_not_fitted_again():
     assert asked._leaders.known[key][1].evidence == 381.0
 
 
-def scripted(monkeypatch, further: dict[tuple[str, ...], list[Any]]) -> tuple[Any, list[Any]]:
-    """Return a search whose tests and fits are given, and the rounds that it asks for, as they come."""
+def scripted(
+    monkeypatch, further: dict[tuple[str, ...], list[Any]], good: int | None = None
+) -> tuple[Any, list[Any]]:
+    """Return a search whose tests and fits are given, and the rounds that it asks for, as they come.
+
+    After the first round so many of the fits, by default all, may be named.
+    """
     rounds: list[Any] = []
 
     def fitted(at: Any, *_: Any) -> tuple[list[Any], list[Any]]:
         rounds.append(at)
         more = further.get(tuple(at.chosen), [])
-        return more, more
+        return more, more[:good] if at.chosen else more
 
     asked: Any = ForceSearch.__new__(ForceSearch)
     asked.layout, asked.usable, asked.base, asked.looks_further, asked._earlier = (
@@ -224,6 +229,13 @@ def scripted(monkeypatch, further: dict[tuple[str, ...], list[Any]]) -> tuple[An
     asked._fits = lambda: SimpleNamespace(told=lambda e: diverging(e))
     asked._about = lambda *_: None
     asked.predicted = lambda _: None
+    asked.averaged_with = []
+
+    def averaged(_: Any, current: Any, rivals: Any) -> Any:
+        asked.averaged_with.append([h.explanation.effects for h in rivals])
+        return current.explanation
+
+    monkeypatch.setattr(module, "averaged", averaged)
     monkeypatch.setattr(module, "tied", lambda _, good, before: good[:1])
     monkeypatch.setattr(module, "in_newtons", lambda law, _: law)
     monkeypatch.setattr(module, "parameters_of", lambda model, chosen: chosen)
@@ -256,6 +268,21 @@ def test_the_search_begins_with_what_the_likeliest_pairs_have_in_common(monkeypa
     # Of one name alone no pair is asked for.
     asked, rounds = scripted(monkeypatch, further)
     assert [s["effects"] for s in asked.run(found(-1000.0), [], 1).steps] == [["payload"]]
+
+
+def test_what_is_fitted_beside_the_names_and_not_named_is_averaged_with_them(monkeypatch):
+    further = {
+        (): [found(10.0, "payload")],
+        ("payload",): [found(14.0, "payload", "waves"), found(9.0, "payload", "trapped_water")],
+    }
+    asked, _ = scripted(monkeypatch, further, good=0)
+    assert [s["effects"] for s in asked.run(found(-1000.0), [], 4).steps] == [["payload"]]
+    assert asked.averaged_with == [[("payload", "waves"), ("payload", "trapped_water")]]
+    # Without any name there is nothing to average; nor is there where no further one was asked for.
+    for given, most in (({(): []}, 4), ({(): [found(10.0, "payload")]}, 1)):
+        asked, _ = scripted(monkeypatch, given)
+        asked.run(found(-1000.0), [], most)
+        assert asked.averaged_with == [[]]
 
 
 def test_an_explanation_whose_free_running_diverges_costs_no_answer():

@@ -18,6 +18,7 @@ from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round
 from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of
+from auvnn.metrics.coloured_noise import NoiseColour
 from auvnn.models import GreyBox
 from tests.diagnosis.noise_law.wandering import wandering_log
 from tests.small_logs import small_vehicle
@@ -174,3 +175,5 @@ def test_whether_commands_answer_is_asked_about_the_filtered_trajectories(monkey
     null = beside.begin(first, white(first, np.full(18, 1e-9)))
     assert null is not None and beside.names.in_closed_loop
     assert len(about) == 1 and about[0] is not None and about[0] is null.explanation.around
+    coloured = replace(windows, noise=NoiseColour(np.full(18, 0.3)))
+    assert beside.names.white_noise and not search.ForceSearch(asked, coloured).names.white_noise

@@ -11,6 +11,7 @@ from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.noise_law import answer
 from auvnn.diagnosis.noise_law.commands.in_place_of_names import in_place_of_names
 from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.diagnosis.stages.state import State
@@ -60,6 +61,28 @@ def test_names_of_what_is_there_stay():
     assert in_place_of_names(*ended(*of(both, held=True), NAMES)) is None
     # Nor is the buoyancy given up for a law: it is in the explanation that is asked.
     assert in_place_of_names(*ended(*of({"net_buoyancy": {"force": 6.0}}, held=True), NAMES)) is None
+
+
+@pytest.mark.parametrize(
+    ("names", "leaves", "given"), [(1, False, True), (2, False, False), (0, True, False)]
+)
+def test_where_names_leave_nothing_a_law_that_spares_some_of_them_takes_their_place(
+    names, leaves, given, monkeypatch
+):
+    """The search with the law must leave nothing with fewer names."""
+    searched: list[Any] = []
+    state: Any = SimpleNamespace(
+        leaves_something=False, chosen=("net_buoyancy", "thrust_overshoot"), windows="held", current=None
+    )
+    again = SimpleNamespace(leaves_something=leaves, chosen=tuple(NAMES[:names]))
+    law = SimpleNamespace(name="smooth", applied=lambda w: f"{w}, smooth", to_dict=lambda: {"a": 1})
+    monkeypatch.setattr(answer, "in_place_of_names", lambda *_: ("fewer", law))
+    monkeypatch.setattr(answer, "asked_without_timed", lambda asked, fewer, end: (fewer, end))
+    monkeypatch.setattr(answer, "search", lambda asked, windows: searched.append((asked, windows)) or again)
+    asked: Any = SimpleNamespace(say=lambda _: None)
+    found = answer.answer_with_force(asked, state)
+    assert found == ((again, {"commands": {"a": 1}}, []) if given else (state, {}, []))
+    assert searched == [(("fewer", None), "held, smooth")]
 
 
 @pytest.mark.long
