@@ -30,7 +30,7 @@ class ActuationDelay(Effect):
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
         """Return the delay."""
-        return (Parameter("delay", "s", 0.0, 0.1, 0.0, 2.0),)
+        return (Parameter("delay", "s", 0.0, 0.1, 0.0, 2.0, timing=True),)
 
     def delay(self) -> Tensor:
         """Return the delay."""

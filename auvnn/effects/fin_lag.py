@@ -34,7 +34,7 @@ class FinLag(FinEffect):
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
         """Return the time constant."""
-        return (Parameter("time_constant", "s", 0.0, 0.15, 0.0, 5.0),)
+        return (Parameter("time_constant", "s", 0.0, 0.15, 0.0, 5.0, timing=True),)
 
     def steer(self, state: Tensor, command: Tensor, step: Tensor) -> Response:
         """Return the lagged angles; at the null they are the commands themselves, exactly.

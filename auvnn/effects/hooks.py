@@ -21,6 +21,8 @@ class Parameter:
         probes: values at which to linearise instead, where the slope at the null says nothing.
         shape: whether it says how the effect acts and not how much (an onset, a frequency, a place): with all
             others at their nulls the effect vanishes whatever its value, so that nothing tells it there.
+        timing: whether it says how long after its sample a command acts, s. When within an interval a command was given
+            is not in a log: an interval's standard deviation is part of its standard error.
     """
 
     name: str
@@ -31,6 +33,7 @@ class Parameter:
     high: float
     probes: tuple[float, ...] = ()
     shape: bool = False
+    timing: bool = False
 
 
 @dataclass(frozen=True)

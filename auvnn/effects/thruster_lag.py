@@ -31,7 +31,7 @@ class ThrusterLag(Effect):
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
         """Return the time constant."""
-        return (Parameter("time_constant", "s", 0.0, 0.15, 0.0, 5.0),)
+        return (Parameter("time_constant", "s", 0.0, 0.15, 0.0, 5.0, timing=True),)
 
     def respond(self, state: Tensor, demand: Tensor, step: Tensor) -> Response:
         """Return the lagged thrust; at the null it is the demand itself, exactly."""

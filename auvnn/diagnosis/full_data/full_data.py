@@ -172,6 +172,7 @@ def refit(
         done = float(step @ known.square @ step) < ENOUGH
         theta, steps = theta + step, steps + 1
     std = _errors(passes, point, sums, priors, theta, list(layout.places(names).values()))
+    std = std if found.between is None else np.hypot(std, found.between)
     slow = slower_than_white(sums.channel, sums.count, sums.rough, sums.pairs, sums.windows, floor)
     return Refit(names, parameters_of(model, names), std, sums, steps, done or not len(theta), slow)
 

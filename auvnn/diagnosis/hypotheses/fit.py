@@ -26,6 +26,7 @@ from auvnn.estimation.prediction_error import Fitted
 from auvnn.estimation.priors import Priors
 from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.windows import Windows
+from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
 # Runs left out at a time where there are many, and stretches where there is one run only.
@@ -52,8 +53,8 @@ class FittedHypothesis:
         under_law: the fit with sums under the law of a stochastic force, in the sensors' white noise; standard errors
             follow from these. None without a force.
         around: trajectories (B, L, 13) about which its windows are linear under a law; None for free running.
-        between: (P,) how far explanations that the data prefer, and that are not named, would move its parameters; None
-            where there are none.
+        between: (P,) how far its parameters may be off for what no fit to this log tells: when within an interval a
+            command acts, and explanations that the data prefer and that are not named; None where that is nothing.
     """
 
     effects: tuple[str, ...]
@@ -185,7 +186,8 @@ def fit_hypothesis(
     judged = plausible(layout, names, effects, held, fitted.theta)
     cost = left_out(fitted.statistics, fitted.theta, judged, folds(windows.run))
     count = fitted.statistics.count[:, np.isfinite(fitted.sigma)].sum(1)
-    return FittedHypothesis(tuple(effects), fitted, names, 0.0, cost, count, judged=judged)
+    between = of_timing(fitted.model, names, windows)
+    return FittedHypothesis(tuple(effects), fitted, names, 0.0, cost, count, judged=judged, between=between)
 
 
 def log_evidence(layout: Layout, explanation: FittedHypothesis, factor: float) -> FittedHypothesis:
@@ -228,7 +230,8 @@ def determined(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> NDA
 def standard_errors(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> tuple[Array, float]:
     """Return standard errors of some parameters, and the inflation that went into them.
 
-    A parameter that is not `determined` has none: NaN. What lies between explanations is part of them.
+    A parameter that is not `determined` has none: NaN. What lies between explanations, and between samples, is part of
+    them.
 
     Args:
         explanation: a fit.
@@ -246,6 +249,24 @@ def standard_errors(explanation: FittedHypothesis, columns: NDArray[np.int64]) -
     if explanation.between is not None:
         variance = variance + explanation.between[columns] ** 2
     return np.where(determined(explanation, columns), np.sqrt(variance), np.nan), factor
+
+
+def of_timing(model: GreyBox, names: Sequence[str], windows: Windows) -> Array | None:
+    """Return how far delays may be off because a log does not tell when within an interval a command acts, (P,).
+
+    The standard deviation of a uniform distribution over an interval between samples; zero for all other parameters,
+    None where there is none of these.
+
+    Args:
+        model: with the effects.
+        names: of effects, in the order of the parameters.
+        windows: of the log.
+    """
+    delays = np.array([p.timing for name in names for p in model.effect(name).parameters_of], dtype=bool)
+    if not delays.any():
+        return None
+    interval = float(windows.times.diff(dim=-1).nanmedian())
+    return np.where(delays, interval / np.sqrt(12.0), 0.0)
 
 
 def is_possible(variance: Array, information: Array, value: Array) -> NDArray[np.bool_]:

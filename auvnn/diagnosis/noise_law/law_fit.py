@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out, plausible
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out, of_timing, plausible
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, priors
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.noise_law.likelihood.about_motion import linear_about_its_own
@@ -80,7 +80,10 @@ class LawFits:
         held = priors(layout, names, free=effects)
         begun = replace(current.explanation.fitted, names=names, priors=held, model=model)
         begun = replace(begun, theta=parameters_of(model, names))
-        explanation = FittedHypothesis(tuple(effects), begun, names, 0.0, np.zeros(0), np.zeros(0))
+        between = of_timing(model, names, self.windows)
+        explanation = FittedHypothesis(
+            tuple(effects), begun, names, 0.0, np.zeros(0), np.zeros(0), between=between
+        )
         judged = plausible(layout, names, effects, held, begun.theta)
         started = replace(explanation, judged=judged, around=current.explanation.around)
         return self.settled(self.judge(started, current.estimate.law, True), least=least)

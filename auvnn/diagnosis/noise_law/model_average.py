@@ -40,4 +40,5 @@ def averaged(layout: Layout, current: Hypothesis, rivals: Sequence[Hypothesis]) 
         for name, at in layout.places(names).items():
             apart[k, at] = rival.explanation.fitted.theta[theirs[name]] - theta[at]
     weight: Array = softmax([current.evidence, *(h.evidence for h in rivals)])
-    return replace(explanation, between=np.sqrt(weight @ apart**2))
+    known = 0.0 if explanation.between is None else explanation.between
+    return replace(explanation, between=np.hypot(known, np.sqrt(weight @ apart**2)))

@@ -18,6 +18,7 @@ from auvnn.diagnosis.hypotheses.fit import (
     is_possible,
     left_out,
     log_evidence,
+    of_timing,
     plausible,
     standard_errors,
 )
@@ -326,3 +327,21 @@ def test_a_fit_whose_slopes_explode_has_no_standard_errors(world):
     hessian[3, :, columns[0]] *= 1e15
     blown = replace(found, fitted=replace(found.fitted, statistics=replace(sums, hessian=hessian)))
     assert np.isnan(standard_errors(blown, columns)[0]).all()
+
+
+def test_delays_have_an_interval_in_their_standard_errors():
+    """Commands that act up to an interval later than logged, evenly: its standard deviation, at any rate of the log."""
+    model = GreyBox(small_vehicle())
+    random = np.random.default_rng(3)
+    for rate in (5.0, 20.0):
+        windows = cut_windows(make_log(model, duration=12.0, rate=rate), 2.0)
+        delayed = lay_out(model, ["net_buoyancy", "actuation_delay", "thruster_lag"])
+        told = of_timing(delayed.model, ["net_buoyancy", "actuation_delay", "thruster_lag"], windows)
+        drawn = random.uniform(0.0, 1.0 / rate, size=100000).std()
+        assert told is not None and told.tolist() == pytest.approx([0.0, drawn, drawn], rel=0.01)
+        assert of_timing(delayed.model, ["net_buoyancy"], windows) is None
+        found = fit_hypothesis(delayed, windows, list(delayed.nuisance), ["actuation_delay"], iterations=1)
+        at = delayed.places(found.names)["actuation_delay"]
+        plain = replace(found, between=None)
+        std = [standard_errors(e, at)[0][0] for e in (found, plain)]
+        assert std[0] == pytest.approx(np.hypot(std[1], drawn), rel=0.01)
