@@ -27,6 +27,7 @@ SAMPLES = {
     "rows-8.jsonl": 7,
     "rows-9.jsonl": 8,
     "rows-10.jsonl": 9,
+    "rows-11.jsonl": 10,
 }
 
 
