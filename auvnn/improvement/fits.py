@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from auvnn.diagnosis.cross_validation.fitters import fitter_for
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, determined
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.put_into_model import with_fitted_parameters
+from auvnn.diagnosis.hypotheses.standard_errors import determined
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, lay_out
 from auvnn.errors import InputError
 from auvnn.estimation.prediction_error import FitError

@@ -7,14 +7,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import torch
 
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, has_stated_uncertainty, lay_out, priors, scales
+from auvnn.estimation.prediction_error import Fitted
 from auvnn.estimation.priors import set_parameters
 from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.models import GreyBox
 from tests.small_logs import small_vehicle
 
 STATED = 0.15
+GROUPS = ["added_mass", "linear_damping", "quadratic_damping", "inertia"]
 CANDIDATES = ["ocean_current", "net_buoyancy", "thruster_lag", "added_mass", "cg_offset"]
 
 
@@ -117,3 +121,29 @@ class World:
         model = self._model
         set_parameters(model, names, theta)
         return replace(self.layout, model=model)
+
+
+def fitted(world, errors, effects):
+    """Return the explanation that a dense least-squares fit gives, and its columns in the world."""
+    names = [*GROUPS, *(e for e in effects if e not in GROUPS)]
+    columns = world.layout.of(names)
+    held = priors(world.layout, names, effects)
+    flat = world.jacobian.reshape(-1, world.jacobian.shape[-1])[:, columns]
+    theta = world.means[columns] + np.linalg.solve(
+        flat.T @ flat + np.diag(held.precision), flat.T @ errors.ravel()
+    )
+    everything = world.means.copy()
+    everything[columns] = theta
+    sums = world.statistics(errors, everything).columns(columns)
+    sigma = np.where(np.arange(18) == 6, 1.0, np.inf)
+    fit = Fitted(
+        world.layout.model, tuple(names), theta, torch.zeros(len(errors), 13), sigma, sums, held, 0.0, True, 1
+    )
+    return FittedHypothesis(
+        tuple(effects), fit, tuple(names), 0.0, np.zeros(len(errors)), np.full(len(errors), 20.0)
+    ), columns
+
+
+def drawn(world, seed, **changed):
+    random = np.random.default_rng(seed)
+    return world.errors(world.drawn(random, **changed), random)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from auvnn.answer_types import ByEffect, Candidate, Parameters, Similar
 from auvnn.diagnosis.answers.describe_parameters import describe_parameters
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, standard_errors
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.standard_errors import standard_errors
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.residuals.autocorrelation import excess_variance
 from auvnn.diagnosis.score_tests.score import Score

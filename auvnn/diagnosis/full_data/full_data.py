@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from auvnn.answer_types import ByEffect
 from auvnn.diagnosis.answers.describe_parameters import describe_parameters
 from auvnn.diagnosis.full_data.map_reduce import LinearisationPoint, MapReduce
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, is_possible
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.standard_errors import is_possible
 from auvnn.diagnosis.hypotheses.stated_priors import DETERMINED, Layout
 from auvnn.diagnosis.residuals.autocorrelation import slower_than_white
 from auvnn.diagnosis.score_tests.few_windows import are_few
@@ -172,7 +173,7 @@ def refit(
         done = float(step @ known.square @ step) < ENOUGH
         theta, steps = theta + step, steps + 1
     std = _errors(passes, point, sums, priors, theta, list(layout.places(names).values()))
-    std = std if found.between is None else np.hypot(std, found.between)
+    std = std if found.systematic is None else np.hypot(std, found.systematic)
     slow = slower_than_white(sums.channel, sums.count, sums.rough, sums.pairs, sums.windows, floor)
     return Refit(names, parameters_of(model, names), std, sums, steps, done or not len(theta), slow)
 
@@ -185,7 +186,7 @@ def _errors(
     theta: Array,
     blocks: Sequence[NDArray[np.int64]],
 ) -> Array:
-    """Return standard errors as `fit.standard_errors` does, for each effect's columns at a time."""
+    """Return standard errors as `standard_errors` does, for each effect's columns at a time."""
     size = len(sums.slope)
     whole = NormalEquations(sums.hessian + priors.square, sums.slope)
     covariance = whole.covariance()

@@ -12,29 +12,22 @@ from torch import Tensor
 from auvnn.diagnosis.hypotheses.measured_start import better_from_measured
 from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
 from auvnn.diagnosis.hypotheses.plausible_sizes import departure, sizes_of
+from auvnn.diagnosis.hypotheses.standard_errors import of_timing
 from auvnn.diagnosis.hypotheses.stated_priors import (
-    DETERMINED,
     Layout,
     correlation_root,
     priors,
     scales,
     shapes,
 )
-from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
-from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.prediction_error import Fitted
 from auvnn.estimation.priors import Priors
 from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.windows import Windows
-from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
 # Runs left out at a time where there are many, and stretches where there is one run only.
 FOLDS = 5
-# Share by which rounding may take a variance below what it must be, and the relative standard error below which no log
-# determines a value.
-ROUNDING, RESOLVED = 1e-3, 1e-9
-TINY = 1e-300
 
 
 @dataclass(frozen=True)
@@ -53,7 +46,7 @@ class FittedHypothesis:
         under_law: the fit with sums under the law of a stochastic force, in the sensors' white noise; standard errors
             follow from these. None without a force.
         around: trajectories (B, L, 13) about which its windows are linear under a law; None for free running.
-        between: (P,) how far its parameters may be off for what no fit to this log tells: when within an interval a
+        systematic: (P,) how far its parameters may be off for what no fit to this log tells: when within an interval a
             command acts, and explanations that the data prefer and that are not named; None where that is nothing.
     """
 
@@ -67,7 +60,7 @@ class FittedHypothesis:
     judged: Priors | None = None
     under_law: Fitted | None = None
     around: Tensor | None = None
-    between: Array | None = None
+    systematic: Array | None = None
 
     @property
     def cv(self) -> float:
@@ -186,8 +179,8 @@ def fit_hypothesis(
     judged = plausible(layout, names, effects, held, fitted.theta)
     cost = left_out(fitted.statistics, fitted.theta, judged, folds(windows.run))
     count = fitted.statistics.count[:, np.isfinite(fitted.sigma)].sum(1)
-    between = of_timing(fitted.model, names, windows)
-    return FittedHypothesis(tuple(effects), fitted, names, 0.0, cost, count, judged=judged, between=between)
+    timing = of_timing(fitted.model, names, windows)
+    return FittedHypothesis(tuple(effects), fitted, names, 0.0, cost, count, judged=judged, systematic=timing)
 
 
 def log_evidence(layout: Layout, explanation: FittedHypothesis, factor: float) -> FittedHypothesis:
@@ -211,75 +204,3 @@ def log_evidence(layout: Layout, explanation: FittedHypothesis, factor: float) -
     volume = np.linalg.slogdet(information + np.eye(len(size)))[1]
     misfit = data + departure(layout, names, effects, fitted.theta)
     return replace(explanation, evidence=-0.5 * (misfit + volume), misfit=misfit)
-
-
-def determined(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return whether the log says more of some parameters than their priors do, by sums that can be right.
-
-    Args:
-        explanation: a fit.
-        columns: positions within its own parameter vector.
-    """
-    fitted = explanation.under_law or explanation.fitted
-    variance = np.diag(fitted.covariance())[columns]
-    known = np.diag(fitted.statistics.total + fitted.priors.square)[columns]
-    told = variance * fitted.priors.precision[columns] < DETERMINED**2
-    return told & is_possible(variance, known, fitted.theta[columns])
-
-
-def standard_errors(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> tuple[Array, float]:
-    """Return standard errors of some parameters, and the inflation that went into them.
-
-    A parameter that is not `determined` has none: NaN. What lies between explanations, and between samples, is part of
-    them.
-
-    Args:
-        explanation: a fit.
-        columns: positions within its own parameter vector.
-    """
-    fitted = explanation.under_law or explanation.fitted
-    statistics = fitted.statistics
-    covariance = fitted.covariance()
-    others = np.setdiff1d(np.arange(len(fitted.theta)), columns)
-    whole = NormalEquations(statistics.total + fitted.priors.square, statistics.slope.sum(0))
-    left = whole.eliminate(columns, others, rcond=1e-12)
-    by_window = left.scores(statistics.slope[:, columns], statistics.slope[:, others])
-    factor = variance_inflation(by_window, left.equations.square, statistics.run)
-    variance = np.maximum(np.diag(covariance)[columns], 0.0) * factor
-    if explanation.between is not None:
-        variance = variance + explanation.between[columns] ** 2
-    return np.where(determined(explanation, columns), np.sqrt(variance), np.nan), factor
-
-
-def of_timing(model: GreyBox, names: Sequence[str], windows: Windows) -> Array | None:
-    """Return how far delays may be off because a log does not tell when within an interval a command acts, (P,).
-
-    The standard deviation of a uniform distribution over an interval between samples; zero for all other parameters,
-    None where there is none of these.
-
-    Args:
-        model: with the effects.
-        names: of effects, in the order of the parameters.
-        windows: of the log.
-    """
-    delays = np.array([p.timing for name in names for p in model.effect(name).parameters_of], dtype=bool)
-    if not delays.any():
-        return None
-    interval = float(windows.times.diff(dim=-1).nanmedian())
-    return np.where(delays, interval / np.sqrt(12.0), 0.0)
-
-
-def is_possible(variance: Array, information: Array, value: Array) -> NDArray[np.bool_]:
-    """Return whether variances can be those of estimates.
-
-    A variance is never less than the inverse of what is known with all other parameters given. Where sums are singular,
-    their generalised inverse is; and where a stiff model lets slopes grow from step to step, they say that a value is
-    known to the last digits.
-
-    Args:
-        variance: of the estimates, (p,).
-        information: on the diagonal of the normal equations, (p,).
-        value: of the estimates, (p,).
-    """
-    least = np.maximum((1.0 - ROUNDING) / np.maximum(information, TINY), (RESOLVED * value) ** 2)
-    return variance > least

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, standard_errors
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.standard_errors import standard_errors
 from auvnn.diagnosis.hypotheses.stated_priors import GROUPS, Layout
 from auvnn.effects import EFFECTS, Effect
 from auvnn.effects.hooks import Body

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.noise_law.commands.holding import Holding, cost_at_best, holding
+from auvnn.diagnosis.noise_law.commands.holding import HELD, Holding, cost_at_best, holding
 from auvnn.diagnosis.noise_law.commands.in_place_of_names import (
-    asked_without_timed,
     in_place_of_names,
+    replaced,
     replaces,
+    without,
     without_timed,
 )
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncertain_wrench
@@ -59,10 +60,11 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
     if not state.leaves_something:
         return _with_fewer_names(asked, state)
     least, held = _held(state)
-    untimed = without_timed(asked, state, least)
+    untimed, gone = without_timed(asked, state, least), dict[str, str]()
     law = None if untimed is None else replaces(untimed, least, held, state.windows)
     if untimed is not None and law is not None:
-        asked, least, held = asked_without_timed(asked, untimed, least), untimed, law
+        gone = replaced(untimed, least)
+        asked, least, held = without(asked, gone), untimed, law
     windows = held.applied(state.windows)
     try:
         uncertain = uncertain_wrench(least, state.windows, held)
@@ -78,6 +80,7 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         why += [] if colour.noise is None else ["the sensors' noise is not white"]
         asked.say(f"{' and '.join(why)}: searching again")
         state = search(asked, colour.applied(windows))
+        state = state.but(failed={**state.failed, **gone})
     wrench = uncertain.to_dict()
     told: dict[str, Any] = {
         "commands": {**held.to_dict(), **({"uncertain": wrench} if wrench else {})},
@@ -111,11 +114,16 @@ def _with_fewer_names(asked: Setting, state: State) -> tuple[State, dict[str, An
     if found is None:
         return state, {}, []
     fewer, law = found
+    gone = replaced(fewer, state.current)
     asked.say(f"commands change between samples ({law.name}): searching again")
-    again = search(asked_without_timed(asked, fewer, state.current), law.applied(state.windows))
+    try:
+        again = search(without(asked, gone), law.applied(state.windows))
+    except UNSOLVED:
+        # The first answer stands: it did not need what could not be solved here.
+        return state, {}, []
     if again.leaves_something or len(again.chosen) >= len(state.chosen):
         return state, {}, []
-    return again, {"commands": law.to_dict()}, []
+    return again.but(failed={**again.failed, **gone}), {"commands": law.to_dict()}, []
 
 
 def _held(state: State) -> tuple[FittedHypothesis, Holding]:
@@ -127,7 +135,7 @@ def _held(state: State) -> tuple[FittedHypothesis, Holding]:
     """
     sigma = state.first.fitted.sigma
     known = [state.first, *state.tried, state.refuted or state.current]
-    least, held = state.first, Holding("held", 0.0, 0.0, 0.0)
+    least, held = state.first, HELD
     for end in sorted(known, key=lambda e: e.squared_error(sigma)):
         with suppress(np.linalg.LinAlgError):
             least, held = end, holding(end, state.windows)

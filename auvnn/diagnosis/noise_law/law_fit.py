@@ -19,7 +19,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out, of_timing, plausible
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out, plausible
+from auvnn.diagnosis.hypotheses.standard_errors import of_timing
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, priors
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.noise_law.likelihood.about_motion import linear_about_its_own
@@ -80,9 +81,9 @@ class LawFits:
         held = priors(layout, names, free=effects)
         begun = replace(current.explanation.fitted, names=names, priors=held, model=model)
         begun = replace(begun, theta=parameters_of(model, names))
-        between = of_timing(model, names, self.windows)
+        timing = of_timing(model, names, self.windows)
         explanation = FittedHypothesis(
-            tuple(effects), begun, names, 0.0, np.zeros(0), np.zeros(0), between=between
+            tuple(effects), begun, names, 0.0, np.zeros(0), np.zeros(0), systematic=timing
         )
         judged = plausible(layout, names, effects, held, begun.theta)
         started = replace(explanation, judged=judged, around=current.explanation.around)

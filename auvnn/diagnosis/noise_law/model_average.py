@@ -40,5 +40,5 @@ def averaged(layout: Layout, current: Hypothesis, rivals: Sequence[Hypothesis]) 
         for name, at in layout.places(names).items():
             apart[k, at] = rival.explanation.fitted.theta[theirs[name]] - theta[at]
     weight: Array = softmax([current.evidence, *(h.evidence for h in rivals)])
-    known = 0.0 if explanation.between is None else explanation.between
-    return replace(explanation, between=np.hypot(known, np.sqrt(weight @ apart**2)))
+    known = 0.0 if explanation.systematic is None else explanation.systematic
+    return replace(explanation, systematic=np.hypot(known, np.sqrt(weight @ apart**2)))

@@ -18,7 +18,7 @@ from auvnn.diagnosis.full_data import large_logs as many
 from auvnn.diagnosis.full_data.full_data import score_tests
 from auvnn.diagnosis.full_data.large_logs import diagnose_files
 from auvnn.diagnosis.full_data.map_reduce import LinearisationPoint, MapReduce, PartTask, sums_of
-from auvnn.diagnosis.hypotheses.fit import standard_errors
+from auvnn.diagnosis.hypotheses.standard_errors import standard_errors
 from auvnn.diagnosis.score_tests import few_windows
 from auvnn.diagnosis.score_tests.probes import probed
 from auvnn.diagnosis.score_tests.score import score

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, standard_errors
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
+from auvnn.diagnosis.hypotheses.standard_errors import standard_errors
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.model_average import averaged
 from auvnn.models import GreyBox
@@ -47,10 +48,10 @@ def test_what_lies_between_is_the_spread_of_draws_about_what_is_answered(world):
     weight = np.exp([10.0, 11.0, 9.0])
     random = np.random.default_rng(1)
     draws = random.choice(values, size=200000, p=weight / weight.sum())
-    assert told.between is not None and told.between.shape == named.fitted.theta.shape
-    assert told.between[at[0]] == pytest.approx(np.sqrt(np.mean((draws - values[0]) ** 2)), rel=0.02)
+    assert told.systematic is not None and told.systematic.shape == named.fitted.theta.shape
+    assert told.systematic[at[0]] == pytest.approx(np.sqrt(np.mean((draws - values[0]) ** 2)), rel=0.02)
     before, after = (standard_errors(e, at)[0] for e in (named, told))
-    assert after[0] == pytest.approx(np.hypot(before[0], told.between[at[0]]))
+    assert after[0] == pytest.approx(np.hypot(before[0], told.systematic[at[0]]))
 
 
 def test_what_the_data_refute_and_nothing_else_changes_nothing(world):

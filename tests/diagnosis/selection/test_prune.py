@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.diagnosis.hypotheses.fit import fit_hypothesis, standard_errors
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
+from auvnn.diagnosis.hypotheses.standard_errors import standard_errors
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.selection import prune
 from auvnn.estimation.prediction_error import FitError

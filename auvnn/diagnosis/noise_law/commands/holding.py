@@ -73,6 +73,9 @@ class Holding:
         return {**told, "samples": self.samples} if self.samples else told
 
 
+HELD = Holding("held", 0.0, 0.0, 0.0)
+
+
 def between(windows: Windows, share: float, *, smooth: bool = False, samples: int = 0) -> Windows:
     """Return windows whose commands and fins have the means that they take between samples.
 
@@ -132,10 +135,9 @@ def holding(first: FittedHypothesis, windows: Windows) -> Holding:
     Raises:
         numpy.linalg.LinAlgError: free running with the fit grows without bound.
     """
-    held = Holding("held", 0.0, 0.0, 0.0)
     # An acceleration is measured at an instant: the mean over an interval says nothing of it.
     if windows.nu_dot is not None:
-        return held
+        return HELD
     sums = first.fitted.statistics
     factor = variance_inflation(sums.slope, sums.total, sums.run)
     plain = cost_at_best(first, windows) / factor
@@ -155,7 +157,7 @@ def holding(first: FittedHypothesis, windows: Windows) -> Holding:
         if 0.5 * gain <= found.odds + PLAINER:
             break
         found = Holding("averaged", LINEAR, 0.5 * gain, gain, samples)
-    return found if found.odds > ODDS else held
+    return found if found.odds > ODDS else HELD
 
 
 def _vertex(name: str, costs: tuple[float, float, float], plain: float) -> Holding | None:

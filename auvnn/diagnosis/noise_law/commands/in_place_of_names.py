@@ -10,17 +10,16 @@ Reference: Akaike (1974), IEEE Transactions on Automatic Control 19(6), for what
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import replace
 
-import numpy as np
-
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.noise_law.commands.holding import Holding, cost_at_best, holding
+from auvnn.diagnosis.noise_law.commands.holding import HELD, Holding, cost_at_best, holding
+from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.effects import effect_class
-from auvnn.estimation.prediction_error import FitError
 from auvnn.metrics.windows import Windows
 
 # What a further parameter costs, in units of the squared error.
@@ -29,7 +28,7 @@ PARAMETER = 2.0
 REST = 0.05
 # Hooks of effects that change when a command acts, or how much of it.
 OF_COMMANDS = {"command", "delay", "respond", "steer"}
-HELD = Holding("held", 0.0, 0.0, 0.0)
+REPLACED = "another law of the commands between samples does what it did"
 
 
 def in_place_of_names(asked: Setting, state: State) -> tuple[FittedHypothesis, Holding] | None:
@@ -53,15 +52,18 @@ def in_place_of_names(asked: Setting, state: State) -> tuple[FittedHypothesis, H
     return None
 
 
-def asked_without_timed(asked: Setting, before: FittedHypothesis, end: FittedHypothesis) -> Setting:
-    """Return what is asked without those names that change when a command acts and that a law has replaced.
+def replaced(before: FittedHypothesis, end: FittedHypothesis) -> dict[str, str]:
+    """Return the names that change when a command acts and that a law has replaced, and why they are not asked for.
 
     Args:
-        asked: what was asked.
         before: the explanation that is left.
         end: the explanation with these names.
     """
-    gone = {*timed(end)} - {*before.effects}
+    return {n: REPLACED for n in timed(end) if n not in before.effects}
+
+
+def without(asked: Setting, gone: Collection[str]) -> Setting:
+    """Return what is asked without some effects."""
     return replace(asked, usable=tuple(n for n in asked.usable if n not in gone))
 
 
@@ -85,7 +87,7 @@ def without_timed(asked: Setting, state: State, end: FittedHypothesis) -> Fitted
     for known in (state.first, *state.path, *state.tried):
         if {*known.effects} == left:
             return known
-    with suppress(FitError):
+    with suppress(*UNSOLVED):
         return asked.chooser(state.windows).without(end, asked.base, gone)
     return None
 
@@ -107,7 +109,7 @@ def replaces(
     sums = end.fitted.statistics
     factor = variance_inflation(sums.slope, sums.total, sums.run)
     sigma = end.fitted.sigma
-    with suppress(np.linalg.LinAlgError):
+    with suppress(*UNSOLVED):
         law = holding(before, windows)
         if law.odds <= 0.0:
             return None

@@ -12,9 +12,15 @@ from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law import answer
-from auvnn.diagnosis.noise_law.commands.in_place_of_names import in_place_of_names
+from auvnn.diagnosis.noise_law.commands import in_place_of_names as in_place_of_names_module
+from auvnn.diagnosis.noise_law.commands.in_place_of_names import (
+    in_place_of_names,
+    replaced,
+    without_timed,
+)
 from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.diagnosis.stages.state import State
+from auvnn.estimation.prediction_error import FitError
 from auvnn.logs import Log
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle, thinned
@@ -74,15 +80,45 @@ def test_where_names_leave_nothing_a_law_that_spares_some_of_them_takes_their_pl
     state: Any = SimpleNamespace(
         leaves_something=False, chosen=("net_buoyancy", "thrust_overshoot"), windows="held", current=None
     )
-    again = SimpleNamespace(leaves_something=leaves, chosen=tuple(NAMES[:names]))
+    again = State("law", None, None, chosen=tuple(NAMES[:names]), failed={"waves": "no"})  # type: ignore[arg-type]
+    again = again.step("unknown" if leaves else "adequate", [], 0.0)
     law = SimpleNamespace(name="smooth", applied=lambda w: f"{w}, smooth", to_dict=lambda: {"a": 1})
     monkeypatch.setattr(answer, "in_place_of_names", lambda *_: ("fewer", law))
-    monkeypatch.setattr(answer, "asked_without_timed", lambda asked, fewer, end: (fewer, end))
+    monkeypatch.setattr(answer, "replaced", lambda fewer, end: {"thrust_overshoot": "why"})
+    monkeypatch.setattr(answer, "without", lambda asked, gone: [*gone])
     monkeypatch.setattr(answer, "search", lambda asked, windows: searched.append((asked, windows)) or again)
     asked: Any = SimpleNamespace(say=lambda _: None)
     found = answer.answer_with_force(asked, state)
-    assert found == ((again, {"commands": {"a": 1}}, []) if given else (state, {}, []))
-    assert searched == [(("fewer", None), "held, smooth")]
+    assert searched == [(["thrust_overshoot"], "held, smooth")]
+    if given:
+        assert found[1:] == ({"commands": {"a": 1}}, []) and found[0].chosen == again.chosen
+        assert found[0].failed == {"waves": "no", "thrust_overshoot": "why"}
+    else:
+        assert found == (state, {}, [])
+    # A search that cannot be solved costs no answer.
+    monkeypatch.setattr(answer, "search", diverging)
+    assert answer.answer_with_force(asked, state) == (state, {}, [])
+
+
+def diverging(*_: Any) -> Any:
+    raise FitError("free running grows without bound")
+
+
+def test_a_look_that_cannot_be_solved_replaces_nothing(monkeypatch):
+    asked, state = ended(*of({"net_buoyancy": {"force": 6.0}}, held=False), NAMES)
+    for name in ("holding", "cost_at_best"):
+        with monkeypatch.context() as there:
+            there.setattr(in_place_of_names_module, name, diverging)
+            assert in_place_of_names(asked, state) is None
+    asked.chooser = lambda _: SimpleNamespace(without=diverging)
+    assert without_timed(asked, state.but(path=(), tried=()), state.current) is None
+
+
+def test_names_that_a_law_replaces_are_not_asked_for_again_and_it_is_said_why():
+    end, before = (SimpleNamespace(effects=e) for e in (("waves", *NAMES), ("waves", "net_buoyancy")))
+    gone = replaced(before, end)  # type: ignore[arg-type]
+    assert [*gone] == ["thrust_overshoot"] and "law of the commands" in gone["thrust_overshoot"]
+    assert replaced(end, end) == {}  # type: ignore[arg-type]
 
 
 @pytest.mark.long
@@ -91,3 +127,5 @@ def test_the_answer_has_the_name_of_what_is_there_alone():
     found = diagnose(model, log, NAMES, advice=False, whiteness=False)
     assert found.verdict == "named" and found.missing == ["net_buoyancy"]
     assert found.stochastic["commands"]["between_samples"] != "held"
+    row = next(c for c in found.candidates if c["effect"] == "thrust_overshoot")
+    assert "law of the commands" in row["reason"]
