@@ -10,6 +10,7 @@ import pytest
 from auvnn.studies.benchmark.case import Case
 from auvnn.studies.benchmark.cases import cases
 from auvnn.studies.benchmark.counts import worlds
+from auvnn.studies.benchmark.counts.rates import Z95, z_of
 from tests.studies.benchmark.plans import of_plan
 
 HERE = Path(__file__).resolve().parents[2] / "experiments" / "worlds"
@@ -60,6 +61,8 @@ def test_the_rows_give_what_is_told(name):
         "nothing_without_a_name": sum(map(worlds.silent, nothing)),
         "nothing_adequate": sum(map(worlds.adequate, nothing)),
         "faults": sum(r["verdict"] == "fault" or bool(r["fault"]) for r in rows),
+        "intervals": sum(len(z_of(r)) for r in rows),
+        "intervals_right": sum(abs(z) < Z95 for r in rows for z in z_of(r)),
     }
     assert found == expected
     text = (HERE / "README.md").read_text()
