@@ -10,8 +10,10 @@ import pytest
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.standard_errors import determined, is_possible, of_timing, standard_errors
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.effects import effect_class
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
+from auvnn.vehicle import load_vehicle
 from tests.diagnosis.linear_world import World, drawn, fitted, layout
 from tests.small_logs import make_log, small_vehicle
 
@@ -91,3 +93,12 @@ def test_delays_have_an_interval_in_their_standard_errors():
         plain = replace(found, systematic=None)
         std = [standard_errors(e, at)[0][0] for e in (found, plain)]
         assert std[0] == pytest.approx(np.hypot(std[1], drawn), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameter"),
+    [("actuation_delay", "delay"), ("thruster_lag", "time_constant"), ("fin_lag", "time_constant")],
+)
+def test_all_effects_that_act_late_say_so(effect, parameter):
+    described = {p.name: p for p in effect_class(effect).describe(load_vehicle("remus100"), "thrusters")}
+    assert described[parameter].timing and described[parameter].unit == "s"

@@ -22,7 +22,7 @@ from auvnn.diagnosis.noise_law.split_windows import split
 from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.models import GreyBox
 from tests.diagnosis.noise_law.wandering import wandering_log
-from tests.small_logs import small_vehicle
+from tests.small_logs import make_log, small_vehicle
 
 NAME = "net_buoyancy"
 
@@ -151,3 +151,16 @@ def test_a_fit_from_the_null_finds_the_value_and_is_at_least_as_likely_as_one_of
     plain = fit_hypothesis(layout, windows, base, [NAME], start=first.fitted, sigma=first.fitted.sigma)
     there = judge(replace(plain, around=found.explanation.around), law)
     assert found.evidence > there.here.evidence - 1.0
+
+
+def test_a_fit_from_the_null_knows_what_no_fit_tells_of_a_delay(monkeypatch):
+    model = GreyBox(small_vehicle())
+    windows, layout = windows_for(model, make_log(model, duration=12.0)), lay_out(model, ["actuation_delay"])
+    base = list(layout.nuisance)
+    first, begun = fit_hypothesis(layout, windows, base, (), iterations=1), []
+    current: Any = SimpleNamespace(estimate=SimpleNamespace(law=object()), explanation=first)
+    fits = LawFits(windows, first.fitted.sigma, lambda explanation, law, held: begun.append(explanation))  # type: ignore[arg-type]
+    monkeypatch.setattr(fits, "settled", lambda found, least: found)
+    fits.from_null(layout, first.fitted.model, current, base, ["actuation_delay"])
+    plain = fit_hypothesis(layout, windows, base, ["actuation_delay"], iterations=1)
+    assert begun[0].systematic is not None and begun[0].systematic.tolist() == plain.systematic.tolist()

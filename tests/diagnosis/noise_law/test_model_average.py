@@ -62,3 +62,12 @@ def test_what_the_data_refute_and_nothing_else_changes_nothing(world):
     for rivals in ([], [as_hypothesis(moved(both, 5.0), -60.0)]):
         told = averaged(world.layout, current, rivals)
         np.testing.assert_allclose(standard_errors(told, at)[0], plain, rtol=1e-6)
+
+
+def test_what_no_fit_tells_of_a_delay_stays_part_of_it(world):
+    named, both = world.of(["net_buoyancy"]), world.of(["net_buoyancy", "ocean_current"])
+    own = np.full(len(named.fitted.theta), 0.3)
+    current, rivals = as_hypothesis(named, 0.0), [as_hypothesis(moved(both, 0.4), 0.0)]
+    plain = averaged(world.layout, current, rivals).systematic
+    told = averaged(world.layout, as_hypothesis(replace(named, systematic=own), 0.0), rivals).systematic
+    np.testing.assert_allclose(told, np.hypot(plain, own))
