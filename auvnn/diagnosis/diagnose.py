@@ -118,7 +118,7 @@ def beside_a_force(asked: Setting, state: State) -> tuple[State, dict[str, Any],
         state: where the search for names alone has ended, or was ended because a force stays.
     """
     found = answer_with_force(asked, state)
-    if not state.interrupted or "force" in found[1]:
+    if not found[0].interrupted or "force" in found[1]:
         return found
     # What stays is no stochastic force: names alone have to do.
     return answer_with_force(asked, search(asked, state.windows))

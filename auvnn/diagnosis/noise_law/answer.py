@@ -23,27 +23,24 @@ from auvnn.diagnosis.noise_law.commands.in_place_of_names import (
     without_timed,
 )
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncertain_wrench
-from auvnn.diagnosis.noise_law.hypothesis import WithForce, shares_left
+from auvnn.diagnosis.noise_law.hypothesis import WithForce
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
-from auvnn.diagnosis.noise_law.left_force import exceeds_actuators, leaves_force, negligible
+from auvnn.diagnosis.noise_law.left_force import leaves_force, negligible
 from auvnn.diagnosis.noise_law.noise_colour import Colour, noise_colour
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.rounds.leaders import fitted_alone
 from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.diagnosis.noise_law.split_windows import fitted_over_parts
 from auvnn.diagnosis.noise_law.standing_names import beside_names, stand
+from auvnn.diagnosis.noise_law.withheld import goes_further, share_left, withheld
 from auvnn.diagnosis.noise_law.words import left
 from auvnn.diagnosis.residuals.variance_component_test import white
-from auvnn.diagnosis.search import search
+from auvnn.diagnosis.search import a_force_stays, search
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.diagnosis.stages.what_is_left import settled
 from auvnn.metrics.force_law import ForceLaw
 
 Array = NDArray[np.float64]
-# Share of the force beyond which a name has left most of it.
-MOST = 0.5
-# A name that leaves less than this share of what there was has explained a force that is too large for a disturbance.
-EXPLAINED = 0.25
 UNDECIDED = (
     "names were not compared together with a stochastic force: with one, free running grows without bound; "
     "choose shorter windows with window="
@@ -75,11 +72,12 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         colour = noise_colour(least, windows, asked.floor)
     except UNSOLVED:
         colour = Colour(None, 0.0)
+    again = False
     if held.odds > 0.0 or colour.noise is not None:
         why = [f"commands change between samples ({held.name})"] if held.odds > 0.0 else []
         why += [] if colour.noise is None else ["the sensors' noise is not white"]
         asked.say(f"{' and '.join(why)}: searching again")
-        state = search(asked, colour.applied(windows))
+        again, state = True, search(asked, colour.applied(windows), until=a_force_stays)
         state = state.but(failed={**state.failed, **gone})
     wrench = uncertain.to_dict()
     told: dict[str, Any] = {
@@ -96,11 +94,19 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         beside = ask(asked, state, uncertain)
     except UNSOLVED:
         # The first answer stands: it did not need what could not be solved here.
-        return state, told, [UNDECIDED]
+        return (_to_the_end(asked, state) if again else state), told, [UNDECIDED]
     if beside is None:
-        return state, told, []
+        return (_to_the_end(asked, state) if again else state), told, []
     state, law, predicted = beside
     return state, {**told, "force": left(law)}, [] if predicted is None else [_words(predicted)]
+
+
+def _to_the_end(asked: Setting, state: State) -> State:
+    """Return where a search ends that was interrupted because a force stays, where there is none that could be told."""
+    if not state.interrupted:
+        return state
+    whole = search(asked, state.windows)
+    return whole.but(failed={**whole.failed, **state.failed})
 
 
 def _with_fewer_names(asked: Setting, state: State) -> tuple[State, dict[str, Any], list[str]]:
@@ -163,7 +169,7 @@ def _with_force(
         return None
     alone = fitted_alone(asked, state)
     first, windows = fitted_over_parts(asked, first, windows)
-    beside = ForceSearch(asked, windows)
+    beside = ForceSearch(asked, windows, closed_loop=uncertain.closed_loop)
     null = beside.begin(first, white(first, floor))
     if null is None:
         return None
@@ -178,20 +184,6 @@ def _with_force(
     over_parts = state.but(first=first, windows=windows)
     ended = _state(asked, state, over_parts, result, uncertain, chance=predicted is None)
     return ended, result.estimate.law, predicted
-
-
-def goes_further(again: WithForce, before: WithForce) -> bool:
-    """Whether further names after the same ones leave less than half of a force of which those leave more.
-
-    Names that leave most of a force that measured inputs predict are withheld: with several causes at once the first of
-    them leaves most, however right it is.
-
-    Args:
-        again: the search that also looks at names that cost little or bring little.
-        before: the search that does not.
-    """
-    same = [s["effects"] for s in again.steps[: len(before.steps)]] == [s["effects"] for s in before.steps]
-    return bool(before.steps) and same and _share_left(before) > MOST >= _share_left(again)
 
 
 def _state(
@@ -212,8 +204,8 @@ def _state(
     table = state.table
     for explanation in result.tried:
         table = fill_candidate(asked.layout, table, explanation, over.first)
-    share = _share_left(result)
-    named = [] if refuted(asked, state, law, share, chance=chance) else list(result.steps)
+    share = share_left(result)
+    named = [] if withheld(asked, state, result, chance=chance) else list(result.steps)
     tried = [e for s in result.steps for e in s["effects"]]
     end: SearchStep = {
         "verdict": "adequate" if small else "unknown",
@@ -241,34 +233,8 @@ def _state(
     )
 
 
-def refuted(asked: Setting, state: State, law: ForceLaw | None, share: float, *, chance: bool) -> bool:
-    """Whether what is left says that names are not the cause.
-
-    A force that follows from what is measured is no noise: names beside which most of it stays are not its cause. Nor
-    are names beside which a force stays that is too large for a disturbance, unless they have explained most of it.
-
-    Args:
-        asked: layout.
-        state: windows over which the force was sought.
-        law: of the stochastic force that is left; None where none was found.
-        share: of the force, before any name, that is left.
-        chance: whether nothing that is measured predicts it.
-    """
-    if not chance and share > MOST:
-        return True
-    return share > EXPLAINED and exceeds_actuators(asked, state, law)
-
-
 def _words(predicted: InputPrediction) -> str:
     return (
         f"{predicted.input} predicts {predicted.share:.0%} of the force in {predicted.axis} that is left "
         f"(at least {predicted.least:.0%}): it is not stochastic, and has no name"
     )
-
-
-def _share_left(result: WithForce) -> float:
-    """Return the stochastic force's share of what was above noise before any name."""
-    if result.estimate.law is None or result.first_law is None:
-        return 0.0
-    left = shares_left(result.estimate.law, result.first_law)
-    return float(np.clip(left.mean(), 0.0, 1.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +33,8 @@ SECOND = 1.0
 # Share of the force of a degree of freedom of which a further name must leave less, where it does not bring much of the
 # gain of all names: after a large effect every other one brings little of it.
 LEAVES = 0.1
+# A name stands out that gains so much in evidence, and so many times what every effect does that is not confused with it.
+AHEAD, TIMES = 100.0, 4.0
 # Share of the gain by which an effect that is known to be confused with the best may fall short of it.
 CLOSE = 0.1
 
@@ -85,6 +88,7 @@ class WithForce:
         p_value: of there being nothing with a name.
         first_law: the law without any name.
         predicted: what measured inputs predict of the force that is left; None where that is little.
+        stands_out: whether the first name explains far more than everything that is not confused with it.
     """
 
     steps: list[SearchStep]
@@ -96,6 +100,7 @@ class WithForce:
     p_value: float
     first_law: ForceLaw | None
     predicted: InputPrediction | None = None
+    stands_out: bool = False
 
 
 def under_its_law(explanation: FittedHypothesis) -> FittedHypothesis:
@@ -179,7 +184,34 @@ def explains_an_axis(after: Hypothesis, before: Hypothesis) -> bool:
         before: hypothesis without it.
     """
     law = before.estimate.law
-    return law is not None and bool((shares_left(after.estimate.law, law) < LEAVES).any())
+    return law is not None and leaves_little(after.estimate.law, law)
+
+
+def leaves_little(after: ForceLaw | None, before: ForceLaw) -> bool:
+    """Whether next to nothing is left of a force in a degree of freedom.
+
+    Args:
+        after: the law that is left; None where none is.
+        before: the law before.
+    """
+    return bool((shares_left(after, before) < LEAVES).any())
+
+
+def stands_out(first: Hypothesis, found: Sequence[Hypothesis], before: Hypothesis) -> bool:
+    """Whether a name gains far more than every other that the catalogue does not know to be confused with it.
+
+    Args:
+        first: the hypothesis with the name.
+        found: all that were fitted in its round.
+        before: the hypothesis without it.
+    """
+    gain = first.evidence - before.evidence
+    others = [
+        h.evidence - before.evidence
+        for h in found
+        if h.name != first.name and not confused(h.name, first.name) and not confused(first.name, h.name)
+    ]
+    return gain > AHEAD and gain > TIMES * max(others, default=0.0)
 
 
 def p_value_of(layout: Layout, after: Hypothesis, before: Hypothesis) -> float:

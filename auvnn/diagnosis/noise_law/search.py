@@ -28,6 +28,7 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     WithForce,
     in_newtons,
     judged,
+    stands_out,
     tied,
 )
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
@@ -39,7 +40,7 @@ from auvnn.diagnosis.noise_law.model_average import averaged
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction, predicted_by_inputs
 from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round, RoundResult
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import Branch, decided, shared, worth_following
-from auvnn.diagnosis.noise_law.rounds.names_given import ALPHA_NAME, NamesGiven
+from auvnn.diagnosis.noise_law.rounds.names_given import ALPHA_NAME, FIRST_COST, NamesGiven
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
@@ -63,14 +64,16 @@ class ForceSearch:
     Args:
         asked: what is asked.
         windows: of the log, without a law.
+        closed_loop: whether commands are known to answer the motion; else it is asked of the fit without any name.
     """
 
-    def __init__(self, asked: Setting, windows: Windows) -> None:
+    def __init__(self, asked: Setting, windows: Windows, *, closed_loop: bool = False) -> None:
         """Begin without a law."""
         self.layout, self.windows = asked.layout, windows
         self.usable, self.base, self.say = list(asked.usable), list(asked.base), asked.say
         self.names = NamesGiven(asked.layout, asked.log, scale_of(asked.log), asked.tolerance)
         self.names.white_noise = windows.noise is None
+        self.names.in_closed_loop = closed_loop
         self.sigma = self.weights = np.full(18, np.inf)
         self.cell = CELL
         self.response: Array | None = None
@@ -117,7 +120,9 @@ class ForceSearch:
         # All names are compared with it: it must not gain by steps that names take first.
         null = self._fits().settled(self.judged(first, found.law), steps)
         with suppress(*UNSOLVED):
-            self.names.in_closed_loop = in_closed_loop(null.explanation, self.windows)
+            self.names.in_closed_loop = self.names.in_closed_loop or in_closed_loop(
+                null.explanation, self.windows
+            )
         return null
 
     def _about(self, explanation: FittedHypothesis, law: ForceLaw | None = None) -> Windows:
@@ -155,7 +160,7 @@ class ForceSearch:
         steps: list[SearchStep] = []
         groups: list[list[FittedHypothesis]] = []
         tried: list[Hypothesis] = []
-        whole, rivals = 1.0, list[Hypothesis]()
+        whole, rivals, ahead = 1.0, list[Hypothesis](), False
         while len(chosen) < most:
             grouped = [e.effects[-1] for g in groups for e in g]
             result = self._round(null, current, chosen, grouped, fitted)
@@ -178,6 +183,9 @@ class ForceSearch:
             names = [h.name for h in group]
             verdict = "ambiguous" if len(group) > 1 else "named"
             steps.append({"verdict": verdict, "effects": names, "p_value": result.sure[group[0].name]})
+            if not chosen:
+                pays = self.names.paying([group[0]], null, FIRST_COST)
+                ahead = bool(pays) and stands_out(group[0], result.found, null)
             current = self._settled(group[0])
             if len(group) > 1:
                 groups.append([current.explanation, *(h.explanation for h in group[1:])])
@@ -196,6 +204,7 @@ class ForceSearch:
             whole,
             in_newtons(null.estimate.law, null.explanation),
             self.predicted(current),
+            ahead,
         )
 
     def _round(

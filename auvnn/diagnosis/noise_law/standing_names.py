@@ -51,7 +51,7 @@ def beside_names(
     if not leaves_force(asked, state, state.current):
         return None
     end, windows = fitted_over_parts(asked, state.current, state.windows)
-    beside = ForceSearch(asked, windows)
+    beside = ForceSearch(asked, windows, closed_loop=uncertain.closed_loop)
     found = beside.begin(end, white(end, asked.floor), 0)
     if found is None:
         return None

@@ -10,9 +10,9 @@ import pytest
 
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.diagnosis.noise_law.answer import goes_further, refuted
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench
 from auvnn.diagnosis.noise_law.left_force import exceeds_actuators, negligible
+from auvnn.diagnosis.noise_law.withheld import goes_further, refuted
 from auvnn.diagnosis.residuals.forces import actuators_of
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.models import GreyBox

@@ -220,7 +220,10 @@ def scripted(
         {},
     )
     asked.names = SimpleNamespace(
-        good=print, sure=lambda *_: 1e-9, likely=lambda at, among, given, odds: given
+        good=print,
+        sure=lambda *_: 1e-9,
+        likely=lambda at, among, given, odds: given,
+        paying=lambda likely, *_: likely,
     )
     asked._leaders = SimpleNamespace(fitted=fitted, take=lambda *_: None)
     asked._tested = lambda *_: SimpleNamespace(p_value=0.0)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
 from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
@@ -31,6 +32,8 @@ NEIGHBOURS = 1.5
 # Share of that difference which must answer the sensors' noise, and its lag-one correlation below which it is white: of
 # white noise that is -2/3, of single steps -1/2, and more of what is smooth.
 ANSWERS, WHITE = 0.05, -0.52
+# Share of what is fast in a command that is enough where its step answers too; levels at which chance is rejected.
+CLOSED, ALPHA_FAST, ALPHA_STEP = 0.01, 1e-3, 0.05
 
 
 @dataclass(frozen=True)
@@ -41,11 +44,13 @@ class UncertainWrench:
         smooth: (6,) rms of what changes as the commands do.
         white: (6,) rms of what is independent from interval to interval.
         step: length of an interval, s.
+        closed_loop: whether commands, as they were read, answer the sensors' noise.
     """
 
     smooth: Array
     white: Array
     step: float
+    closed_loop: bool = False
 
     def over(self, time: Array) -> Array:
         """Return the rms of a force with given correlation times, (6,) s, that has the same power at low frequencies.
@@ -83,7 +88,7 @@ def uncertain_wrench(end: FittedHypothesis, windows: Windows, held: Holding) -> 
         white = np.maximum(white, law_differences(model, windows, held))
     elif held.odds > 0.0:
         smooth = law_differences(model, windows, held)
-    return UncertainWrench(smooth, white, step)
+    return UncertainWrench(smooth, white, step, in_closed_loop(end, windows))
 
 
 def law_differences(model: GreyBox, windows: Windows, held: Holding) -> Array:
@@ -161,6 +166,10 @@ def noise_answered(end: FittedHypothesis, windows: Windows) -> Array:
 def in_closed_loop(end: FittedHypothesis, windows: Windows) -> bool:
     """Whether commands or fin angles answer the sensors' noise at their own sample, as only a controller's do.
 
+    What is fast in the errors predicts a part of what is fast in a command. A small part counts too where errors predict
+    the command's step from the sample before as well: where most errors are the model's own, and where fins follow
+    slowly, the part is small. Where a velocity is held, the bends of a smooth command are predicted in open loop, too.
+
     Args:
         end: the explanation whose errors stand for the noise.
         windows: those it was fitted to.
@@ -175,12 +184,28 @@ def in_closed_loop(end: FittedHypothesis, windows: Windows) -> bool:
     for values in (given.command, given.fins):
         if values is None:
             continue
-        target = _fast(values[:, windows.warmup :])[usable].numpy()
-        left = target - regressors @ np.linalg.lstsq(regressors, target, rcond=1e-8)[0]
-        whole, chance = (target**2).sum(0), regressors.shape[1] / len(regressors)
-        if (1.0 - (left**2).sum(0) / np.maximum(whole, 1e-300) - chance > ANSWERS)[whole > 0.0].any():
+        rows = values[:, windows.warmup :]
+        step = torch.cat([torch.zeros_like(rows[:, :1]), rows[:, 1:] - rows[:, :-1]], dim=1)
+        share, chance = _predicted(_fast(rows)[usable].numpy(), regressors)
+        a_part = (share > CLOSED) & (chance < ALPHA_FAST)
+        steps = _predicted(step[usable].numpy(), regressors)[1] < ALPHA_STEP
+        if ((share > ANSWERS) | (a_part & steps)).any():
             return True
     return False
+
+
+def _predicted(target: Array, regressors: Array) -> tuple[Array, Array]:
+    """Return the share of targets, (N, n), that regressors, (N, c), predict beyond chance, and the p-values, (n,).
+
+    By the F test of a linear regression; a target that does not change is not predicted.
+    """
+    target = target - target.mean(0)
+    left = target - regressors @ np.linalg.lstsq(regressors, target, rcond=1e-8)[0]
+    count, own = regressors.shape
+    whole = (target**2).sum(0)
+    share = np.where(whole > 0.0, 1.0 - (left**2).sum(0) / np.maximum(whole, 1e-300), 0.0)
+    ratio = share / own / (np.maximum(1.0 - share, 1e-12) / (count - own))
+    return share - own / count, f_distribution.sf(ratio, own, count - own)
 
 
 def _fast_errors(end: FittedHypothesis, windows: Windows) -> tuple[Tensor, Array] | None:

@@ -186,3 +186,42 @@ def test_fins_in_the_flow_count_too():
     fin = model.vehicle.fins[2]
     lift = 0.5 * model.vehicle.water_density * fin.area * fin.lift_slope * 1.5**2 * 0.01
     assert np.hypot(found[1], found[2]) == pytest.approx(2.0 * lift, rel=0.02)
+
+
+@pytest.mark.parametrize(("gain", "closed"), [(0.15, True), (0.0, False)])
+def test_a_small_answer_to_the_noise_is_a_controllers(gain, closed):
+    """Of a command's changes, 1 in the mean, a controller that answers noise of 1 by 0.15 makes 2 %."""
+    model = GreyBox(small_vehicle(), actuation="wrench")
+    first, windows = fitted(model, make_log(model, duration=60.0, rate=20.0, noise=0.0))
+    random = np.random.default_rng(5)
+    noise = torch.as_tensor(0.004 * random.normal(size=windows.nu.shape))
+    command = windows.inputs.command.clone()
+    begin, count = windows.warmup, windows.nu.shape[1]
+    own = torch.as_tensor(0.004 * random.normal(size=(len(noise), count)))
+    command[:, begin:, 2] = own + gain * noise[..., 2]
+    seen = replace(first, around=torch.cat([windows.eta, windows.nu], dim=-1))
+    answering = replace(windows, nu=windows.nu + noise, inputs=replace(windows.inputs, command=command))
+    assert in_closed_loop(seen, answering) is closed
+
+
+def test_a_held_velocity_and_a_smooth_command_are_no_closed_loop():
+    """A velocity that is late by a hold of four samples has the bends of the command that drives it."""
+    model = GreyBox(small_vehicle(), actuation="wrench")
+    first, windows = fitted(model, make_log(model, duration=60.0, rate=20.0, noise=0.0))
+    rows = windows.inputs.command.shape[1] - windows.warmup
+    times = torch.arange(rows, dtype=torch.float64) * 0.05
+    command = windows.inputs.command.clone()
+    command[:, windows.warmup :, 2] = torch.sin(10.5 * times)
+    nu, held = windows.nu.clone(), torch.arange(nu_length := windows.nu.shape[1]) // 4 * 4
+    late = -torch.cos(10.5 * times[:nu_length])
+    nu[..., 2] += late[held] - late
+    nu += 1e-4 * torch.as_tensor(np.random.default_rng(6).normal(size=nu.shape))
+    seen = replace(first, around=torch.cat([windows.eta, windows.nu], dim=-1))
+    asked = replace(windows, nu=nu, inputs=replace(windows.inputs, command=command))
+    told = uncertain._fast_errors(seen, asked)
+    assert told is not None
+    usable, regressors = told
+    share, _ = uncertain._predicted(
+        uncertain._fast(command[:, windows.warmup :])[usable].numpy()[:, 2:3], regressors
+    )
+    assert share[0] > 0.01 and not in_closed_loop(seen, asked)

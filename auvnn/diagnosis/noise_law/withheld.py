@@ -1,0 +1,78 @@
+"""Whether names that were found beside a stochastic force are given, by what they leave of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from auvnn.diagnosis.noise_law.hypothesis import WithForce, leaves_little, shares_left
+from auvnn.diagnosis.noise_law.left_force import exceeds_actuators
+from auvnn.diagnosis.stages.state import Setting, State
+from auvnn.metrics.force_law import ForceLaw
+
+# Share of the force beyond which a name has left most of it.
+MOST = 0.5
+# A name that leaves less than this share of what there was has explained a force that is too large for a disturbance.
+EXPLAINED = 0.25
+
+
+def withheld(asked: Setting, state: State, result: WithForce, *, chance: bool) -> bool:
+    """Whether names are not given because of what they leave.
+
+    They are in spite of it where the first one explains far more than everything it is not confused with, and where they
+    leave next to nothing of the force in a degree of freedom: then what is left has another cause.
+
+    Args:
+        asked: layout.
+        state: windows over which the force was sought.
+        result: what was found.
+        chance: whether nothing that is measured predicts the force that is left.
+    """
+    law, before = result.estimate.law, result.first_law
+    if not refuted(asked, state, law, share_left(result), chance=chance):
+        return False
+    explains = bool(result.steps) and before is not None and leaves_little(law, before)
+    return not (result.stands_out or explains)
+
+
+def refuted(asked: Setting, state: State, law: ForceLaw | None, share: float, *, chance: bool) -> bool:
+    """Whether what is left says that names are not the cause.
+
+    A force that follows from what is measured is no noise: names beside which most of it stays are not its cause. Nor
+    are names beside which a force stays that is too large for a disturbance, unless they have explained most of it.
+
+    Args:
+        asked: layout.
+        state: windows over which the force was sought.
+        law: of the stochastic force that is left; None where none was found.
+        share: of the force, before any name, that is left.
+        chance: whether nothing that is measured predicts it.
+    """
+    if not chance and share > MOST:
+        return True
+    return share > EXPLAINED and exceeds_actuators(asked, state, law)
+
+
+def goes_further(again: WithForce, before: WithForce) -> bool:
+    """Whether further names after the same ones leave less than half of a force of which those leave more.
+
+    Names that leave most of a force that measured inputs predict are withheld: with several causes at once the first of
+    them leaves most, however right it is.
+
+    Args:
+        again: the search that also looks at names that cost little or bring little.
+        before: the search that does not.
+    """
+    same = [s["effects"] for s in again.steps[: len(before.steps)]] == [s["effects"] for s in before.steps]
+    return bool(before.steps) and same and share_left(before) > MOST >= share_left(again)
+
+
+def share_left(result: WithForce) -> float:
+    """Return the stochastic force's share of what was above noise before any name.
+
+    Args:
+        result: what was found.
+    """
+    if result.estimate.law is None or result.first_law is None:
+        return 0.0
+    left = shares_left(result.estimate.law, result.first_law)
+    return float(np.clip(left.mean(), 0.0, 1.0))
