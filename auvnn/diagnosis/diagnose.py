@@ -17,8 +17,8 @@ from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.noise_law.answer import answer_with_force
-from auvnn.diagnosis.search import a_force_stays, search
+from auvnn.diagnosis.noise_law.answer import answer_with_force, asks_again
+from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.shorter_windows import search_over_shorter
 from auvnn.diagnosis.stages.state import Searched, Setting, State
@@ -187,7 +187,7 @@ def searched(
         say=say,
     )
     try:
-        state, told, words = search(asked, windows, until=a_force_stays if stochastic else None), {}, []
+        state, told, words = search(asked, windows, until=asks_again if stochastic else None), {}, []
         if window is None:
             asked, state = search_over_shorter(asked, state, search)
         if stochastic:

@@ -26,7 +26,7 @@ from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncert
 from auvnn.diagnosis.noise_law.hypothesis import WithForce
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.noise_law.left_force import leaves_force, negligible
-from auvnn.diagnosis.noise_law.noise_colour import Colour, noise_colour
+from auvnn.diagnosis.noise_law.noise_colour import Colour, clearly_coloured, noise_colour
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.rounds.leaders import fitted_alone
 from auvnn.diagnosis.noise_law.search import ForceSearch
@@ -45,6 +45,28 @@ UNDECIDED = (
     "names were not compared together with a stochastic force: with one, free running grows without bound; "
     "choose shorter windows with window="
 )
+
+
+def asks_again(asked: Setting, state: State) -> bool:
+    """Whether a search for names alone ends after a round, because it will be made again.
+
+    Beside a stochastic force, where names leave most of one; with another colour of the noise, where that is clear after
+    the first name.
+
+    Args:
+        asked: what is asked.
+        state: after a round.
+    """
+    if a_force_stays(asked, state):
+        return True
+    try:
+        return (
+            len(state.path) == 1
+            and leaves_force(asked, state, state.current)
+            and clearly_coloured(state.current, state.windows, asked.floor)
+        )
+    except UNSOLVED:
+        return False
 
 
 def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, Any], list[str]]:

@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 TIMES = (0.1, 0.25, 0.6)
 # Of the best one, for each sensor separately.
 FACTORS = (0.0, 0.55)
+# Correlation time, s, and logarithm of the odds by which noise is clearly coloured, whatever else is missing.
+PLAIN_TO_SEE, CLEAR = 0.25, 1000.0
 SENSORS = {"position": POSITION, "attitude": ATTITUDE, "velocity": slice(6, 9), "rates": slice(9, 12)}
 # Correlation time, s, of the innovations in which outliers are looked for; how many standard deviations are too many.
 INNOVATION, OUTLIER, NORMAL = 0.3, 6.0, 1.4826
@@ -89,6 +91,23 @@ def noise_colour(explanation: FittedHypothesis, windows: Windows, floor: Array) 
             times[place] *= factor
             best = min(best, (cost_of(times), times), key=lambda found: found[0])
     return Colour(NoiseColour(best[1]), 0.5 * (plain - best[0]), windows.mask)
+
+
+def clearly_coloured(explanation: FittedHypothesis, windows: Windows, floor: Array) -> bool:
+    """Whether the noise has so clear a colour that no other effect has to be named before it is asked for.
+
+    One correlation time is compared with white noise beside a stochastic force: without the right effects the force is
+    larger, so that a force, and no colour, is preferred too often, not too seldom.
+
+    Args:
+        explanation: a fit, perhaps one that leaves much.
+        windows: those it was fitted to, as if noise were white.
+        floor: (18,) below which no channel is trusted.
+    """
+    windows = replace(windows, mask=without_outliers(explanation, windows))
+    cost_of = _Costs(explanation, windows, floor)
+    times = np.where(np.arange(18) < 12, PLAIN_TO_SEE, 0.0)
+    return bool(0.5 * (cost_of(np.zeros(18)) - cost_of(times)) > CLEAR)
 
 
 def without_outliers(explanation: FittedHypothesis, windows: Windows) -> Tensor:
