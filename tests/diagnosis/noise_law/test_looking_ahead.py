@@ -288,6 +288,22 @@ def test_what_is_fitted_beside_the_names_and_not_named_is_averaged_with_them(mon
         assert asked.averaged_with == [[]]
 
 
+@pytest.mark.parametrize(
+    ("pays", "waves", "expected"), [(True, 20.0, True), (False, 20.0, False), (True, 90.0, False)]
+)
+def test_the_first_name_stands_out_where_it_pays_and_is_far_ahead(monkeypatch, pays, waves, expected):
+    """Of the first round alone: a further name does not stand out because it is far ahead of those left."""
+    further = {
+        (): [found(-800.0, "payload"), found(-1000.0 + waves, "waves")],
+        ("payload",): [found(500.0, "payload", "waves")],
+        ("payload", "waves"): [],
+    }
+    asked, _ = scripted(monkeypatch, further)
+    asked.names.paying = lambda likely, *_: likely if pays else []
+    ended = asked.run(found(-1000.0), [], 4)
+    assert [s["effects"] for s in ended.steps] == [["payload"], ["waves"]] and ended.stands_out is expected
+
+
 def test_an_explanation_whose_free_running_diverges_costs_no_answer():
     def told(explanation: Effects) -> Effects:
         if "waves" in explanation.effects:

@@ -10,7 +10,7 @@ import pytest
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.noise_law.noise_colour import noise_colour
+from auvnn.diagnosis.noise_law.noise_colour import clearly_coloured, noise_colour
 from auvnn.estimation.window_normal_equations import TRUST, motion
 from auvnn.logs import Log
 from auvnn.logs.signals.rotation import from_euler, to_euler
@@ -60,3 +60,14 @@ def test_white_noise_is_white_with_and_without_a_force():
     model = GreyBox(small_vehicle())
     assert asked(model, make_log(model, runs=3, noise=1.0)).to_dict() == {}
     assert asked(model, wandering_log(model, 4.0, 1.0, runs=3)).to_dict() == {}
+
+
+@pytest.mark.parametrize(("time", "clear"), [(0.3, True), (None, False)])
+def test_a_clear_colour_is_seen_beside_what_is_missing(time, clear):
+    """A constant force of 3 N that the model lacks is no colour, and hides none."""
+    model = GreyBox(small_vehicle())
+    log = make_log(model.with_effects({"constant_force": {"Y": 3.0}}), runs=6, duration=60.0, noise=1.0)
+    log = log if time is None else remembering(log, time)
+    windows, layout = windows_for(model, log), lay_out(model, [])
+    first = fit_hypothesis(layout, windows, list(layout.names), (), iterations=4)
+    assert clearly_coloured(first, windows, TRUST * motion(windows) + 1e-9) is clear
