@@ -89,6 +89,7 @@ class WithForce:
         first_law: the law without any name.
         predicted: what measured inputs predict of the force that is left; None where that is little.
         stands_out: whether the first name explains far more than everything that is not confused with it.
+        explains: whether the first name leaves next to nothing of the force in a degree of freedom.
     """
 
     steps: list[SearchStep]
@@ -101,6 +102,7 @@ class WithForce:
     first_law: ForceLaw | None
     predicted: InputPrediction | None = None
     stands_out: bool = False
+    explains: bool = False
 
 
 def under_its_law(explanation: FittedHypothesis) -> FittedHypothesis:
@@ -184,17 +186,7 @@ def explains_an_axis(after: Hypothesis, before: Hypothesis) -> bool:
         before: hypothesis without it.
     """
     law = before.estimate.law
-    return law is not None and leaves_little(after.estimate.law, law)
-
-
-def leaves_little(after: ForceLaw | None, before: ForceLaw) -> bool:
-    """Whether next to nothing is left of a force in a degree of freedom.
-
-    Args:
-        after: the law that is left; None where none is.
-        before: the law before.
-    """
-    return bool((shares_left(after, before) < LEAVES).any())
+    return law is not None and bool((shares_left(after.estimate.law, law) < LEAVES).any())
 
 
 def stands_out(first: Hypothesis, found: Sequence[Hypothesis], before: Hypothesis) -> bool:

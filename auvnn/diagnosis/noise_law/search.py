@@ -26,6 +26,7 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     GROUP,
     Hypothesis,
     WithForce,
+    explains_an_axis,
     in_newtons,
     judged,
     stands_out,
@@ -160,7 +161,7 @@ class ForceSearch:
         steps: list[SearchStep] = []
         groups: list[list[FittedHypothesis]] = []
         tried: list[Hypothesis] = []
-        whole, rivals, ahead = 1.0, list[Hypothesis](), False
+        whole, rivals, ahead, explains = 1.0, list[Hypothesis](), False, False
         while len(chosen) < most:
             grouped = [e.effects[-1] for g in groups for e in g]
             result = self._round(null, current, chosen, grouped, fitted)
@@ -183,10 +184,9 @@ class ForceSearch:
             names = [h.name for h in group]
             verdict = "ambiguous" if len(group) > 1 else "named"
             steps.append({"verdict": verdict, "effects": names, "p_value": result.sure[group[0].name]})
-            if not chosen:
-                pays = self.names.paying([group[0]], null, FIRST_COST)
-                ahead = bool(pays) and stands_out(group[0], result.found, null)
             current = self._settled(group[0])
+            if not chosen and self.names.paying([group[0]], null, FIRST_COST):
+                ahead, explains = stands_out(group[0], result.found, null), explains_an_axis(current, null)
             if len(group) > 1:
                 groups.append([current.explanation, *(h.explanation for h in group[1:])])
             chosen.append(group[0].name)
@@ -205,6 +205,7 @@ class ForceSearch:
             in_newtons(null.estimate.law, null.explanation),
             self.predicted(current),
             ahead,
+            explains,
         )
 
     def _round(

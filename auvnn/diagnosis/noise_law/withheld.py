@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from auvnn.diagnosis.noise_law.hypothesis import WithForce, leaves_little, shares_left
+from auvnn.diagnosis.noise_law.hypothesis import WithForce, shares_left
 from auvnn.diagnosis.noise_law.left_force import exceeds_actuators
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.metrics.force_law import ForceLaw
@@ -18,8 +18,9 @@ EXPLAINED = 0.25
 def withheld(asked: Setting, state: State, result: WithForce, *, chance: bool) -> bool:
     """Whether names are not given because of what they leave.
 
-    They are in spite of it where the first one explains far more than everything it is not confused with, and where they
-    leave next to nothing of the force in a degree of freedom: then what is left has another cause.
+    They are in spite of it where the first one explains far more than everything it is not confused with, and, where
+    nothing that is measured predicts the force that is left, where the first one leaves next to nothing of it in a degree
+    of freedom: then what is left has another cause.
 
     Args:
         asked: layout.
@@ -27,11 +28,9 @@ def withheld(asked: Setting, state: State, result: WithForce, *, chance: bool) -
         result: what was found.
         chance: whether nothing that is measured predicts the force that is left.
     """
-    law, before = result.estimate.law, result.first_law
-    if not refuted(asked, state, law, share_left(result), chance=chance):
+    if not refuted(asked, state, result.estimate.law, share_left(result), chance=chance):
         return False
-    explains = bool(result.steps) and before is not None and leaves_little(law, before)
-    return not (result.stands_out or explains)
+    return not (result.stands_out or (chance and result.explains))
 
 
 def refuted(asked: Setting, state: State, law: ForceLaw | None, share: float, *, chance: bool) -> bool:

@@ -242,6 +242,7 @@ def scripted(
     monkeypatch.setattr(module, "tied", lambda _, good, before: good[:1])
     monkeypatch.setattr(module, "in_newtons", lambda law, _: law)
     monkeypatch.setattr(module, "parameters_of", lambda model, chosen: chosen)
+    monkeypatch.setattr(module, "explains_an_axis", lambda after, _: after.name == "payload")
     return asked, rounds
 
 
@@ -302,6 +303,7 @@ def test_the_first_name_stands_out_where_it_pays_and_is_far_ahead(monkeypatch, p
     asked.names.paying = lambda likely, *_: likely if pays else []
     ended = asked.run(found(-1000.0), [], 4)
     assert [s["effects"] for s in ended.steps] == [["payload"], ["waves"]] and ended.stands_out is expected
+    assert ended.explains is pays
 
 
 def test_an_explanation_whose_free_running_diverges_costs_no_answer():

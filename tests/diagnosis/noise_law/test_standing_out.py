@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis.noise_law import withheld as module
-from auvnn.diagnosis.noise_law.hypothesis import leaves_little, stands_out
+from auvnn.diagnosis.noise_law.hypothesis import explains_an_axis, stands_out
 from auvnn.diagnosis.noise_law.withheld import withheld
 from auvnn.metrics.force_law import ForceLaw
 
@@ -37,38 +37,37 @@ def test_a_name_stands_out_that_gains_four_times_what_others_do(gain, others, ex
     assert stands_out(first, found, hypothesis("", 0.0)) is expected
 
 
-def law_of(*rms: float) -> ForceLaw:
-    return ForceLaw(np.array(rms), np.full(6, 2.0), 0.5, 5.0)
+def beside(*rms: float) -> Any:
+    law = ForceLaw(np.array(rms), np.full(6, 2.0), 0.5, 5.0) if rms else None
+    return SimpleNamespace(estimate=SimpleNamespace(law=law))
 
 
 def test_next_to_nothing_is_left_where_a_tenth_of_the_square_is():
-    before = law_of(4.0, 0.0, 2.0, 0.0, 1.0, 0.0)
-    assert leaves_little(law_of(4.0, 0.0, 2.0, 0.0, 0.31, 0.0), before)
-    assert not leaves_little(law_of(4.0, 0.0, 2.0, 0.0, 0.33, 0.0), before)
+    before = beside(4.0, 0.0, 2.0, 0.0, 1.0, 0.0)
+    assert explains_an_axis(beside(4.0, 0.0, 2.0, 0.0, 0.31, 0.0), before)
+    assert not explains_an_axis(beside(4.0, 0.0, 2.0, 0.0, 0.33, 0.0), before)
     # A degree of freedom that had none is not explained; all of it is where nothing is left.
-    assert not leaves_little(law_of(4.0, 0.0, 2.0, 0.0, 1.0, 0.0), before) and leaves_little(None, before)
+    assert not explains_an_axis(before, before) and explains_an_axis(beside(), before)
+    assert not explains_an_axis(before, beside())
 
 
 @pytest.mark.parametrize(
-    ("refutes", "ahead", "heave", "steps", "expected"),
+    ("refutes", "ahead", "explains", "chance", "expected"),
     [
-        (True, False, 2.0, 1, True),
-        (True, True, 2.0, 1, False),
-        (True, False, 0.6, 1, False),
-        # Without any name nothing was explained.
-        (True, False, 0.6, 0, True),
-        (False, False, 2.0, 1, False),
+        (True, False, False, True, True),
+        (True, True, False, True, False),
+        (True, True, False, False, False),
+        (True, False, True, True, False),
+        # What is measured predicts what is left: a degree of freedom that was explained is no answer to that.
+        (True, False, True, False, True),
+        (False, False, False, False, False),
     ],
 )
 def test_what_is_left_withholds_names_that_do_not_stand_out(
-    monkeypatch, refutes, ahead, heave, steps, expected
+    monkeypatch, refutes, ahead, explains, chance, expected
 ):
     monkeypatch.setattr(module, "refuted", lambda *_, **__: refutes)
-    result: Any = SimpleNamespace(
-        estimate=SimpleNamespace(law=law_of(4.0, 3.0, heave, 0.0, 0.0, 0.0)),
-        first_law=law_of(4.0, 3.0, 2.0, 0.0, 0.0, 0.0),
-        steps=[{"effects": ["payload"]}] * steps,
-        stands_out=ahead,
-    )
+    monkeypatch.setattr(module, "share_left", lambda _: 1.0)
+    result: Any = SimpleNamespace(estimate=SimpleNamespace(law=None), stands_out=ahead, explains=explains)
     nothing: Any = None
-    assert withheld(nothing, nothing, result, chance=True) is expected
+    assert withheld(nothing, nothing, result, chance=chance) is expected
