@@ -25,7 +25,7 @@ from auvnn.diagnosis.noise_law.commands.in_place_of_names import (
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncertain_wrench
 from auvnn.diagnosis.noise_law.hypothesis import WithForce
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
-from auvnn.diagnosis.noise_law.left_force import leaves_force, negligible
+from auvnn.diagnosis.noise_law.left_force import leaves_force, negligible, sized_by_law
 from auvnn.diagnosis.noise_law.noise_colour import Colour, clearly_coloured, noise_colour
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.rounds.leaders import fitted_alone
@@ -246,7 +246,7 @@ def _state(
         table=table,
         left=None if named or small else state.left,
         traced=None,
-        remainder=None if named else state.remainder,
+        remainder=sized_by_law(state.remainder, law if named else result.first_law, over.windows),
         negligible=small,
         nearest=() if named else tuple(dict.fromkeys([*tried, *state.nearest, *before])),
         partial=False,

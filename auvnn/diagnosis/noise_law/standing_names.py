@@ -5,7 +5,7 @@ from __future__ import annotations
 from auvnn.diagnosis.hypotheses.measured_start import above_noise
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench
 from auvnn.diagnosis.noise_law.hypothesis import in_newtons
-from auvnn.diagnosis.noise_law.left_force import leaves_force, negligible
+from auvnn.diagnosis.noise_law.left_force import leaves_force, negligible, sized_by_law
 from auvnn.diagnosis.noise_law.noise_colour import Colour
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.search import ForceSearch
@@ -59,7 +59,13 @@ def beside_names(
     law = in_newtons(found.estimate.law, found.explanation)
     small = predicted is None and negligible(asked, state, law, uncertain)
     named = tuple(s for s in state.steps if s["effects"])
-    told = state.but(steps=named, negligible=small, left=None, traced=None, remainder=None)
+    told = state.but(
+        steps=named,
+        negligible=small,
+        left=None,
+        traced=None,
+        remainder=sized_by_law(state.remainder, law, windows),
+    )
     # As beside names that were found together with the force: what is stochastic is reported, and is no riddle.
     if small or predicted is not None:
         told = told.step("adequate" if small else "unknown", [], state.p_value)

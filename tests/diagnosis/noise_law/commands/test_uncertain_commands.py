@@ -107,6 +107,9 @@ def test_commands_that_answer_the_noise_leave_its_share_uncertain():
     command[:, windows.warmup :, 2] -= 30.0 * noise
     answering = replace(windows, nu=nu, inputs=replace(windows.inputs, command=command))
     found = noise_answered(first, answering)
+    held = Holding("held", 0.0, 0.0, 0.0)
+    assert uncertain_wrench(first, answering, held).closed_loop
+    assert not uncertain_wrench(first, windows, held).closed_loop
     # Half of the noise is the log's own, which nothing answers: what is regressed on is noisy itself.
     assert not in_closed_loop(first, windows) and in_closed_loop(first, answering)
     # About filtered trajectories their errors count, and no run of the model, which may not stay finite.
