@@ -97,8 +97,8 @@ def upper_limit(law: ForceLaw, windows: Windows) -> Array:
 def sized_by_law(left: Unnamed | None, law: ForceLaw | None, windows: Windows) -> Unnamed | None:
     """Return what is left with the sizes that the law of the stochastic force has.
 
-    A Fourier series in each window tells the size of a force roughly; the law has its likeliest size and correlation time.
-    In a degree of freedom without a force in the law none is left. What would have shown stays as it was.
+    A Fourier series in each window tells the size of a force roughly; the law has its likeliest size and correlation
+    time. In a degree of freedom without a force in the law none is left. What would have shown stays as it was.
 
     Args:
         left: as the test of a force has it; None where it was not asked.

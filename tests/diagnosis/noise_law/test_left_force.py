@@ -11,9 +11,11 @@ import pytest
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench
-from auvnn.diagnosis.noise_law.left_force import exceeds_actuators, negligible
+from auvnn.diagnosis.noise_law.left_force import exceeds_actuators, negligible, sized_by_law
 from auvnn.diagnosis.noise_law.withheld import goes_further, refuted
 from auvnn.diagnosis.residuals.forces import actuators_of
+from auvnn.diagnosis.residuals.unnamed_size import Size
+from auvnn.diagnosis.residuals.variance_component_test import Unnamed
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
@@ -116,3 +118,22 @@ def test_further_names_after_the_same_ones_stand_where_they_leave_less_than_half
     again: Any = found(names, left)
     assert goes_further(again, found(before, 0.55)) is expected
     assert not goes_further(again, found(before, 0.45))
+
+
+def test_what_is_left_has_the_size_of_its_law():
+    model = GreyBox(small_vehicle())
+    windows = windows_for(model, make_log(model))
+    law = ForceLaw(np.array([3.0, 0.0, 0.0, 0.0, 0.0, 0.0]), np.full(6, 0.4), 0.2, 5.0)
+    rough = {axis: Size(9.0, 12.0, 0.5, 2.0) for axis in "XYZKMN"}
+    left = Unnamed(np.zeros(6), np.ones(6), np.zeros(6), {"X": 3.0}, rough)
+    found = sized_by_law(left, law, windows)
+    assert found is not None and found.acts_in == left.acts_in
+    times = windows.times[:, windows.warmup :]
+    independent = float((times[:, -1] - times[:, 0]).sum()) / 0.8
+    upper = 3.0 * (1.0 + 1.645 / np.sqrt(2.0 * independent))
+    surge = found.sizes["X"]
+    assert (surge.rms, surge.correlation_time, surge.detectable) == (3.0, 0.4, 0.5)
+    assert surge.upper == pytest.approx(upper)
+    # Elsewhere the law has none; what the log would have shown, and the rough limit, stay.
+    assert all(found.sizes[axis] == Size(0.0, 12.0, 0.5, None) for axis in "YZKMN")
+    assert sized_by_law(left, None, windows) is left and sized_by_law(None, law, windows) is None

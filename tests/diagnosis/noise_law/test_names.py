@@ -35,6 +35,18 @@ def said(hidden, seed=1, rms=RMS):
     return diagnose(model, log, CANDIDATES, advice=False, whiteness=False, stochastic=True, max_effects=1)
 
 
+def left_as_its_law(found):
+    """Assert that what is left is the law's, and that this is what acts."""
+    assert {"X", "Y", "Z", "cost"} <= found.left.keys()
+    for axis, told in found.left.items():
+        law = found.stochastic["force"].get(axis)
+        if axis != "cost" and law is None:
+            assert told["rms"] == 0.0 and told["correlation_time"] is None and told["detectable"] > 0.0
+        elif axis != "cost":
+            assert {n: told[n] for n in law} == law and told["upper"] > told["rms"]
+            assert told["rms"] == pytest.approx(RMS["XYZKMN".index(axis)], rel=0.3)
+
+
 @pytest.mark.long
 def test_an_effect_is_named_and_the_force_beside_it_told():
     found = said({"net_buoyancy": {"force": 8.0}})
@@ -44,6 +56,7 @@ def test_an_effect_is_named_and_the_force_beside_it_told():
         assert found.stochastic["force"][axis]["rms"] == pytest.approx(4.0, rel=0.3)
         assert 0.4 < found.stochastic["force"][axis]["correlation_time"] < 2.5
     assert any("stochastic force" in line for line in found.story)
+    left_as_its_law(found)
     parameters = found.candidates[0]["parameters"]["force"]
     assert parameters["value"] == pytest.approx(8.0, abs=4 * parameters["std"])
 
@@ -52,6 +65,7 @@ def test_an_effect_is_named_and_the_force_beside_it_told():
 def test_a_force_alone_has_no_name():
     found = said({}, seed=2)
     assert found.missing == [] and found.verdict == "unknown" and found.stochastic["force"]
+    left_as_its_law(found)
 
 
 @pytest.mark.long
