@@ -29,6 +29,7 @@ SAMPLES = {
     "rows-9.jsonl": 8,
     "rows-10.jsonl": 9,
     "rows-11.jsonl": 10,
+    "rows-12.jsonl": 11,
 }
 
 
