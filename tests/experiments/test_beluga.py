@@ -86,4 +86,7 @@ def test_the_knock_outs_that_missed_are_told_as_missed():
     present = {c["removed"]: c["rank"] for c in EXPECTED["knock-out"]["one step"]["cases"]}
     assert present == {"tilted_vertical": 3, "turning_forces": 1, "cg_offset": 1, "thrust_overshoot": 1}
     text = (HERE / "README.md").read_text()
-    assert "3 of 4 (75 %)" in text and "0 of 4. The target of 80 % is missed" in text
+    beside = {c["removed"]: c for c in EXPECTED["knock-out"]["free running, beside a force"]["cases"]}
+    assert [n for n, c in beside.items() if c["named_first"] or c["in_first_group"]] == ["cg_offset"]
+    assert not any(s["effects"] for n, c in beside.items() if n != "cg_offset" for s in c["steps"])
+    assert "3 of 4 (75 %)" in text and "1 of 4, in a group of two. The target of 80 % is missed" in text
