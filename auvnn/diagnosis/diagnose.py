@@ -17,11 +17,11 @@ from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.noise_law.answer import answer_with_force, asks_again
+from auvnn.diagnosis.noise_law.answer import answer_with_force, ends_early
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.shorter_windows import search_over_shorter
-from auvnn.diagnosis.stages.state import Searched, Setting, State
+from auvnn.diagnosis.stages.state import Searched, Setting
 from auvnn.diagnosis.stages.what_is_left import settled
 from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.prediction_error import SINGULAR
@@ -110,20 +110,6 @@ def diagnose(
     )[0]
 
 
-def beside_a_force(asked: Setting, state: State) -> tuple[State, dict[str, Any], list[str]]:
-    """Return where the search ends once a stochastic force has been asked for, what was found of it, and words.
-
-    Args:
-        asked: what is asked.
-        state: where the search for names alone has ended, or was ended because a force stays.
-    """
-    found = answer_with_force(asked, state)
-    if not found[0].interrupted or "force" in found[1]:
-        return found
-    # What stays is no stochastic force: names alone have to do.
-    return answer_with_force(asked, search(asked, state.windows))
-
-
 def searched(
     model: GreyBox,
     log: Log,
@@ -187,11 +173,11 @@ def searched(
         say=say,
     )
     try:
-        state, told, words = search(asked, windows, until=asks_again if stochastic else None), {}, []
+        state, told, words = search(asked, windows, until=ends_early if stochastic else None), {}, []
         if window is None:
             asked, state = search_over_shorter(asked, state, search)
         if stochastic:
-            state, told, words = beside_a_force(asked, state)
+            state, told, words = answer_with_force(asked, state)
         state = settled(asked, state)
         found = answer(asked, state)
     except (np.linalg.LinAlgError, SINGULAR) as problem:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis import search
-from auvnn.diagnosis.diagnose import beside_a_force
 from auvnn.diagnosis.search import a_force_stays
 
 
@@ -75,37 +73,3 @@ def test_where_the_test_cannot_be_solved_the_search_goes_on(monkeypatch):
     monkeypatch.setattr(search, "variance_component_test", unsolved)
     asked: Any = SimpleNamespace(floor=0.0)
     assert not a_force_stays(asked, state(3))
-
-
-@pytest.mark.parametrize(
-    ("interrupted", "made_again", "told", "searches"),
-    [
-        (True, False, {}, 1),
-        (True, True, {}, 0),
-        (True, False, {"force": "its law"}, 0),
-        (False, False, {}, 0),
-    ],
-    ids=[
-        "ended early, and there is no force",
-        "ended early, and made again to its end",
-        "ended early, beside a force",
-        "ended by itself",
-    ],
-)
-def test_a_search_that_was_ended_for_a_force_goes_on_where_there_is_none(
-    monkeypatch, interrupted, made_again, told, searches
-):
-    module = importlib.import_module("auvnn.diagnosis.diagnose")
-    seen = []
-    monkeypatch.setattr(module, "search", lambda asked, windows: seen.append(windows) or "whole")
-    after: Any = SimpleNamespace(interrupted=interrupted and not made_again, windows="others")
-    monkeypatch.setattr(
-        module,
-        "answer_with_force",
-        lambda asked, state: (state, {}, []) if state == "whole" else (after, told, []),
-    )
-    asked: Any = "asked"
-    before: Any = SimpleNamespace(interrupted=interrupted, windows="windows")
-    found = beside_a_force(asked, before)
-    assert seen == ["windows"] * searches
-    assert found[0] == ("whole" if searches else after)

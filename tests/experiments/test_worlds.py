@@ -52,6 +52,7 @@ def test_the_rows_give_what_is_told(name):
     expected = json.loads((HERE / "expected.json").read_text())[name]
     seen = [r for r in rows if r["kind"] == "effect" and worlds.visible(r)]
     nothing = [r for r in rows if r["kind"] == "nothing"]
+    disturbed = [r for r in rows if r["world"].startswith("disturbed")]
     found = {
         "logs": len(rows),
         "visible": len(seen),
@@ -62,6 +63,8 @@ def test_the_rows_give_what_is_told(name):
         "nothing_without_a_name": sum(map(worlds.silent, nothing)),
         "nothing_adequate": sum(map(worlds.adequate, nothing)),
         "faults": sum(r["verdict"] == "fault" or bool(r["fault"]) for r in rows),
+        "forces": sum(len(worlds.force_right(r)) for r in disturbed),
+        "forces_right": sum(sum(worlds.force_right(r)) for r in disturbed),
         "intervals": sum(len(z_of(r)) for r in rows),
         "intervals_right": sum(abs(z) < Z95 for r in rows for z in z_of(r)),
     }

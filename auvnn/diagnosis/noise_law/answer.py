@@ -47,7 +47,7 @@ UNDECIDED = (
 )
 
 
-def asks_again(asked: Setting, state: State) -> bool:
+def ends_early(asked: Setting, state: State) -> bool:
     """Whether a search for names alone ends after a round, because it will be made again.
 
     Beside a stochastic force, where names leave most of one; with another colour of the noise, where that is clear after
@@ -76,8 +76,9 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         asked: what is asked.
         state: where the first search ended.
     """
+    began = state
     if not state.leaves_something:
-        return _with_fewer_names(asked, state)
+        return _names_alone(asked, began, *_with_fewer_names(asked, state))
     least, held = _held(state)
     untimed, gone = without_timed(asked, state, least), dict[str, str]()
     law = None if untimed is None else replaces(untimed, least, held, state.windows)
@@ -94,12 +95,11 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         colour = noise_colour(least, windows, asked.floor)
     except UNSOLVED:
         colour = Colour(None, 0.0)
-    again = False
     if held.odds > 0.0 or colour.noise is not None:
         why = [f"commands change between samples ({held.name})"] if held.odds > 0.0 else []
         why += [] if colour.noise is None else ["the sensors' noise is not white"]
         asked.say(f"{' and '.join(why)}: searching again")
-        again, state = True, search(asked, colour.applied(windows), until=a_force_stays)
+        state = search(asked, colour.applied(windows), until=a_force_stays)
         state = state.but(failed={**state.failed, **gone})
     wrench = uncertain.to_dict()
     told: dict[str, Any] = {
@@ -107,7 +107,7 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         "noise": colour.to_dict(),
     }
     if not state.leaves_something:
-        return state, told, []
+        return _names_alone(asked, began, state, told, [])
     if state.refuted is not None and not leaves_force(asked, state, state.refuted):
         # With all names nothing significant is left: those that predict alone decide whether there is.
         state = settled(asked, state)
@@ -116,19 +116,31 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         beside = ask(asked, state, uncertain)
     except UNSOLVED:
         # The first answer stands: it did not need what could not be solved here.
-        return (_to_the_end(asked, state) if again else state), told, [UNDECIDED]
+        return _names_alone(asked, began, state, told, [UNDECIDED])
     if beside is None:
-        return (_to_the_end(asked, state) if again else state), told, []
+        return _names_alone(asked, began, state, told, [])
     state, law, predicted = beside
     return state, {**told, "force": left(law)}, [] if predicted is None else [_words(predicted)]
 
 
-def _to_the_end(asked: Setting, state: State) -> State:
-    """Return where a search ends that was interrupted because a force stays, where there is none that could be told."""
+def _names_alone(
+    asked: Setting, began: State, state: State, told: dict[str, Any], words: list[str]
+) -> tuple[State, dict[str, Any], list[str]]:
+    """Return an answer without a stochastic force: a search that ended early, because a force stays, goes on to its end.
+
+    Args:
+        asked: what is asked.
+        began: where the first search ended.
+        state: where the search stands, perhaps one with other commands or another noise.
+        told: what was found of these.
+        words: what could not be worked out.
+    """
     if not state.interrupted:
-        return state
+        return state, told, words
     whole = search(asked, state.windows)
-    return whole.but(failed={**whole.failed, **state.failed})
+    if state.windows is began.windows:
+        return answer_with_force(asked, whole)
+    return whole.but(failed={**whole.failed, **state.failed}), told, words
 
 
 def _with_fewer_names(asked: Setting, state: State) -> tuple[State, dict[str, Any], list[str]]:

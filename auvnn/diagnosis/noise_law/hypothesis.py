@@ -201,7 +201,7 @@ def stands_out(first: Hypothesis, found: Sequence[Hypothesis], before: Hypothesi
     others = [
         h.evidence - before.evidence
         for h in found
-        if h.name != first.name and not confused(h.name, first.name) and not confused(first.name, h.name)
+        if h.name != first.name and not confused(h.name, first.name)
     ]
     return gain > AHEAD and gain > TIMES * max(others, default=0.0)
 

@@ -32,7 +32,7 @@ TIMES = (0.1, 0.25, 0.6)
 # Of the best one, for each sensor separately.
 FACTORS = (0.0, 0.55)
 # Correlation time, s, and logarithm of the odds by which noise is clearly coloured, whatever else is missing.
-PLAIN_TO_SEE, CLEAR = 0.25, 1000.0
+CLEAR_TIME, CLEAR_ODDS = 0.25, 1000.0
 SENSORS = {"position": POSITION, "attitude": ATTITUDE, "velocity": slice(6, 9), "rates": slice(9, 12)}
 # Correlation time, s, of the innovations in which outliers are looked for; how many standard deviations are too many.
 INNOVATION, OUTLIER, NORMAL = 0.3, 6.0, 1.4826
@@ -106,8 +106,8 @@ def clearly_coloured(explanation: FittedHypothesis, windows: Windows, floor: Arr
     """
     windows = replace(windows, mask=without_outliers(explanation, windows))
     cost_of = _Costs(explanation, windows, floor)
-    times = np.where(np.arange(18) < 12, PLAIN_TO_SEE, 0.0)
-    return bool(0.5 * (cost_of(np.zeros(18)) - cost_of(times)) > CLEAR)
+    times = np.where(np.arange(18) < 12, CLEAR_TIME, 0.0)
+    return bool(0.5 * (cost_of(np.zeros(18)) - cost_of(times)) > CLEAR_ODDS)
 
 
 def without_outliers(explanation: FittedHypothesis, windows: Windows) -> Tensor:

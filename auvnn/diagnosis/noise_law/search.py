@@ -185,8 +185,10 @@ class ForceSearch:
             verdict = "ambiguous" if len(group) > 1 else "named"
             steps.append({"verdict": verdict, "effects": names, "p_value": result.sure[group[0].name]})
             current = self._settled(group[0])
-            if not chosen and self.names.paying([group[0]], null, FIRST_COST):
+            if not chosen:
                 ahead, explains = stands_out(group[0], result.found, null), explains_an_axis(current, null)
+                if (ahead or explains) and not self.names.paying([group[0]], null, FIRST_COST):
+                    ahead = explains = False
             if len(group) > 1:
                 groups.append([current.explanation, *(h.explanation for h in group[1:])])
             chosen.append(group[0].name)

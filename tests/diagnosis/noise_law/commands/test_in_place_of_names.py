@@ -78,7 +78,11 @@ def test_where_names_leave_nothing_a_law_that_spares_some_of_them_takes_their_pl
     """The search with the law must leave nothing with fewer names."""
     searched: list[Any] = []
     state: Any = SimpleNamespace(
-        leaves_something=False, chosen=("net_buoyancy", "thrust_overshoot"), windows="held", current=None
+        leaves_something=False,
+        chosen=("net_buoyancy", "thrust_overshoot"),
+        windows="held",
+        current=None,
+        interrupted=False,
     )
     again = State("law", None, None, chosen=tuple(NAMES[:names]), failed={"waves": "no"})  # type: ignore[arg-type]
     again = again.step("unknown" if leaves else "adequate", [], 0.0)

@@ -42,7 +42,7 @@ def test_a_search_ends_early_for_a_force_or_a_clear_colour(
     monkeypatch.setattr(answer, "leaves_force", lambda *_: force)
     monkeypatch.setattr(answer, "clearly_coloured", lambda *_: clear)
     state: Any = SimpleNamespace(path=[None] * rounds, current=None, windows=None)
-    assert answer.asks_again(NOTHING, state) is expected
+    assert answer.ends_early(NOTHING, state) is expected
 
 
 def test_what_cannot_be_solved_ends_no_search(monkeypatch):
@@ -52,19 +52,16 @@ def test_what_cannot_be_solved_ends_no_search(monkeypatch):
     monkeypatch.setattr(answer, "a_force_stays", lambda *_: False)
     monkeypatch.setattr(answer, "leaves_force", unsolved)
     state: Any = SimpleNamespace(path=[None], current=None, windows=None)
-    assert not answer.asks_again(NOTHING, state)
+    assert not answer.ends_early(NOTHING, state)
 
 
-@pytest.mark.parametrize(
-    ("interrupted", "force", "searches"),
-    [(True, None, 2), (False, None, 1), (True, "told", 1), (True, "unsolved", 2)],
-)
-def test_a_search_with_another_colour_goes_on_where_no_force_is_told(
-    monkeypatch, interrupted, force, searches
-):
-    """The first of the searches has the colour and may end early; the second goes to the end over the same windows."""
+def answered(monkeypatch, *, interrupted, force, coloured):
+    """Return the searches that an answer makes, windows and whether they may end early, and the answer.
+
+    The first search has ended early; those made again do so where they may, if `interrupted`.
+    """
     begun: list[tuple[str, bool]] = []
-    colour = Colour(NoiseColour(np.full(18, 0.3)), 5000.0)
+    noise = NoiseColour(np.full(18, 0.3)) if coloured else None
     state: Any = Stage(
         leaves_something=True,
         windows="white",
@@ -86,13 +83,46 @@ def test_a_search_with_another_colour_goes_on_where_no_force_is_told(
     monkeypatch.setattr(answer, "_held", lambda _: (None, HELD))
     monkeypatch.setattr(answer, "without_timed", lambda *_: None)
     monkeypatch.setattr(answer, "uncertain_wrench", lambda *_: UncertainWrench(np.zeros(6), np.zeros(6), 0.1))
-    monkeypatch.setattr(answer, "noise_colour", lambda *_: colour)
+    monkeypatch.setattr(answer, "noise_colour", lambda *_: Colour(noise, 5000.0))
     monkeypatch.setattr(Colour, "applied", lambda self, windows: "coloured")
     monkeypatch.setattr(answer, "search", search)
     monkeypatch.setattr(answer, "_with_force", beside)
     monkeypatch.setattr(answer, "left", lambda law: {})
-    found, told, words = answer.answer_with_force(NOTHING, state)
+    return begun, *answer.answer_with_force(NOTHING, state)
+
+
+@pytest.mark.parametrize(
+    ("interrupted", "force", "searches"),
+    [(True, None, 2), (False, None, 1), (True, "told", 1), (True, "unsolved", 2)],
+)
+def test_a_search_with_another_colour_goes_on_where_no_force_is_told(
+    monkeypatch, interrupted, force, searches
+):
+    """The first of the searches has the colour and may end early; the second goes to the end over the same windows."""
+    begun, found, told, words = answered(monkeypatch, interrupted=interrupted, force=force, coloured=True)
     assert begun == [("coloured", True), ("coloured", False)][:searches]
     assert ("force" in told) is (force == "told") and bool(words) is (force == "unsolved")
-    # Whoever asked must not begin anew: what was made over these windows is the whole of it.
-    assert not found.interrupted or force == "told"
+    assert found.interrupted is (force == "told")
+    # What the colour's search could not fit is told beside what its whole could not.
+    assert told["noise"] and found.windows == "coloured"
+
+
+@pytest.mark.parametrize(("force", "searches"), [(None, 1), ("told", 0)])
+def test_a_search_that_ended_early_goes_on_where_no_force_is_told(monkeypatch, force, searches):
+    """With commands and noise as they were, the whole search is asked of both anew."""
+    begun, found, told, _ = answered(monkeypatch, interrupted=True, force=force, coloured=False)
+    assert begun == [("white", False)] * searches
+    assert ("force" in told) is (force == "told") and found.interrupted is (force == "told")
+
+
+def test_a_search_that_ended_early_and_leaves_nothing_goes_on(monkeypatch):
+    begun = []
+
+    def search(asked: Any, windows: str, until: Any = None) -> Stage:
+        begun.append(windows)
+        return Stage(leaves_something=False, windows=windows, chosen=(), interrupted=False)
+
+    monkeypatch.setattr(answer, "search", search)
+    state: Any = Stage(leaves_something=False, windows="white", chosen=(), interrupted=True)
+    found, told, words = answer.answer_with_force(NOTHING, state)
+    assert begun == ["white"] and not found.interrupted and (told, words) == ({}, [])
