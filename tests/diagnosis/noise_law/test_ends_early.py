@@ -55,7 +55,7 @@ def test_what_cannot_be_solved_ends_no_search(monkeypatch):
     assert not answer.ends_early(NOTHING, state)
 
 
-def answered(monkeypatch, *, interrupted, force, coloured):
+def answered(monkeypatch, *, interrupted, force, coloured, leaves=True):
     """Return the searches that an answer makes, windows and whether they may end early, and the answer.
 
     The first search has ended early; those made again do so where they may, if `interrupted`.
@@ -73,7 +73,11 @@ def answered(monkeypatch, *, interrupted, force, coloured):
 
     def search(asked: Any, windows: str, until: Any = None) -> Stage:
         begun.append((windows, until is not None))
-        return state.but(windows=windows, interrupted=interrupted and until is not None, failed={})
+        early = interrupted and until is not None
+        failed = {"tether" if early else "payload": "its fit failed"}
+        return state.but(
+            windows=windows, interrupted=early, failed=failed, leaves_something=leaves or not coloured
+        )
 
     def beside(asked: Any, state: Stage, uncertain: Any) -> Any:
         if force == "unsolved":
@@ -103,8 +107,15 @@ def test_a_search_with_another_colour_goes_on_where_no_force_is_told(
     assert begun == [("coloured", True), ("coloured", False)][:searches]
     assert ("force" in told) is (force == "told") and bool(words) is (force == "unsolved")
     assert found.interrupted is (force == "told")
-    # What the colour's search could not fit is told beside what its whole could not.
     assert told["noise"] and found.windows == "coloured"
+    # What could not be fitted before the early end is told beside what could not afterwards.
+    whole = {"payload"} if searches == 2 or not interrupted else set()
+    assert {*found.failed} == whole | ({"tether"} if interrupted else set())
+
+
+def test_names_that_end_early_and_leave_nothing_go_on(monkeypatch):
+    begun, found, told, _ = answered(monkeypatch, interrupted=True, force=None, coloured=True, leaves=False)
+    assert begun == [("coloured", True), ("coloured", False)] and not found.interrupted and told["noise"]
 
 
 @pytest.mark.parametrize(("force", "searches"), [(None, 1), ("told", 0)])
