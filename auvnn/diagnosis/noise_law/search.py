@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.commands.uncertain import in_closed_loop
+from auvnn.diagnosis.noise_law.first_law import first_law
 from auvnn.diagnosis.noise_law.hypothesis import (
     GROUP,
     Hypothesis,
@@ -33,10 +34,8 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     tied,
 )
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
-from auvnn.diagnosis.noise_law.likelihood.about_motion import linear_about_its_own
-from auvnn.diagnosis.noise_law.likelihood.estimate_law import estimate
-from auvnn.diagnosis.noise_law.likelihood.law_likelihood import STEPS, Likelihood
-from auvnn.diagnosis.noise_law.likelihood.sums import CELL, ForceSums, force_sums, whole_cells
+from auvnn.diagnosis.noise_law.likelihood.law_likelihood import STEPS
+from auvnn.diagnosis.noise_law.likelihood.sums import CELL, ForceSums, force_sums
 from auvnn.diagnosis.noise_law.model_average import averaged
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction, predicted_by_inputs
 from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round, RoundResult
@@ -47,7 +46,7 @@ from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.diagnosis.stages.state import Setting
 from auvnn.estimation.priors import parameters_of
-from auvnn.metrics.force_law import ForceLaw, cell_for
+from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.rollouts import scale_of
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
@@ -55,8 +54,8 @@ from auvnn.models import GreyBox
 Array = NDArray[np.float64]
 # Share of the gain of all names that a further one must bring.
 FURTHER_SHARE = 0.1
-# Steps of the fit without any name, and how often its windows are made linear about the motion first.
-NULL_STEPS, TURNS = 25, 3
+# Steps of the fit without any name.
+NULL_STEPS = 25
 
 
 class ForceSearch:
@@ -99,27 +98,12 @@ class ForceSearch:
         # Fits without the force weigh errors as the first one did.
         self.sigma, self.weights = sigma, first.fitted.sigma
         self.response = GreyBox(first.fitted.model.vehicle).prepare().inverse.detach().numpy()
-        # A whole number of cells: a window's last force is that with which the next one begins.
-        self.cell = whole_cells(self.windows, CELL)
-        found = estimate(Likelihood(self._sums(first)))
-        if found.law is None:
+        found = first_law(first, self.windows, sigma, self.response)
+        if found is None:
             return None
-        cell = whole_cells(self.windows, cell_for(found.law.time[found.law.axes]))
-        if cell < self.cell:
-            self.cell = cell
-            found = estimate(Likelihood(self._sums(first)), replace(found.law, cell=cell), found.law.axes)
-        for _ in range(TURNS):
-            assert found.law is not None
-            about = linear_about_its_own(first, self.windows, found, sigma)
-            if about is None:
-                break
-            first = about
-            found = estimate(Likelihood(self._sums(first)), found.law)
-            if found.law is None:
-                return None
-        assert found.law is not None
+        self.cell = found.cell
         # All names are compared with it: it must not gain by steps that names take first.
-        null = self._fits().settled(self.judged(first, found.law), steps)
+        null = self._fits().settled(self.judged(found.explanation, found.law), steps)
         with suppress(*UNSOLVED):
             self.names.in_closed_loop = self.names.in_closed_loop or in_closed_loop(
                 null.explanation, self.windows
