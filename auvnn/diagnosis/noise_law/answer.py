@@ -6,13 +6,12 @@ Where the first search leaves nothing, its answer stands, but for names that ano
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.answer_types import SearchStep
-from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.commands.holding import HELD, Holding, cost_at_best, holding
 from auvnn.diagnosis.noise_law.commands.in_place_of_names import (
@@ -23,16 +22,15 @@ from auvnn.diagnosis.noise_law.commands.in_place_of_names import (
     without_timed,
 )
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncertain_wrench
-from auvnn.diagnosis.noise_law.hypothesis import WithForce
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
-from auvnn.diagnosis.noise_law.left_force import leaves_force, negligible, sized_by_law
+from auvnn.diagnosis.noise_law.left_force import leaves_force
 from auvnn.diagnosis.noise_law.noise_colour import Colour, clearly_coloured, noise_colour
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.rounds.leaders import fitted_alone
 from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.diagnosis.noise_law.split_windows import fitted_over_parts
 from auvnn.diagnosis.noise_law.standing_names import beside_names, stand
-from auvnn.diagnosis.noise_law.withheld import goes_further, share_left, withheld
+from auvnn.diagnosis.noise_law.withheld import goes_further, state_with
 from auvnn.diagnosis.noise_law.words import left
 from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.diagnosis.search import a_force_stays, search
@@ -112,7 +110,7 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         # With all names nothing significant is left: those that predict alone decide whether there is.
         state = settled(asked, state)
     try:
-        ask = beside_names if stand(state, colour) else _with_force
+        ask = partial(beside_names, anew=_with_force) if stand(state, colour) else _with_force
         beside = ask(asked, state, uncertain)
     except UNSOLVED:
         # The first answer stands: it did not need what could not be solved here.
@@ -216,55 +214,8 @@ def _with_force(
         if again.predicted is None or goes_further(again, result):
             result, predicted = again, again.predicted
     over_parts = state.but(first=first, windows=windows)
-    ended = _state(asked, state, over_parts, result, uncertain, chance=predicted is None)
+    ended = state_with(asked, state, over_parts, result, uncertain, chance=predicted is None)
     return ended, result.estimate.law, predicted
-
-
-def _state(
-    asked: Setting, state: State, over: State, result: WithForce, uncertain: UncertainWrench, *, chance: bool
-) -> State:
-    """Return the state with what was found together with the force in the place of what the first search found.
-
-    Args:
-        asked: what is asked.
-        state: where the first search ended.
-        over: the same with the windows over which the force was sought, and the fit without a name over these.
-        result: what was found.
-        uncertain: what commands between samples leave uncertain.
-        chance: whether nothing that is measured predicts the force that is left.
-    """
-    law = result.estimate.law
-    small = chance and negligible(asked, state, law, uncertain)
-    table = state.table
-    for explanation in result.tried:
-        table = fill_candidate(asked.layout, table, explanation, over.first)
-    share = share_left(result)
-    named = [] if withheld(asked, state, result, chance=chance) else list(result.steps)
-    tried = [e for s in result.steps for e in s["effects"]]
-    end: SearchStep = {
-        "verdict": "adequate" if small else "unknown",
-        "effects": [],
-        "p_value": state.p_value,
-    }
-    # What is left beside the names is stochastic, and reported as such; or it has no name, and is unknown.
-    steps = [*named, end] if small or not (chance and named) else named
-    before = [e for s in state.steps for e in s["effects"]]
-    return (over if named else state).but(
-        current=result.last if named else state.first,
-        chosen=result.last.effects if named else (),
-        groups=tuple(tuple(group) for group in result.groups) if named else (),
-        withdrawn=(),
-        steps=tuple(steps),
-        table=table,
-        left=None if named or small else state.left,
-        traced=None,
-        remainder=sized_by_law(state.remainder, law if named else result.first_law, over.windows),
-        negligible=small,
-        nearest=() if named else tuple(dict.fromkeys([*tried, *state.nearest, *before])),
-        partial=False,
-        refuted=None,
-        unexplained=share if named else state.unexplained,
-    )
 
 
 def _words(predicted: InputPrediction) -> str:

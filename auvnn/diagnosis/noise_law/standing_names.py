@@ -1,6 +1,13 @@
-"""Names that leave so little that a stochastic force cannot refute them: they stand, and what is left is estimated."""
+"""Names that leave so little that a stochastic force cannot refute them: they stand, and what is left is estimated.
+
+Unless the log can do without one of them. Under a controller commands answer the force that is left, and a fit of output
+errors then takes a mass that is too large for what resists the commands: a name without which the log is as likely under
+the law of the force, everything else fitted again, has taken up the force. Then names are sought beside it anew.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 from auvnn.diagnosis.hypotheses.measured_start import above_noise
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench
@@ -10,6 +17,7 @@ from auvnn.diagnosis.noise_law.noise_colour import Colour
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.diagnosis.noise_law.split_windows import fitted_over_parts
+from auvnn.diagnosis.noise_law.withheld import state_with
 from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.metrics.force_law import ForceLaw
@@ -36,9 +44,15 @@ def stand(state: State, colour: Colour) -> bool:
     return after < LITTLE and after < MOST_LEFT * before
 
 
+Answer = tuple[State, ForceLaw | None, InputPrediction | None] | None
+
+
 def beside_names(
-    asked: Setting, state: State, uncertain: UncertainWrench
-) -> tuple[State, ForceLaw | None, InputPrediction | None] | None:
+    asked: Setting,
+    state: State,
+    uncertain: UncertainWrench,
+    anew: Callable[[Setting, State, UncertainWrench], Answer],
+) -> Answer:
     """Return the state with its names and what is left beside them, the law of that, and what inputs predict of it.
 
     None where there is no such force.
@@ -47,6 +61,7 @@ def beside_names(
         asked: what is asked.
         state: where the first search ended.
         uncertain: what commands between samples leave uncertain.
+        anew: seeks names beside the force; asked where the log can do without any of those that there are.
     """
     if not leaves_force(asked, state, state.current):
         return None
@@ -55,6 +70,14 @@ def beside_names(
     found = beside.begin(end, white(end, asked.floor), 0)
     if found is None:
         return None
+    first, _ = fitted_over_parts(asked, state.first, state.windows)
+    result = beside.from_names(found, first, state, asked.most)
+    if result is not None:
+        if not result.steps:
+            return anew(asked, state, uncertain)
+        over, chance = state.but(first=first, windows=windows), result.predicted is None
+        ended = state_with(asked, state, over, result, uncertain, chance=chance)
+        return ended, result.estimate.law, result.predicted
     predicted = beside.predicted(found)
     law = in_newtons(found.estimate.law, found.explanation)
     small = predicted is None and negligible(asked, state, law, uncertain)

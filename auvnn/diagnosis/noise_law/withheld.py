@@ -1,11 +1,14 @@
-"""Whether names that were found beside a stochastic force are given, by what they leave of it."""
+"""Whether names that were found beside a stochastic force are given, by what they leave of it; and the state then."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from auvnn.answer_types import SearchStep
+from auvnn.diagnosis.answers.table import fill_candidate
+from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench
 from auvnn.diagnosis.noise_law.hypothesis import WithForce, shares_left
-from auvnn.diagnosis.noise_law.left_force import exceeds_actuators
+from auvnn.diagnosis.noise_law.left_force import exceeds_actuators, negligible, sized_by_law
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.metrics.force_law import ForceLaw
 
@@ -75,3 +78,56 @@ def share_left(result: WithForce) -> float:
         return 0.0
     left = shares_left(result.estimate.law, result.first_law)
     return float(np.clip(left.mean(), 0.0, 1.0))
+
+
+def state_with(
+    asked: Setting,
+    state: State,
+    over: State,
+    result: WithForce,
+    uncertain: UncertainWrench,
+    *,
+    chance: bool,
+) -> State:
+    """Return the state with what was found together with the force in the place of what the first search found.
+
+    Args:
+        asked: what is asked.
+        state: where the first search ended.
+        over: the same with the windows over which the force was sought, and the fit without a name over these.
+        result: what was found.
+        uncertain: what commands between samples leave uncertain.
+        chance: whether nothing that is measured predicts the force that is left.
+    """
+    law = result.estimate.law
+    small = chance and negligible(asked, state, law, uncertain)
+    table = state.table
+    for explanation in result.tried:
+        table = fill_candidate(asked.layout, table, explanation, over.first)
+    share = share_left(result)
+    named = [] if withheld(asked, state, result, chance=chance) else list(result.steps)
+    tried = [e for s in result.steps for e in s["effects"]]
+    end: SearchStep = {
+        "verdict": "adequate" if small else "unknown",
+        "effects": [],
+        "p_value": state.p_value,
+    }
+    # What is left beside the names is stochastic, and reported as such; or it has no name, and is unknown.
+    steps = [*named, end] if small or not (chance and named) else named
+    before = [e for s in state.steps for e in s["effects"]]
+    return (over if named else state).but(
+        current=result.last if named else state.first,
+        chosen=result.last.effects if named else (),
+        groups=tuple(tuple(group) for group in result.groups) if named else (),
+        withdrawn=(),
+        steps=tuple(steps),
+        table=table,
+        left=None if named or small else state.left,
+        traced=None,
+        remainder=sized_by_law(state.remainder, law if named else result.first_law, over.windows),
+        negligible=small,
+        nearest=() if named else tuple(dict.fromkeys([*tried, *state.nearest, *before])),
+        partial=False,
+        refuted=None,
+        unexplained=share if named else state.unexplained,
+    )

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis.noise_law import search as module
+from auvnn.diagnosis.noise_law.rounds import name_after_name
 from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import Branch, decided, shared, worth_following
 from auvnn.diagnosis.noise_law.search import ForceSearch
@@ -229,9 +230,9 @@ def scripted(
     asked._tested = lambda *_: SimpleNamespace(p_value=0.0)
     asked._settled = lambda h: h
     asked._takes_up = lambda *_: False
-    asked._fits = lambda: SimpleNamespace(told=lambda e: diverging(e))
-    asked._about = lambda *_: None
-    asked.predicted = lambda _: None
+    asked.fits = lambda: SimpleNamespace(told=lambda e: diverging(e))
+    asked.about = lambda *_: None
+    asked.predicted, asked.in_closed_loop, asked.say = lambda _: None, False, lambda _: None
     asked.averaged_with = []
 
     def averaged(_: Any, current: Any, rivals: Any) -> Any:
@@ -239,10 +240,12 @@ def scripted(
         return current.explanation
 
     monkeypatch.setattr(module, "averaged", averaged)
-    monkeypatch.setattr(module, "tied", lambda _, good, before: good[:1])
+    monkeypatch.setattr(module, "no_longer_needed", lambda *_: None)
+    monkeypatch.setattr(module, "as_good_in_place", lambda *_: None)
+    monkeypatch.setattr(name_after_name, "tied", lambda _, good, before: good[:1])
     monkeypatch.setattr(module, "in_newtons", lambda law, _: law)
-    monkeypatch.setattr(module, "parameters_of", lambda model, chosen: chosen)
-    monkeypatch.setattr(module, "explains_an_axis", lambda after, _: after.name == "payload")
+    monkeypatch.setattr(name_after_name, "parameters_of", lambda model, chosen: chosen)
+    monkeypatch.setattr(name_after_name, "explains_an_axis", lambda after, _: after.name == "payload")
     return asked, rounds
 
 
@@ -313,6 +316,112 @@ def test_an_explanation_whose_free_running_diverges_costs_no_answer():
         return explanation
 
     asked: Any = ForceSearch.__new__(ForceSearch)
-    asked._fits = lambda: SimpleNamespace(told=told)
+    asked.fits = lambda: SimpleNamespace(told=told)
     kept = asked._told([found(3.0, "tether"), found(2.0, "waves"), found(1.0, "payload")])
     assert [e.effects for e in kept] == [("tether",), ("payload",)]
+
+
+def test_a_name_that_later_ones_make_needless_goes_and_the_search_goes_on(monkeypatch):
+    further = {
+        (): [found(10.0, "payload")],
+        ("payload",): [found(500.0, "payload", "thrust_asymmetry")],
+        ("payload", "thrust_asymmetry"): [],
+        ("thrust_asymmetry",): [found(900.0, "thrust_asymmetry", "waves")],
+        ("thrust_asymmetry", "waves"): [],
+    }
+    asked, rounds = scripted(monkeypatch, further)
+    asked_of: list[tuple[Any, ...]] = []
+
+    def needless(names: Any, current: Any, refit: Any) -> Any:
+        asked_of.append((tuple(names), current.explanation.effects))
+        return ("payload", found(499.0, "thrust_asymmetry")) if "payload" in names else None
+
+    monkeypatch.setattr(module, "no_longer_needed", needless)
+    tested: list[list[str]] = []
+    asked._tested = lambda current, remaining, *_: tested.append(remaining) or SimpleNamespace(p_value=0.0)
+    ended = asked.run(found(-1000.0), [], 2)
+    assert [s["effects"] for s in ended.steps] == [["thrust_asymmetry"], ["waves"]]
+    assert ended.last.effects == ("thrust_asymmetry", "waves")
+    # The name that came last was sought beside the others: the earlier ones are asked for.
+    assert asked_of == [
+        (("payload",), ("payload", "thrust_asymmetry")),
+        (("thrust_asymmetry",), ("thrust_asymmetry", "waves")),
+    ]
+    # It does not come back, and what was known of the first name is not known of the next one.
+    assert [at.chosen for at in rounds[-2:]] == [["payload"], ["thrust_asymmetry"]]
+    assert tested[-1] == ["trapped_water", "waves"] and not ended.explains
+
+
+@pytest.mark.parametrize("lost", [True, False])
+def test_a_tie_is_decided_beside_all_names(monkeypatch, lost):
+    further = {
+        (): [found(10.0, "payload"), found(9.0, "trapped_water")],
+        ("payload",): [found(500.0, "payload", "waves")],
+        ("trapped_water",): [],
+        ("payload", "waves"): [],
+    }
+    asked, _ = scripted(monkeypatch, further)
+    scores = {
+        "thrust_asymmetry": SimpleNamespace(evidence=30.0, degrees=1),
+        "x": SimpleNamespace(evidence=90.0, degrees=0),
+    }
+    asked._tested = lambda *_: SimpleNamespace(p_value=0.0, scores=scores)
+    monkeypatch.setattr(name_after_name, "tied", lambda _, good, before: good)
+    monkeypatch.setattr(name_after_name, "decided", lambda good, *_: good)
+    given: list[Any] = []
+
+    def those(groups: Any, current: Any, refit: Any, rest: float) -> set[tuple[str, str]]:
+        given.append(([[e.effects for e in g] for g in groups], current.explanation.effects, rest))
+        return {("payload", "trapped_water")} if lost else set()
+
+    monkeypatch.setattr(module, "those_that_lose", those)
+    ended = asked.run(found(-1000.0), [], 4)
+    # What the best further effect promises, of those of which the log says anything.
+    assert given == [([[("payload",), ("trapped_water",)]], ("payload", "waves"), 30.0)]
+    first = ended.steps[0]
+    assert (first["verdict"], first["effects"]) == (
+        ("named", ["payload"]) if lost else ("ambiguous", ["payload", "trapped_water"])
+    )
+    assert len(ended.groups) == (0 if lost else 1)
+
+
+@pytest.mark.parametrize(
+    ("evidence", "expected"),
+    [
+        (560.0, [["net_buoyancy"], ["thrust_asymmetry"], ["waves"]]),
+        (502.0, [["net_buoyancy", "payload"], ["thrust_asymmetry"], ["waves"]]),
+        (499.0, [["payload", "net_buoyancy"], ["thrust_asymmetry"]]),
+    ],
+)
+def test_a_rival_that_does_better_beside_all_names_takes_the_place(monkeypatch, evidence, expected):
+    further = {
+        (): [found(10.0, "payload"), found(-400.0, "net_buoyancy"), found(-900.0, "waves")],
+        ("payload",): [found(500.0, "payload", "thrust_asymmetry")],
+        ("payload", "thrust_asymmetry"): [],
+        ("net_buoyancy", "thrust_asymmetry"): [found(900.0, "thrust_asymmetry", "net_buoyancy", "waves")],
+        ("net_buoyancy", "thrust_asymmetry", "waves"): [],
+    }
+    asked, _ = scripted(monkeypatch, further)
+    asked.usable.append("net_buoyancy")
+    asked._tested = lambda *_: SimpleNamespace(p_value=0.0, scores={})
+    monkeypatch.setattr(module, "those_that_lose", lambda *_: set())
+    monkeypatch.setattr(
+        module, "rivals_among", lambda known, null: {"payload": [h.explanation for h in known]}
+    )
+    given: list[Any] = []
+
+    def as_good(names: Any, current: Any, rivals: Any, refit: Any) -> Any:
+        able = [e.effects[-1] for e in rivals["payload"]]
+        given.append((names, current.explanation.effects, able))
+        if "payload" not in names or len(given) > 1:
+            return None
+        return "payload", found(evidence, "thrust_asymmetry", "net_buoyancy")
+
+    monkeypatch.setattr(module, "as_good_in_place", as_good)
+    ended = asked.run(found(-1000.0), [], 4)
+    assert [s["effects"] for s in ended.steps] == expected
+    first = (["payload"], ("payload", "thrust_asymmetry"), ["payload", "net_buoyancy", "waves"])
+    assert given[0] == first and len(given) == (1 if evidence < 500.0 else 2)
+    # What has given its place, and what is tied, is not asked for again.
+    if evidence > 500.0:
+        assert given[1][0] == ["net_buoyancy", "thrust_asymmetry"] and "payload" not in given[1][2]

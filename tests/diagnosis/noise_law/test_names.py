@@ -10,7 +10,7 @@ import pytest
 
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.answers.tolerance import Tolerance
-from auvnn.diagnosis.noise_law import search
+from auvnn.diagnosis.noise_law import under_law
 from auvnn.diagnosis.noise_law.hypothesis import explains_an_axis, predicts_better, shares_left, tied
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.rounds import names_given
@@ -278,10 +278,10 @@ def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_ends_the_se
 ):
     told = None if predicted is None else InputPrediction("X", "u", 0.5, predicted)
     asked = ForceSearch.__new__(ForceSearch)
-    asked.names = given(in_closed_loop=True)
-    monkeypatch.setattr(search, "predicted_by_inputs", lambda *_, **__: told)
+    asked.in_closed_loop = True
+    monkeypatch.setattr(under_law, "predicted_by_inputs", lambda *_, **__: told)
     monkeypatch.setattr(asked, "say", lambda _: None, raising=False)
-    monkeypatch.setattr(asked, "_about", lambda _: None)
+    monkeypatch.setattr(asked, "about", lambda _: None)
     monkeypatch.setattr(asked, "_sums", lambda _: None)
     found = SimpleNamespace(
         estimate=SimpleNamespace(law=object()), weighed=None, name=further, explanation=None

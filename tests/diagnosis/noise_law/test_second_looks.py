@@ -12,7 +12,7 @@ import pytest
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.noise_law import search
+from auvnn.diagnosis.noise_law import search, under_law
 from auvnn.diagnosis.noise_law.rounds import leader_fits
 from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round
 from auvnn.diagnosis.residuals.variance_component_test import white
@@ -170,16 +170,16 @@ def test_whether_commands_answer_is_asked_about_the_filtered_trajectories(monkey
     asked: Any = SimpleNamespace(
         layout=layout, tolerance=None, usable=(), base=layout.names, say=lambda _: None, log=log
     )
-    monkeypatch.setattr(search, "in_closed_loop", lambda end, _: about.append(end.around) or True)
+    monkeypatch.setattr(under_law, "in_closed_loop", lambda end, _: about.append(end.around) or True)
     beside = search.ForceSearch(asked, windows)
     null = beside.begin(first, white(first, np.full(18, 1e-9)))
-    assert null is not None and beside.names.in_closed_loop
+    assert null is not None and beside.in_closed_loop
     assert len(about) == 1 and about[0] is not None and about[0] is null.explanation.around
     # Of commands as they were read it was known before: what other laws make of them answers less.
-    monkeypatch.setattr(search, "in_closed_loop", lambda end, _: False)
+    monkeypatch.setattr(under_law, "in_closed_loop", lambda end, _: False)
     for known in (True, False):
         beside = search.ForceSearch(asked, windows, closed_loop=known)
         assert beside.begin(first, white(first, np.full(18, 1e-9)), 0) is not None
-        assert beside.names.in_closed_loop is known
+        assert beside.in_closed_loop is known
     coloured = replace(windows, noise=NoiseColour(np.full(18, 0.3)))
     assert beside.names.white_noise and not search.ForceSearch(asked, coloured).names.white_noise

@@ -11,7 +11,7 @@ import pytest
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.noise_law import answer, standing_names
 from auvnn.diagnosis.noise_law.noise_colour import Colour
-from auvnn.diagnosis.noise_law.standing_names import stand
+from auvnn.diagnosis.noise_law.standing_names import beside_names, stand
 from auvnn.models import GreyBox
 from tests.diagnosis.noise_law.wandering import wandering_log
 from tests.small_logs import small_vehicle
@@ -71,3 +71,50 @@ def test_names_that_stand_keep_their_values_and_the_force_beside_them_is_told(mo
     assert [found.stochastic["force"][axis]["rms"] for axis in "XYZ"] == pytest.approx(law.rms[:3])
     for axis in "XYZ":
         assert found.stochastic["force"][axis]["rms"] == pytest.approx(4.0, rel=0.3)
+
+
+@pytest.mark.parametrize("left", [None, ["tilted_vertical"], []])
+def test_names_stand_only_where_the_log_needs_each_of_them_beside_the_force(monkeypatch, left):
+    asked: Any = SimpleNamespace(floor=None, most=4)
+    end, first = SimpleNamespace(effects=("added_mass", "tilted_vertical")), SimpleNamespace(effects=())
+    state: Any = SimpleNamespace(current=end, first=first, windows="windows", but=lambda **changes: changes)
+    found = SimpleNamespace(name="found")
+    result = SimpleNamespace(steps=left, estimate=SimpleNamespace(law="law"), predicted="an input")
+
+    class Under:
+        def __init__(self, asked: Any, windows: Any, *, closed_loop: bool) -> None:
+            assert closed_loop and windows == "parts"
+
+        def begin(self, *_: Any) -> Any:
+            return found
+
+        def from_names(self, named: Any, without: Any, before: Any, most: int) -> Any:
+            assert named is found and without is first and before is state and most == 4
+            return None if left is None else result
+
+        def predicted(self, _: Any) -> Any:
+            raise RuntimeError("the names stand")
+
+    def ended(_: Any, before: Any, over: Any, what: Any, uncertain: Any, *, chance: bool) -> Any:
+        assert before is state and over == {"first": first, "windows": "parts"}
+        assert what is result and not chance
+        return "with other names"
+
+    monkeypatch.setattr(standing_names, "ForceSearch", Under)
+    monkeypatch.setattr(standing_names, "leaves_force", lambda *_: True)
+    monkeypatch.setattr(standing_names, "fitted_over_parts", lambda asked, fit, windows: (fit, "parts"))
+    monkeypatch.setattr(standing_names, "white", lambda *_: None)
+    monkeypatch.setattr(standing_names, "state_with", ended)
+    uncertain: Any = SimpleNamespace(closed_loop=True)
+
+    def ask() -> Any:
+        return beside_names(asked, state, uncertain, lambda *also: also)  # type: ignore[arg-type,return-value]
+
+    if left is None:
+        with pytest.raises(RuntimeError, match="stand"):
+            ask()
+    elif left:
+        assert ask() == ("with other names", "law", "an input")
+    else:
+        # None of the names is needed: names are sought beside the force as if there had been none.
+        assert ask() == (asked, state, uncertain)

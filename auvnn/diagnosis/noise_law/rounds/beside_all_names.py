@@ -1,0 +1,192 @@
+"""Names compared again beside all that were found after them: is each still needed, and do its rivals still do as well?
+
+When a name is sought, causes that are found later are still in the force that is left, and the law of that force is no
+more than near the truth. A name may have taken up what a later one explains, and effects that are confused with the best
+are kept although they explain less. Beside all names the force has what is left of it: a name without which the log is as
+likely, everything else refitted, is needed no longer; and a rival that is refitted in the place of the one that leads
+loses where it falls short by more than any further effect would still gain, for that is how far the model is known to be
+wrong.
+
+Reference: Miller (2002), Subset Selection in Regression, 2nd ed., section 3.3 (backward elimination); Burnham and
+Anderson (2002), Model Selection and Multimodel Inference, 2nd ed., chapter 2 (whole models are compared, not terms).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from contextlib import suppress
+
+from auvnn.answer_types import SearchStep
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
+from auvnn.diagnosis.noise_law.hypothesis import Hypothesis, predicts_better
+from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
+from auvnn.diagnosis.noise_law.rounds.leaders import RIVALS
+from auvnn.diagnosis.noise_law.rounds.looking_ahead import RIVALS_SHARE
+from auvnn.diagnosis.selection.model_comparison import ODDS, confused
+from auvnn.estimation.priors import parameters_of, set_parameters
+
+# Standard errors by which runs left out must be predicted better with the name that leads.
+SURE = 3.0
+# From the name of the one that leads, and a rival in its place or none, to all names fitted so.
+Refit = Callable[[str, FittedHypothesis | None], Hypothesis | None]
+# Of each effect what might take its place.
+Rivals = Mapping[str, Sequence[FittedHypothesis]]
+
+
+def refitted(
+    layout: Layout,
+    fits: LawFits,
+    current: Hypothesis,
+    base: Sequence[str],
+    name: str,
+    rival: FittedHypothesis | None,
+) -> Hypothesis | None:
+    """Return the names that were found without one of them, everything else fitted; None where that fails.
+
+    Args:
+        layout: stated values.
+        fits: under laws of the force.
+        current: with the names that were found.
+        base: effects that are free whatever is chosen.
+        name: that is left out.
+        rival: an effect that takes its place, as it was fitted when the two could not be told apart; None for none.
+    """
+    fitted = current.explanation.fitted
+    model = fitted.model.rebuilt(fitted.model.copied_effects())
+    set_parameters(model, [name], parameters_of(layout.model, [name]))
+    effects = [e for e in current.explanation.effects if e != name]
+    if rival is not None:
+        effects.append(rival.effects[-1])
+        set_parameters(model, effects[-1:], parameters_of(rival.fitted.model, effects[-1:]))
+    with suppress(*UNSOLVED):
+        return fits.from_null(layout, model, current, list(base), effects)
+    return None
+
+
+def no_longer_needed(
+    names: Iterable[str], current: Hypothesis, refit: Refit
+) -> tuple[str, Hypothesis] | None:
+    """Return the name that the log needs least, and the explanation without it; None where it needs all.
+
+    Args:
+        names: that are asked for.
+        current: with all names.
+        refit: fits all names but one.
+    """
+    without = [(name, refit(name, None)) for name in names]
+    spare = [(n, h) for n, h in without if h is not None and current.evidence - h.evidence < ODDS]
+    return max(spare, key=lambda found: found[1].evidence, default=None)
+
+
+def rivals_among(known: Sequence[Hypothesis], null: Hypothesis) -> Rivals:
+    """Return what might take the place of each of some effects, as it was fitted.
+
+    Rivals are effects that the catalogue knows to be confused with one, and that gained half as much as it, or more, when
+    the first name was sought; two of each.
+
+    Args:
+        known: what was fitted then, the most evident first.
+        null: without any name.
+    """
+    gains = {h.name: h.evidence - null.evidence for h in known}
+    out = {}
+    for name, gain in gains.items():
+        able = [
+            h.explanation for h in known if gains[h.name] >= RIVALS_SHARE * gain and confused(h.name, name)
+        ]
+        out[name] = able[:RIVALS]
+    return out
+
+
+def rivals_tried(names: Iterable[str], tried: Iterable[FittedHypothesis]) -> Rivals:
+    """Return what might take the place of each of some effects, of fits without the force, two of each.
+
+    Args:
+        names: of the effects.
+        tried: explanations, perhaps with several effects, of which the last counts.
+    """
+    least: dict[str, FittedHypothesis] = {}
+    for e in tried:
+        if e.effects and (e.effects[-1] not in least or e.fitted.cost < least[e.effects[-1]].fitted.cost):
+            least[e.effects[-1]] = e
+    order = sorted(least.values(), key=lambda e: e.fitted.cost)
+    return {name: [e for e in order if confused(e.effects[-1], name)][:RIVALS] for name in names}
+
+
+def as_good_in_place(
+    names: Iterable[str], current: Hypothesis, rivals: Rivals, refit: Refit
+) -> tuple[str, Hypothesis] | None:
+    """Return the best rival that does as well as a name in its place, everything else fitted again, and that name.
+
+    None where none does.
+
+    Args:
+        names: whose places are asked for.
+        current: with all names.
+        rivals: of each name.
+        refit: fits all names with a rival in the place of one.
+    """
+    found = []
+    for name in names:
+        for rival in rivals.get(name, ()):
+            other = None if rival.effects[-1] in current.explanation.effects else refit(name, rival)
+            if other is not None and current.evidence - other.evidence < ODDS:
+                found.append((name, other))
+    return max(found, key=lambda pair: pair[1].evidence, default=None)
+
+
+def loses(current: Hypothesis, rival: Hypothesis, rest: float) -> bool:
+    """Whether a rival explains less than the names that were found, by more than the model is known to be wrong.
+
+    Args:
+        current: with the names that were found.
+        rival: with the rival in the place of one of them.
+        rest: what the best further effect gains beside the names, in the logarithm of the odds.
+    """
+    return current.evidence - rival.evidence > max(ODDS, rest) and predicts_better(
+        current, rival, SURE, ranks=False
+    )
+
+
+def those_that_lose(
+    groups: Sequence[Sequence[FittedHypothesis]], current: Hypothesis, refit: Refit, rest: float
+) -> set[tuple[str, str]]:
+    """Return the rivals that lose, each as the name of the one that leads and its own.
+
+    Args:
+        groups: explanations that could not be told apart, the one that leads first.
+        current: with the names that were found.
+        refit: fits all names with a rival in the place of one.
+        rest: what the best further effect gains beside the names, in the logarithm of the odds.
+    """
+    lost = set()
+    for lead, *rivals in groups:
+        for rival in rivals:
+            other = refit(lead.effects[-1], rival)
+            if other is not None and loses(current, other, rest):
+                lost.add((lead.effects[-1], rival.effects[-1]))
+    return lost
+
+
+def without_lost(
+    steps: Sequence[SearchStep], groups: Sequence[Sequence[FittedHypothesis]], lost: Set[tuple[str, str]]
+) -> tuple[list[SearchStep], list[list[FittedHypothesis]]]:
+    """Return steps and groups without the rivals that have lost; a name that is left alone makes no group.
+
+    Args:
+        steps: of the search.
+        groups: explanations that could not be told apart, the one that leads first.
+        lost: name of the one that leads, and of its rival.
+    """
+    kept: list[list[FittedHypothesis]] = []
+    for group in groups:
+        lead = group[0].effects[-1]
+        left = [e for e in group if (lead, e.effects[-1]) not in lost]
+        kept += [left] if len(left) > 1 else []
+    told: list[SearchStep] = []
+    for step in steps:
+        names = [n for n in step["effects"] if (step["effects"][0], n) not in lost]
+        alone = step["verdict"] == "ambiguous" and len(names) == 1
+        told.append({**step, "verdict": "named" if alone else step["verdict"], "effects": names})
+    return told, kept

@@ -1,0 +1,189 @@
+"""One name after the other, together with a stochastic force: rounds of tests, fits and comparisons."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.noise_law.hypothesis import (
+    GROUP,
+    Hypothesis,
+    explains_an_axis,
+    stands_out,
+    tied,
+)
+from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round, RoundResult
+from auvnn.diagnosis.noise_law.rounds.looking_ahead import Branch, decided, shared, worth_following
+from auvnn.diagnosis.noise_law.rounds.names_given import ALPHA_NAME, FIRST_COST, NamesGiven
+from auvnn.diagnosis.noise_law.rounds.path import Path
+from auvnn.diagnosis.noise_law.under_law import NULL_STEPS, UnderLaw
+from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
+from auvnn.diagnosis.selection.choose import ALPHA
+from auvnn.diagnosis.selection.model_comparison import ODDS, confused
+from auvnn.diagnosis.stages.state import Setting
+from auvnn.estimation.priors import parameters_of
+from auvnn.metrics.rollouts import scale_of
+from auvnn.metrics.windows import Windows
+
+Array = NDArray[np.float64]
+# Share of the gain of all names that a further one must bring.
+FURTHER_SHARE = 0.1
+
+
+class NameAfterName(UnderLaw):
+    """Rounds of a search together with a stochastic force, of one log.
+
+    Args:
+        asked: what is asked.
+        windows: of the log, without a law.
+        closed_loop: whether commands are known to answer the motion; else it is asked of the fit without any name.
+    """
+
+    def __init__(self, asked: Setting, windows: Windows, *, closed_loop: bool = False) -> None:
+        """Begin without a law."""
+        super().__init__(asked, windows, closed_loop=closed_loop)
+        self.usable = list(asked.usable)
+        self.names = NamesGiven(asked.layout, asked.log, scale_of(asked.log), asked.tolerance)
+        self.names.white_noise = windows.noise is None
+        self.looks_further = False
+        # What was asked at an explanation, for a second search that passes there: its tests, and where it went with a law
+        # of its own.
+        self._tests: dict[int, Tested] = {}
+        self._gone_on: dict[int, tuple[Hypothesis, Hypothesis]] = {}
+        self._leaders: LeaderFits | None = None
+        # Values of effects that were fitted when nothing was chosen.
+        self._earlier: dict[str, Array] = {}
+
+    def begin(self, first: FittedHypothesis, sigma: Array, steps: int = NULL_STEPS) -> Hypothesis | None:
+        """Return an explanation under the law of the force; None where no variance is above zero.
+
+        Args:
+            first: the fit without any effect, beside which names are sought; or one with names that stand.
+            sigma: (18,) the sensors' white noise.
+            steps: of its fit under the law; with none its parameters stay.
+        """
+        null = super().begin(first, sigma, steps)
+        self.names.in_closed_loop = self.in_closed_loop
+        return null
+
+    def names_after(
+        self, path: Path, null: Hypothesis, fitted: Sequence[FittedHypothesis], most: int
+    ) -> tuple[list[Hypothesis], float]:
+        """Go on with one name after the other; return what was tried at first, and the p-value of there being nothing."""
+        tried, whole = list[Hypothesis](), 1.0
+        while len(path.chosen) < most:
+            passed = [*path.dropped, *[e.effects[-1] for g in path.groups for e in g]]
+            result = self._round(null, path.current, path.chosen, passed, fitted)
+            if result is None:
+                break
+            if not path.chosen:
+                tried, whole = (
+                    result.found,
+                    min([result.at.tested.p_value, *result.sure.values()], default=1.0),
+                )
+            good = result.good
+            if not good or (path.chosen and self._takes_up(good[0], path.chosen)):
+                path.rivals = result.found if path.chosen else []
+                break
+            if not path.chosen and most > 1:
+                good = self._looking_ahead(null, good, fitted)
+            group = tied(self.layout, good, path.current)
+            if len(group) > GROUP:
+                break
+            names = [h.name for h in group]
+            verdict = "ambiguous" if len(group) > 1 else "named"
+            path.steps.append({"verdict": verdict, "effects": names, "p_value": result.sure[group[0].name]})
+            path.current = current = self._settled(group[0])
+            if not path.chosen:
+                ahead, explains = stands_out(group[0], result.found, null), explains_an_axis(current, null)
+                pays = (ahead or explains) and self.names.paying([group[0]], null, FIRST_COST)
+                path.stands_out, path.explains = bool(pays) and ahead, bool(pays) and explains
+            if len(group) > 1:
+                path.groups.append([current.explanation, *(h.explanation for h in group[1:])])
+            path.chosen.append(group[0].name)
+        return tried, whole
+
+    def rest(self, current: Hypothesis, chosen: Sequence[str]) -> float:
+        """Return what the best further effect promises beside names, in the logarithm of the odds."""
+        remaining = [n for n in self.usable if n not in chosen]
+        base = [*self.base, *[c for c in chosen if c not in self.base]]
+        scores = self._tested(current, remaining, base, list(chosen)).scores.values()
+        return max((s.evidence for s in scores if s.degrees), default=0.0)
+
+    def _round(
+        self,
+        null: Hypothesis,
+        current: Hypothesis,
+        chosen: Sequence[str],
+        passed: Sequence[str],
+        fitted: Sequence[FittedHypothesis],
+    ) -> RoundResult | None:
+        """Return what a round has found beside an explanation; None where nothing significant is left."""
+        remaining = [n for n in self.usable if n not in chosen and n not in passed]
+        if not remaining:
+            return None
+        base = [*self.base, *[c for c in chosen if c not in self.base]]
+        tests = self._tested(current, remaining, base, list(chosen))
+        # Beside what was found the variance is no longer inflated by it: the tests say whether to go on.
+        if chosen and tests.p_value >= ALPHA:
+            return None
+        share = 0.0 if self.looks_further else FURTHER_SHARE
+        odds = max(ODDS, share * (current.evidence - null.evidence))
+        at = Round(tests, current, base, list(chosen), self._earlier if chosen else {})
+        good_of = partial(self.names.good, at, len(remaining))
+        self._leaders = self._leaders or LeaderFits(self.layout, self.fits(), self.say)
+        found, good = self._leaders.fitted(at, fitted, odds, ALPHA_NAME, good_of)
+        if not chosen:
+            self._earlier = {h.name: parameters_of(h.explanation.fitted.model, [h.name]) for h in found}
+        sure = {h.name: self.names.sure(h, at, len(remaining)) for h in found}
+        return RoundResult(at, found, good, sure, len(remaining))
+
+    def _looking_ahead(
+        self, null: Hypothesis, good: list[Hypothesis], fitted: Sequence[FittedHypothesis]
+    ) -> list[Hypothesis]:
+        """Return the first names that may be given, the one to begin with first, see `looking_ahead`."""
+        branches: list[Branch] = []
+        for h in worth_following(good, null):
+            after = self._settled(h)
+            result = self._round(null, after, [h.name], [], fitted)
+            further = [] if result is None else self.names.likely(result.at, result.among, result.found, ODDS)
+            branches.append(Branch(h, after, further))
+            if not further and len(branches) == 1:
+                # Beside the first name nothing is left that another one could explain.
+                return good
+        assert self._leaders is not None
+        for branch, pair in shared(branches):
+            self._leaders.take(branch.after, pair)
+        return decided(good, branches, null)
+
+    def _settled(self, found: Hypothesis) -> Hypothesis:
+        """Return an explanation beside which further names are sought."""
+        if id(found) not in self._gone_on:
+            # Kept with what it came from: no other explanation can have its place then.
+            self._gone_on[id(found)] = found, self.fits().settled(found)
+        return self._gone_on[id(found)][1]
+
+    def _tested(
+        self, current: Hypothesis, remaining: list[str], base: list[str], chosen: list[str]
+    ) -> Tested:
+        """Return the tests of what remains beside an explanation."""
+        if id(current) not in self._tests:
+            self.say(f"testing {len(remaining)} effects together with the force")
+            windows = self.about(current.explanation, current.estimate.law)
+            tests = NullTests(self.layout, windows, self.say)
+            self._tests[id(current)] = tests(current.weighed, remaining, base, chosen)
+        return self._tests[id(current)]
+
+    def _takes_up(self, further: Hypothesis, chosen: Sequence[str]) -> bool:
+        """Whether a further effect only takes up what the shape of an earlier one gets wrong.
+
+        Where thrust ahead and astern follow curves of another shape, a mean force is left beside the asymmetry that is
+        named: an effect that the catalogue knows to be confused with an earlier one, and beside which measured inputs
+        still predict the force, is no further cause.
+        """
+        known = any(confused(further.name, name) for name in chosen)
+        return known and self.predicted(further) is not None

@@ -1,0 +1,106 @@
+"""Where a search together with a stochastic force has come."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from auvnn.answer_types import SearchStep
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
+
+
+@dataclass
+class Path:
+    """Where a search has come.
+
+    Attributes:
+        current: the explanation with what was found.
+        chosen: names found so far.
+        steps: of the search.
+        groups: explanations between which the log cannot decide.
+        dropped: names that later ones made needless.
+        rivals: explanations with one name more that were not named.
+        stands_out: see `WithForce`.
+        explains: see `WithForce`.
+    """
+
+    current: Hypothesis
+    chosen: list[str] = field(default_factory=list)
+    steps: list[SearchStep] = field(default_factory=list)
+    groups: list[list[FittedHypothesis]] = field(default_factory=list)
+    dropped: list[str] = field(default_factory=list)
+    rivals: list[Hypothesis] = field(default_factory=list)
+    stands_out: bool = False
+    explains: bool = False
+
+    @classmethod
+    def of_names(cls, named: Hypothesis, steps: Sequence[SearchStep]) -> Path:
+        """Return a path to names that another search has found, each a step.
+
+        Args:
+            named: the explanation with them.
+            steps: of that search.
+        """
+        names = list(named.explanation.effects)
+        p_values = {n: s["p_value"] for s in steps for n in s["effects"] if s["verdict"] != "withdrawn"}
+        told: list[SearchStep] = [
+            {"verdict": "named", "effects": [n], "p_value": p_values.get(n, 1.0)} for n in names
+        ]
+        return cls(named, names, told)
+
+    def without(self, name: str, current: Hypothesis) -> None:
+        """Go on without a name.
+
+        Args:
+            name: that is needed no longer.
+            current: the explanation without it.
+        """
+        if name == self.chosen[0]:
+            self.stands_out = self.explains = False
+        self.current, self.rivals = current, []
+        self.dropped.append(name)
+        self.chosen = [c for c in self.chosen if c != name]
+        self.steps = [s for s in self.steps if s["effects"][0] != name]
+        self.groups = [g for g in self.groups if g[0].effects[-1] != name]
+
+    def exchange(self, name: str, other: Hypothesis, *, tied: bool) -> None:
+        """Go on with a rival in the place of a name.
+
+        Args:
+            name: that gives its place.
+            other: the explanation with the rival, which came last, in its place.
+            tied: whether the log cannot tell the two apart.
+        """
+        before = replace(self.current.explanation, effects=_last(self.current, name))
+        self.groups = [g for g in self.groups if g[0].effects[-1] != name]
+        self.groups += [[other.explanation, before]] if tied else []
+        self._step(name, [other.name, name] if tied else [other.name])
+        self.chosen = [other.name if c == name else c for c in self.chosen]
+        self.dropped.append(name)
+        self.current, self.rivals = other, []
+
+    def tie(self, name: str, other: Hypothesis) -> None:
+        """Say of a rival that the log cannot tell it from a name.
+
+        Args:
+            name: that leads.
+            other: the explanation with the rival, which came last, in its place.
+        """
+        group = next((g for g in self.groups if g[0].effects[-1] == name), None)
+        if group is None:
+            group = [replace(self.current.explanation, effects=_last(self.current, name))]
+            self.groups.append(group)
+        group.append(other.explanation)
+        self._step(name, [e.effects[-1] for e in group])
+
+    def _step(self, name: str, names: list[str]) -> None:
+        """Put names in the place of those of the step that a name leads."""
+        at = next(k for k, s in enumerate(self.steps) if s["effects"][0] == name)
+        verdict = "ambiguous" if len(names) > 1 else "named"
+        self.steps[at] = {**self.steps[at], "verdict": verdict, "effects": names}
+
+
+def _last(current: Hypothesis, name: str) -> tuple[str, ...]:
+    """Return the effects of an explanation, one of them last."""
+    return (*[e for e in current.explanation.effects if e != name], name)

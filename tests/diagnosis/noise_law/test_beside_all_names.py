@@ -1,0 +1,363 @@
+"""Names compared again beside all that were found after them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
+from auvnn.diagnosis.noise_law.rounds import beside_all_names as module
+from auvnn.diagnosis.noise_law.rounds.beside_all_names import (
+    as_good_in_place,
+    loses,
+    no_longer_needed,
+    refitted,
+    rivals_among,
+    rivals_tried,
+    those_that_lose,
+    without_lost,
+)
+from auvnn.diagnosis.noise_law.rounds.path import Path
+from auvnn.diagnosis.noise_law.under_law import UnderLaw
+from auvnn.diagnosis.residuals.variance_component_test import white
+from auvnn.estimation.priors import parameters_of, set_parameters
+from auvnn.models import GreyBox
+from tests.diagnosis.noise_law.wandering import wandering_log
+from tests.small_logs import small_vehicle
+
+
+def worth(evidence: float) -> Any:
+    return SimpleNamespace(evidence=evidence)
+
+
+def explanation(*effects: str) -> Any:
+    return SimpleNamespace(effects=effects)
+
+
+def test_the_name_that_the_log_needs_least_goes():
+    without = {"added_mass": 6.1, "cg_offset": 2.6, "tilted_vertical": -117.6, "payload": None}
+    refit: Any = lambda name, rival: None if without[name] is None else worth(without[name])  # noqa: E731
+    name, rest = no_longer_needed(without, worth(0.0), refit)  # type: ignore[misc,arg-type]
+    assert name == "added_mass" and rest.evidence == 6.1
+    # The log is 4.6 likelier with a name that is needed, in the logarithm: a hundred to one.
+    for evidence, needed in ((-4.7, True), (-4.5, False)):
+        without = {"payload": evidence}
+        assert (no_longer_needed(without, worth(0.0), refit) is None) is needed  # type: ignore[arg-type]
+    assert no_longer_needed([], worth(0.0), refit) is None  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("short", "rest", "predicted", "expected"),
+    [
+        (12.0, 3.0, True, True),
+        # As likely as the leader but for a factor of ninety, and less short than another effect would still gain.
+        (4.5, 0.0, True, False),
+        (12.0, 13.0, True, False),
+        (12.0, 3.0, False, False),
+    ],
+)
+def test_a_rival_loses_by_more_than_the_model_is_known_to_be_wrong(
+    monkeypatch, short, rest, predicted, expected
+):
+    asked: list[Any] = []
+
+    def better(after, before, least, *, ranks):
+        asked.append((after.evidence, before.evidence, least, ranks))
+        return predicted
+
+    monkeypatch.setattr(module, "predicts_better", better)
+    assert loses(worth(short), worth(0.0), rest) is expected
+    assert all(given == (short, 0.0, 3.0, False) for given in asked)
+
+
+def test_each_rival_is_fitted_in_the_place_of_the_one_that_leads(monkeypatch):
+    monkeypatch.setattr(
+        module, "loses", lambda current, rival, rest: current.evidence - rival.evidence > rest
+    )
+    current, shear, scale = (
+        explanation("ocean_current"),
+        explanation("current_shear"),
+        explanation("velocity_scale"),
+    )
+    groups = [
+        [current, shear, scale],
+        [explanation("payload", "thruster_lag"), explanation("payload", "waves")],
+    ]
+    fits = {"current_shear": -900.0, "velocity_scale": -3.0}
+    asked = []
+
+    def refit(name, rival):
+        asked.append((name, rival.effects[-1]))
+        return worth(fits[rival.effects[-1]]) if rival.effects[-1] in fits else None
+
+    lost = those_that_lose(groups, worth(0.0), refit, 100.0)  # type: ignore[arg-type]
+    # One that cannot be fitted has not lost.
+    assert lost == {("ocean_current", "current_shear")}
+    assert asked == [
+        ("ocean_current", "current_shear"),
+        ("ocean_current", "velocity_scale"),
+        ("thruster_lag", "waves"),
+    ]
+    steps: Any = [
+        {
+            "verdict": "ambiguous",
+            "effects": ["ocean_current", "current_shear", "velocity_scale"],
+            "p_value": 0.0,
+        },
+        {"verdict": "named", "effects": ["current_shear"], "p_value": 0.1},
+        {"verdict": "ambiguous", "effects": ["thruster_lag", "waves"], "p_value": 0.2},
+    ]
+    told, kept = without_lost(steps, groups, lost)
+    assert [s["effects"] for s in told] == [
+        ["ocean_current", "velocity_scale"],
+        ["current_shear"],
+        ["thruster_lag", "waves"],
+    ]
+    assert [s["verdict"] for s in told] == ["ambiguous", "named", "ambiguous"]
+    assert kept == [[current, scale], groups[1]]
+    # A name whose rivals have all lost is given alone.
+    told, kept = without_lost(steps, groups, lost | {("ocean_current", "velocity_scale")})
+    assert (
+        told[0] == {"verdict": "named", "effects": ["ocean_current"], "p_value": 0.0} and kept == groups[1:]
+    )
+
+
+def test_a_path_goes_on_without_a_name():
+    first, second = explanation("payload"), explanation("payload", "waves")
+    path = Path(
+        worth(0.0),
+        ["payload", "waves", "tether"],
+        [
+            {"verdict": "ambiguous", "effects": ["payload", "trapped_water"], "p_value": 0.0},
+            {"verdict": "ambiguous", "effects": ["waves", "gyro_bias"], "p_value": 0.0},
+            {"verdict": "named", "effects": ["tether"], "p_value": 0.0},
+        ],
+        [[first, explanation("trapped_water")], [second, explanation("payload", "gyro_bias")]],
+        [],
+        [worth(1.0)],
+        True,
+        True,
+    )
+    path.without("waves", worth(7.0))
+    assert path.chosen == ["payload", "tether"] and path.current.evidence == 7.0 and path.rivals == []
+    assert [s["effects"] for s in path.steps] == [["payload", "trapped_water"], ["tether"]]
+    assert path.groups == [[first, path.groups[0][1]]] and path.stands_out and path.explains
+    # What was known of the first name goes with it.
+    path.without("payload", worth(8.0))
+    assert path.chosen == ["tether"] and path.dropped == ["waves", "payload"] and path.groups == []
+    assert not path.stands_out and not path.explains
+
+
+def fit(evidence: float, *effects: str) -> Any:
+    return SimpleNamespace(evidence=evidence, name=effects[-1], explanation=explanation(*effects))
+
+
+NULL = fit(-1000.0, "")
+KNOWN = [
+    fit(0.0, "tether"),
+    # Not known to be confused with a cable.
+    fit(-10.0, "gyro_bias"),
+    fit(-400.0, "constant_force"),
+    fit(-499.0, "net_buoyancy"),
+    # Gains less than half of what the cable does.
+    fit(-501.0, "ocean_current"),
+]
+
+
+def effects(rivals: Any) -> dict[str, list[str]]:
+    return {name: [e.effects[-1] for e in of] for name, of in rivals.items()}
+
+
+def test_rivals_are_confused_with_a_name_and_gained_half_as_much():
+    told = effects(rivals_among(KNOWN, NULL))
+    assert told["tether"] == ["constant_force", "net_buoyancy"]
+    assert told["net_buoyancy"] == ["tether", "constant_force"] and told["ocean_current"][0] == "tether"
+    assert rivals_among([], NULL) == {}
+
+
+def test_rivals_among_fits_without_the_force_are_the_two_that_leave_least():
+    def tried(cost: float, *names: str) -> Any:
+        return SimpleNamespace(effects=names, fitted=SimpleNamespace(cost=cost))
+
+    fits = [
+        tried(9.0),
+        tried(7.0, "net_buoyancy"),
+        tried(8.0, "constant_force"),
+        tried(6.0, "ocean_current"),
+        tried(5.0, "waves"),
+        tried(4.0, "payload", "constant_force"),
+        tried(1.0, "constant_force", "waves"),
+    ]
+    told = rivals_tried(["tether", "waves"], fits)
+    assert effects(told)["tether"] == ["constant_force", "ocean_current"]
+    assert told["tether"][0].fitted.cost == 4.0 and "tether" not in effects(told)["waves"]
+
+
+@pytest.mark.parametrize(
+    ("evidences", "expected"),
+    [
+        ({"net_buoyancy": 30.0, "constant_force": 20.0}, ("tether", "net_buoyancy")),
+        ({"net_buoyancy": 30.0, "constant_force": 40.0}, ("tether", "constant_force")),
+        ({"net_buoyancy": -4.5, "constant_force": -20.0}, ("tether", "net_buoyancy")),
+        ({"net_buoyancy": -4.7, "constant_force": None}, None),
+    ],
+)
+def test_a_plainer_cause_may_take_the_place_of_a_name_once_others_are_found(evidences, expected):
+    asked = []
+
+    def refit(name: str, rival: Any) -> Any:
+        asked.append((name, rival.effects[-1]))
+        value = evidences[rival.effects[-1]]
+        return None if value is None else fit(value, "tilted_vertical", rival.effects[-1])
+
+    current, rivals = fit(0.0, "tether", "tilted_vertical"), rivals_among(KNOWN, NULL)
+    found = as_good_in_place(["tether"], current, rivals, refit)
+    assert (None if found is None else (found[0], found[1].name)) == expected
+    assert asked == [("tether", "constant_force"), ("tether", "net_buoyancy")]
+    # A name that was found later has no rivals from the first round; one that is named has its own place.
+    assert as_good_in_place(["tilted_vertical"], current, rivals, refit) is None
+    named = fit(0.0, "tether", "net_buoyancy", "constant_force")
+    assert as_good_in_place(["tether"], named, rivals, refit) is None and len(asked) == 2
+
+
+@dataclass(frozen=True)
+class Explained:
+    """What an explanation supposes."""
+
+    effects: tuple[str, ...]
+
+
+@pytest.mark.parametrize("tied", [True, False])
+def test_a_rival_takes_the_place_of_a_name_on_the_path(tied):
+    current: Any = SimpleNamespace(evidence=0.0, explanation=Explained(("tether", "tilted_vertical")))
+    steps: Any = [
+        {"verdict": "ambiguous", "effects": ["tether", "waves"], "p_value": 1e-9},
+        {"verdict": "named", "effects": ["tilted_vertical"], "p_value": 1e-5},
+    ]
+    waves = explanation("waves")
+    path = Path(
+        current, ["tether", "tilted_vertical"], steps, [[explanation("tether"), waves]], stands_out=True
+    )
+    other: Any = fit(3.0, "tilted_vertical", "net_buoyancy")
+    path.exchange("tether", other, tied=tied)
+    assert path.chosen == ["net_buoyancy", "tilted_vertical"] and path.current is other
+    assert path.dropped == ["tether"] and path.steps[1] == steps[1]
+    told = {"verdict": "ambiguous", "effects": ["net_buoyancy", "tether"], "p_value": 1e-9}
+    assert path.steps[0] == (told if tied else {**told, "verdict": "named", "effects": ["net_buoyancy"]})
+    assert [[e.effects for e in g] for g in path.groups] == (
+        [[("tilted_vertical", "net_buoyancy"), ("tilted_vertical", "tether")]] if tied else []
+    )
+
+
+def test_a_rival_that_does_as_well_is_told_together_with_the_name():
+    current: Any = SimpleNamespace(evidence=0.0, explanation=Explained(("tether", "tilted_vertical")))
+    steps: Any = [
+        {"verdict": "named", "effects": ["tether"], "p_value": 1e-9},
+        {"verdict": "named", "effects": ["tilted_vertical"], "p_value": 1e-5},
+    ]
+    path = Path(current, ["tether", "tilted_vertical"], list(steps))
+    path.tie("tether", fit(-3.0, "tilted_vertical", "net_buoyancy"))
+    assert path.steps[0]["verdict"] == "ambiguous" and path.steps[0]["effects"] == ["tether", "net_buoyancy"]
+    assert [e.effects for e in path.groups[0]] == [
+        ("tilted_vertical", "tether"),
+        ("tilted_vertical", "net_buoyancy"),
+    ]
+    path.tie("tether", fit(-3.0, "tilted_vertical", "constant_force"))
+    assert path.steps[0]["effects"] == ["tether", "net_buoyancy", "constant_force"] and len(path.groups) == 1
+    assert (
+        path.chosen == ["tether", "tilted_vertical"] and path.current is current and path.steps[1] == steps[1]
+    )
+
+
+@pytest.fixture(scope="module")
+def beside() -> tuple[UnderLaw, Any]:
+    """A log with a net buoyancy and a force of no cause, and what is known of it without any name."""
+    model = GreyBox(small_vehicle())
+    rms = np.array([4.0, 4.0, 4.0, 0.4, 0.4, 0.5])
+    plant = model.with_effects({"net_buoyancy": {"force": 8.0}})
+    log = wandering_log(plant, rms, 1.0, runs=2, duration=40.0, seed=1)
+    layout, windows = lay_out(model, ["net_buoyancy", "thruster_gain", "gyro_bias"]), windows_for(model, log)
+    base = ["linear_damping", "quadratic_damping"]
+    asked: Any = SimpleNamespace(layout=layout, base=base, say=lambda _: None, log=log)
+    first = fit_hypothesis(layout, windows, base, (), iterations=4)
+    under = UnderLaw(asked, windows)
+    null = under.begin(first, white(first, np.full(18, 1e-9)))
+    assert null is not None
+    return under, null
+
+
+def named(beside: tuple[UnderLaw, Any], *effects: str) -> Any:
+    under, null = beside
+    model = null.explanation.fitted.model
+    return under.fits().from_null(under.layout, model, null, under.base, list(effects))
+
+
+def test_a_name_that_took_up_what_a_later_one_explains_is_needed_no_longer(beside):
+    """Against a fit that never had the name: the two have to end at the same place."""
+    under, _ = beside
+    both, right = named(beside, "thruster_gain", "net_buoyancy"), named(beside, "net_buoyancy")
+    without = refitted(under.layout, under.fits(), both, under.base, "thruster_gain", None)
+    assert without is not None and without.explanation.effects == ("net_buoyancy",)
+    assert without.evidence == pytest.approx(right.evidence, abs=1.0)
+    value = float(parameters_of(without.explanation.fitted.model, ["net_buoyancy"])[0])
+    assert value == pytest.approx(8.0, abs=3.0)
+    assert parameters_of(without.explanation.fitted.model, ["thruster_gain"]) == pytest.approx(1.0)
+
+    def refit(name: str, rival: Any) -> Any:
+        return refitted(under.layout, under.fits(), both, under.base, name, rival)
+
+    found = no_longer_needed(both.explanation.effects, both, refit)
+    assert found is not None and found[0] == "thruster_gain"
+    assert no_longer_needed(["net_buoyancy"], both, refit) is None
+
+
+def test_a_rival_takes_the_place_of_a_name_with_what_it_was_fitted_to(beside, monkeypatch):
+    under, _ = beside
+    right, wrong = named(beside, "net_buoyancy"), named(beside, "gyro_bias")
+    found = refitted(under.layout, under.fits(), right, under.base, "net_buoyancy", wrong.explanation)
+    assert found is not None and found.explanation.effects == ("gyro_bias",)
+    assert found.evidence == pytest.approx(wrong.evidence, abs=1.0)
+    assert loses(right, found, 0.0) and not loses(right, found, right.evidence - found.evidence + 1.0)
+    # It begins with its own values, and the name it takes the place of is as it was stated.
+    began = []
+    model = wrong.explanation.fitted.model
+    set_parameters(model, ["gyro_bias"], np.array([0.011, 0.012, 0.013]))
+    fits = under.fits()
+    monkeypatch.setattr(fits, "from_null", lambda layout, model, *_: began.append(model))
+    assert refitted(under.layout, fits, right, under.base, "net_buoyancy", wrong.explanation) is None
+    assert parameters_of(began[0], ["gyro_bias"]) == pytest.approx([0.011, 0.012, 0.013])
+    assert parameters_of(began[0], ["net_buoyancy"]) == pytest.approx(0.0)
+
+    def failing(*_: Any) -> Any:
+        raise UNSOLVED[1]("SVD did not converge")
+
+    monkeypatch.setattr(fits, "from_null", failing)
+    assert refitted(under.layout, fits, right, under.base, "net_buoyancy", None) is None
+
+
+def test_a_path_to_names_of_another_search():
+    named: Any = SimpleNamespace(
+        evidence=0.0, explanation=Explained(("added_mass", "tilted_vertical", "cg_offset"))
+    )
+    steps: Any = [
+        {"verdict": "named", "effects": ["payload"], "p_value": 0.01},
+        {"verdict": "named", "effects": ["added_mass"], "p_value": 0.02},
+        {"verdict": "withdrawn", "effects": ["payload"], "p_value": 0.03},
+        {"verdict": "ambiguous", "effects": ["tilted_vertical", "cg_offset"], "p_value": 0.04},
+        {"verdict": "unknown", "effects": [], "p_value": 0.05},
+    ]
+    path = Path.of_names(named, steps)
+    assert path.chosen == ["added_mass", "tilted_vertical", "cg_offset"] and path.current is named
+    assert [(s["verdict"], s["effects"], s["p_value"]) for s in path.steps] == [
+        ("named", ["added_mass"], 0.02),
+        ("named", ["tilted_vertical"], 0.04),
+        ("named", ["cg_offset"], 0.04),
+    ]
+    assert path.groups == [] and not path.stands_out
