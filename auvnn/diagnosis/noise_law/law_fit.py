@@ -65,6 +65,8 @@ class LawFits:
         base: list[str],
         effects: list[str],
         least: float = -np.inf,
+        *,
+        held: bool = True,
     ) -> Hypothesis:
         """Return effects fitted under the law, from the values that a model has.
 
@@ -75,19 +77,20 @@ class LawFits:
             base: effects that are free anyway.
             effects: effects asked for.
             least: evidence below which, what steps promise included, the fit is given up.
+            held: whether the first steps are taken under the law of that explanation; else it is estimated anew before.
         """
         assert current.estimate.law is not None
         names = tuple(dict.fromkeys([*base, *effects]))
-        held = priors(layout, names, free=effects)
-        begun = replace(current.explanation.fitted, names=names, priors=held, model=model)
+        stated = priors(layout, names, free=effects)
+        begun = replace(current.explanation.fitted, names=names, priors=stated, model=model)
         begun = replace(begun, theta=parameters_of(model, names))
         timing = of_timing(model, names, self.windows)
         explanation = FittedHypothesis(
             tuple(effects), begun, names, 0.0, np.zeros(0), np.zeros(0), systematic=timing
         )
-        judged = plausible(layout, names, effects, held, begun.theta)
+        judged = plausible(layout, names, effects, stated, begun.theta)
         started = replace(explanation, judged=judged, around=current.explanation.around)
-        return self.settled(self.judge(started, current.estimate.law, True), least=least)
+        return self.settled(self.judge(started, current.estimate.law, held), least=least)
 
     def settled(self, found: Hypothesis, most: int = STEPS, least: float = -np.inf) -> Hypothesis:
         """Return a hypothesis at parameters where its likelihood is largest, as far as steps lead there.

@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +41,8 @@ from auvnn.diagnosis.noise_law.rounds.name_after_name import NameAfterName
 from auvnn.diagnosis.noise_law.rounds.path import Path
 from auvnn.diagnosis.noise_law.under_law import NULL_STEPS
 from auvnn.diagnosis.selection.model_comparison import ODDS
-from auvnn.diagnosis.stages.state import State
+from auvnn.diagnosis.stages.state import Setting, State
+from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
 
@@ -55,6 +55,13 @@ class ForceSearch(NameAfterName):
         windows: of the log, without a law.
         closed_loop: whether commands are known to answer the motion; else it is asked of the fit without any name.
     """
+
+    def __init__(self, asked: Setting, windows: Windows, *, closed_loop: bool = False) -> None:
+        """Begin without a law."""
+        super().__init__(asked, windows, closed_loop=closed_loop)
+        self._refits: dict[
+            tuple[int, str, int, bool], tuple[Hypothesis, FittedHypothesis | None, Hypothesis | None]
+        ] = {}
 
     def run(self, null: Hypothesis, fitted: Sequence[FittedHypothesis], most: int) -> WithForce:
         """Search for one effect after the other.
@@ -109,7 +116,8 @@ class ForceSearch(NameAfterName):
         if path.groups:
             self.say("comparing effects that could not be told apart, beside all names")
             rest = self.rest(path.current, path.chosen)
-            lost = those_that_lose(path.groups, path.current, self._refit(path.current), rest)
+            refit = self._refit(path.current, whole=True)
+            lost = those_that_lose(path.groups, path.current, refit, rest)
             path.steps, path.groups = without_lost(path.steps, path.groups, lost)
 
     def _ended(self, path: Path, null: Hypothesis, tried: Sequence[Hypothesis], whole: float) -> WithForce:
@@ -130,8 +138,18 @@ class ForceSearch(NameAfterName):
             path.explains,
         )
 
-    def _refit(self, current: Hypothesis) -> Refit:
-        return partial(refitted, self.layout, self.fits(), current, self.base)
+    def _refit(self, current: Hypothesis, *, whole: bool = False) -> Refit:
+        """Return what fits all names but one, perhaps with a rival in its place; what was asked before is kept."""
+
+        def refit(name: str, rival: FittedHypothesis | None) -> Hypothesis | None:
+            key = id(current), name, id(rival), whole
+            if key not in self._refits:
+                at = refitted(self.layout, self.fits(), current, self.base, name, rival, whole=whole)
+                # Kept with what it came from: nothing else can have their places then.
+                self._refits[key] = current, rival, at
+            return self._refits[key][2]
+
+        return refit
 
     def _fewer(self, path: Path, names: Sequence[str]) -> bool:
         """Go on without the name that the log needs least, where it needs it no longer; return whether there was one."""

@@ -326,16 +326,23 @@ def test_a_rival_takes_the_place_of_a_name_with_what_it_was_fitted_to(beside, mo
     assert found.evidence == pytest.approx(wrong.evidence, abs=1.0)
     assert loses(right, found, 0.0) and not loses(right, found, right.evidence - found.evidence + 1.0)
     # It begins with its own values, and the name it takes the place of is as it was stated.
-    began = []
+    began: list[Any] = []
     model = wrong.explanation.fitted.model
     set_parameters(model, ["gyro_bias"], np.array([0.011, 0.012, 0.013]))
     fits = under.fits()
-    monkeypatch.setattr(fits, "from_null", lambda layout, model, *_: began.append(model))
+    monkeypatch.setattr(
+        fits, "from_null", lambda layout, model, *given, held: began.append((model, *given, held))
+    )
     assert refitted(under.layout, fits, right, under.base, "net_buoyancy", wrong.explanation) is None
-    assert parameters_of(began[0], ["gyro_bias"]) == pytest.approx([0.011, 0.012, 0.013])
-    assert parameters_of(began[0], ["net_buoyancy"]) == pytest.approx(0.0)
+    assert parameters_of(began[0][0], ["gyro_bias"]) == pytest.approx([0.011, 0.012, 0.013])
+    assert parameters_of(began[0][0], ["net_buoyancy"]) == pytest.approx(0.0)
+    # What falls far short is given up, under the law that is likeliest there; one that is compared goes on to its end.
+    assert refitted(under.layout, fits, right, under.base, "net_buoyancy", None, whole=True) is None
+    assert [given[-2:] for given in began] == [(right.evidence - 1000.0, False), (-np.inf, False)]
+    assert all(given[1] is right and given[2] == under.base for given in began)
+    assert [given[3] for given in began] == [["gyro_bias"], []]
 
-    def failing(*_: Any) -> Any:
+    def failing(*_: Any, **__: Any) -> Any:
         raise UNSOLVED[1]("SVD did not converge")
 
     monkeypatch.setattr(fits, "from_null", failing)

@@ -233,7 +233,7 @@ def scripted(
     asked.fits = lambda: SimpleNamespace(told=lambda e: diverging(e))
     asked.about = lambda *_: None
     asked.predicted, asked.in_closed_loop, asked.say = lambda _: None, False, lambda _: None
-    asked.averaged_with = []
+    asked.averaged_with, asked._refits = [], {}
 
     def averaged(_: Any, current: Any, rivals: Any) -> Any:
         asked.averaged_with.append([h.explanation.effects for h in rivals])
@@ -370,12 +370,17 @@ def test_a_tie_is_decided_beside_all_names(monkeypatch, lost):
     monkeypatch.setattr(name_after_name, "decided", lambda good, *_: good)
     given: list[Any] = []
 
+    wholes: list[bool] = []
+    monkeypatch.setattr(module, "refitted", lambda *_, whole: wholes.append(whole))
+
     def those(groups: Any, current: Any, refit: Any, rest: float) -> set[tuple[str, str]]:
+        refit("payload", groups[0][1])
         given.append(([[e.effects for e in g] for g in groups], current.explanation.effects, rest))
         return {("payload", "trapped_water")} if lost else set()
 
     monkeypatch.setattr(module, "those_that_lose", those)
     ended = asked.run(found(-1000.0), [], 4)
+    assert wholes == [True]
     # What the best further effect promises, of those of which the log says anything.
     assert given == [([[("payload",), ("trapped_water",)]], ("payload", "waves"), 30.0)]
     first = ended.steps[0]
@@ -425,3 +430,25 @@ def test_a_rival_that_does_better_beside_all_names_takes_the_place(monkeypatch, 
     # What has given its place, and what is tied, is not asked for again.
     if evidence > 500.0:
         assert given[1][0] == ["net_buoyancy", "thrust_asymmetry"] and "payload" not in given[1][2]
+
+
+def test_what_was_fitted_without_a_name_is_not_fitted_again(monkeypatch):
+    asked, _ = scripted(monkeypatch, {})
+    asked._settled, fits = None, []
+    monkeypatch.setattr(module, "refitted", lambda *given, **_: fits.append(given[2:]) or len(fits))
+    current, other, rival = (
+        found(1.0, "payload", "waves"),
+        found(1.0, "payload", "waves"),
+        Effects(("tether",)),
+    )
+    refit = asked._refit(current)
+    assert [refit("waves", None), refit("waves", rival), refit("payload", None)] == [1, 2, 3]
+    assert [asked._refit(current)("waves", None), refit("waves", rival), refit("payload", None)] == [1, 2, 3]
+    # Another explanation with the same names is another one.
+    assert asked._refit(other)("waves", None) == 4
+    assert [(given[0] is current, *given[2:]) for given in fits] == [
+        (True, "waves", None),
+        (True, "waves", rival),
+        (True, "payload", None),
+        (False, "waves", None),
+    ]

@@ -16,6 +16,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from contextlib import suppress
 
+import numpy as np
+
 from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
@@ -28,6 +30,9 @@ from auvnn.estimation.priors import parameters_of, set_parameters
 
 # Standard errors by which runs left out must be predicted better with the name that leads.
 SURE = 3.0
+# Logarithm of the odds by which a fit may fall short, what its next step promises included, before it is given up: a name
+# that is so much needed need not be fitted without to the end.
+FAR = 1000.0
 # From the name of the one that leads, and a rival in its place or none, to all names fitted so.
 Refit = Callable[[str, FittedHypothesis | None], Hypothesis | None]
 # Of each effect what might take its place.
@@ -41,6 +46,8 @@ def refitted(
     base: Sequence[str],
     name: str,
     rival: FittedHypothesis | None,
+    *,
+    whole: bool = False,
 ) -> Hypothesis | None:
     """Return the names that were found without one of them, everything else fitted; None where that fails.
 
@@ -51,6 +58,7 @@ def refitted(
         base: effects that are free whatever is chosen.
         name: that is left out.
         rival: an effect that takes its place, as it was fitted when the two could not be told apart; None for none.
+        whole: whether the fit goes on to its end though it falls far short.
     """
     fitted = current.explanation.fitted
     model = fitted.model.rebuilt(fitted.model.copied_effects())
@@ -60,7 +68,8 @@ def refitted(
         effects.append(rival.effects[-1])
         set_parameters(model, effects[-1:], parameters_of(rival.fitted.model, effects[-1:]))
     with suppress(*UNSOLVED):
-        return fits.from_null(layout, model, current, list(base), effects)
+        least = -np.inf if whole else current.evidence - FAR
+        return fits.from_null(layout, model, current, list(base), effects, least, held=False)
     return None
 
 
