@@ -154,7 +154,7 @@ class ForceSearch(NameAfterName):
     def _fewer(self, path: Path, names: Sequence[str]) -> bool:
         """Go on without the name that the log needs least, where it needs it no longer; return whether there was one."""
         if names:
-            self.say(f"asking whether {' and '.join(names)} are needed beside all names")
+            self.say(f"asking whether each name is needed beside the others: {', '.join(names)}")
         found = no_longer_needed(names, path.current, self._refit(path.current))
         if found is not None:
             path.without(*found)
