@@ -35,7 +35,9 @@ class FirstLaw:
     cell: float
 
 
-def first_law(first: FittedHypothesis, windows: Windows, sigma: Array, response: Array) -> FirstLaw | None:
+def first_law(
+    first: FittedHypothesis, windows: Windows, sigma: Array, response: Array, cell: float | None = None
+) -> FirstLaw | None:
     """Return the law of the force that a fit leaves; None where no variance is above zero.
 
     Args:
@@ -43,21 +45,22 @@ def first_law(first: FittedHypothesis, windows: Windows, sigma: Array, response:
         windows: of the log, without a law.
         sigma: (18,) the sensors' white noise.
         response: (6, 6) accelerations by the forces of the law.
+        cell: the time over which the force is constant, s; by default as short as its correlation time needs.
     """
     # A whole number of cells: a window's last force is that with which the next one begins.
-    cell = whole_cells(windows, CELL)
+    length = whole_cells(windows, CELL) if cell is None else cell
 
     def estimated(law: ForceLaw | None = None, axes: list[int] | None = None) -> Estimate:
         about = replace(windows, law=None, around=first.around)
-        return estimate(Likelihood(force_sums(first, about, sigma, cell, response)), law, axes)
+        return estimate(Likelihood(force_sums(first, about, sigma, length, response)), law, axes)
 
     found = estimated()
     if found.law is None:
         return None
     shorter = whole_cells(windows, cell_for(found.law.time[found.law.axes]))
-    if shorter < cell:
-        cell = shorter
-        found = estimated(replace(found.law, cell=cell), found.law.axes)
+    if shorter < length and cell is None:
+        length = shorter
+        found = estimated(replace(found.law, cell=length), found.law.axes)
     for _ in range(TURNS):
         assert found.law is not None
         about = linear_about_its_own(first, windows, found, sigma)
@@ -68,4 +71,4 @@ def first_law(first: FittedHypothesis, windows: Windows, sigma: Array, response:
         if found.law is None:
             return None
     assert found.law is not None
-    return FirstLaw(first, found.law, cell)
+    return FirstLaw(first, found.law, length)

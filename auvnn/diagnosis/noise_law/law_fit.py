@@ -73,11 +73,11 @@ class LawFits:
         Args:
             layout: stated values.
             model: with the values to begin from; of what is asked for, its null or near it.
-            current: an explanation without the last effect, whose law and trajectories to begin from.
+            current: another explanation, whose law and trajectories to begin from.
             base: effects that are free anyway.
             effects: effects asked for.
             least: evidence below which, what steps promise included, the fit is given up.
-            held: whether the first steps are taken under the law of that explanation; else it is estimated anew before.
+            held: whether the first steps are taken under that law; else it is estimated again before the first step.
         """
         assert current.estimate.law is not None
         names = tuple(dict.fromkeys([*base, *effects]))

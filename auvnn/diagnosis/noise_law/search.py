@@ -19,7 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.noise_law.first_law import first_law
 from auvnn.diagnosis.noise_law.hypothesis import (
+    GROUP,
     Hypothesis,
     WithForce,
     in_newtons,
@@ -71,33 +73,50 @@ class ForceSearch(NameAfterName):
             fitted: explanations of one effect that the first search has fitted.
             most: look for at most this many.
         """
-        path = Path(null)
+        path = Path(null, null=null)
         tried, whole = self.names_after(path, null, fitted, most)
         self._to_the_end(path, null, rivals_among(tried, null), fitted, most)
         return self._ended(path, null, tried, whole)
 
-    def from_names(
-        self, named: Hypothesis, first: FittedHypothesis, before: State, most: int
-    ) -> WithForce | None:
-        """Go on from names that another search found; None where each is needed and has no rival that does as well.
+    def changed(self, named: Hypothesis, before: State) -> Path | None:
+        """Return a path without the names that are not needed; None where each is, and has no rival that does as well.
 
         Args:
-            named: from `begin`, with the names.
+            named: from `begin`, with the names that another search found.
+            before: where that search ended.
+        """
+        path = Path.of_names(self.fits().settled(named), before.steps)
+        refit = self._refit(path.current)
+        for lead, *others in before.groups:
+            for other in [refit(lead.effects[-1], e) for e in others]:
+                if other is not None:
+                    path.tie(lead.effects[-1], other)
+        known, anything = len(self._passed(path)), False
+        rivals = rivals_tried(path.chosen, before.tried, before.first.fitted.sigma)
+        while self._fewer(path, path.chosen) or self._exchanged(path, path.chosen, rivals):
+            anything = True
+        # Names that stand leave next to nothing of the error: what is beside them withholds none.
+        path.stands_out = True
+        return path if anything or len(self._passed(path)) > known else None
+
+    def go_on(self, path: Path, first: FittedHypothesis, before: State, most: int) -> WithForce:
+        """Go on from names that are needed.
+
+        Args:
+            path: from `changed`, with at least one name.
             first: the fit without any, over the same windows.
             before: where the search that found them ended.
             most: look for at most this many.
         """
-        path = Path.of_names(self.fits().settled(named), before.steps)
-        rivals, law = rivals_tried(path.chosen, before.tried), path.current.estimate.law
-        changed = False
-        while self._fewer(path, path.chosen) or self._exchanged(path, path.chosen, rivals):
-            changed = True
-        if law is None or not (changed or path.groups):
-            return None
-        null = self.fits().settled(self.judged(first, law), NULL_STEPS)
-        if path.chosen:
-            self.names_after(path, null, (), most)
-            self._to_the_end(path, null, rivals, (), most)
+        assert self.response is not None
+        begun = first_law(first, self.windows, self.sigma, self.response, self.cell)
+        law = path.current.estimate.law
+        assert law is not None
+        null = self.judged(first, law) if begun is None else self.judged(begun.explanation, begun.law)
+        null = self.fits().settled(null, NULL_STEPS)
+        rivals = rivals_tried(path.chosen, before.tried, before.first.fitted.sigma)
+        self.names_after(path, null, (), most)
+        self._to_the_end(path, null, rivals, (), most)
         return self._ended(path, null, (), before.p_value)
 
     def _to_the_end(
@@ -115,7 +134,7 @@ class ForceSearch(NameAfterName):
             earlier = path.chosen[:-1]
         if path.groups:
             self.say("comparing effects that could not be told apart, beside all names")
-            rest = self.rest(path.current, path.chosen)
+            rest = self.rest(path)
             refit = self._refit(path.current, whole=True)
             lost = those_that_lose(path.groups, path.current, refit, rest)
             path.steps, path.groups = without_lost(path.steps, path.groups, lost)
@@ -126,8 +145,8 @@ class ForceSearch(NameAfterName):
         assert law is not None
         return WithForce(
             path.steps,
-            [[under_law.told(e) for e in group] for group in path.groups],
-            under_law.told(averaged(self.layout, current, path.rivals)),
+            [[under_law.told(e) for e in group] for group in path.in_order],
+            under_law.told(averaged(self.layout, current, path.not_named)),
             self.about(current.explanation, law),
             replace(current.estimate, law=in_newtons(law, current.explanation)),
             self._told(tried),
@@ -163,20 +182,21 @@ class ForceSearch(NameAfterName):
     def _exchanged(self, path: Path, names: Sequence[str], rivals: Rivals) -> bool:
         """Go on with a rival that does better in the place of a name; return whether there was one.
 
-        One that does as well is told together with the name.
+        Those that do as well are told together with the name, which stays.
         """
-        known = {*path.dropped, *(e.effects[-1] for g in path.groups for e in g)}
-        able = {n: [e for e in of if e.effects[-1] not in known] for n, of in rivals.items()}
-        found = as_good_in_place(names, path.current, able, self._refit(path.current))
-        if found is None:
-            return False
-        name, other = found
-        better = other.evidence - path.current.evidence
-        if better > 0.0:
-            path.exchange(name, other, tied=better < ODDS)
-        else:
+        while True:
+            known = self._passed(path)
+            able = {n: [e for e in of if e.effects[-1] not in known] for n, of in rivals.items()}
+            open_to = [n for n in names if path.members(n) < GROUP]
+            found = as_good_in_place(open_to, path.current, able, self._refit(path.current))
+            if found is None:
+                return False
+            name, other = found
+            better = other.evidence - path.current.evidence
+            if better > 0.0:
+                path.exchange(name, other, tied=better < ODDS)
+                return True
             path.tie(name, other)
-        return better > 0.0
 
     def _told(self, tried: Sequence[Hypothesis]) -> list[FittedHypothesis]:
         """Return explanations with their errors of free running, those aside whose free running grows without bound."""

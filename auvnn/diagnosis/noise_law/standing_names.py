@@ -1,8 +1,9 @@
 """Names that leave so little that a stochastic force cannot refute them: they stand, and what is left is estimated.
 
-Unless the log can do without one of them. Under a controller commands answer the force that is left, and a fit of output
-errors then takes a mass that is too large for what resists the commands: a name without which the log is as likely under
-the law of the force, everything else fitted again, has taken up the force. Then names are sought beside it anew.
+Unless the log can do without one of them, or with another effect in its place. Under a controller commands answer the
+force that is left, and a fit of output errors then takes a mass that is too large for what resists the commands. A name
+without which the log is as likely under the law of the force, everything else fitted again, has taken up that force: the
+search goes on without it.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def beside_names(
         asked: what is asked.
         state: where the first search ended.
         uncertain: what commands between samples leave uncertain.
-        anew: seeks names beside the force; asked where the log can do without any of those that there are.
+        anew: seeks names beside the force; asked where the log needs none of those that there are.
     """
     if not leaves_force(asked, state, state.current):
         return None
@@ -70,11 +71,12 @@ def beside_names(
     found = beside.begin(end, white(end, asked.floor), 0)
     if found is None:
         return None
-    first, _ = fitted_over_parts(asked, state.first, state.windows)
-    result = beside.from_names(found, first, state, asked.most)
-    if result is not None:
-        if not result.steps:
+    path = beside.changed(found, state)
+    if path is not None:
+        if not path.chosen:
             return anew(asked, state, uncertain)
+        first, _ = fitted_over_parts(asked, state.first, state.windows)
+        result = beside.go_on(path, first, state, asked.most)
         over, chance = state.but(first=first, windows=windows), result.predicted is None
         ended = state_with(asked, state, over, result, uncertain, chance=chance)
         return ended, result.estimate.law, result.predicted

@@ -64,7 +64,11 @@ def goes_further(again: WithForce, before: WithForce) -> bool:
         again: the search that also looks at names that cost little or bring little.
         before: the search that does not.
     """
-    same = [s["effects"] for s in again.steps[: len(before.steps)]] == [s["effects"] for s in before.steps]
+    # Beside further names the log may tell apart what it could not before.
+    pairs = list(zip(again.steps, before.steps, strict=False))
+    same = len(pairs) == len(before.steps) and all(
+        a["effects"][0] == b["effects"][0] and {*a["effects"]} <= {*b["effects"]} for a, b in pairs
+    )
     return bool(before.steps) and same and share_left(before) > MOST >= share_left(again)
 
 

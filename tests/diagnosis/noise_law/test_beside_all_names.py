@@ -14,6 +14,7 @@ from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.noise_law.rounds import beside_all_names as module
+from auvnn.diagnosis.noise_law.rounds import path as path_module
 from auvnn.diagnosis.noise_law.rounds.beside_all_names import (
     as_good_in_place,
     loses,
@@ -39,6 +40,13 @@ def worth(evidence: float) -> Any:
 
 def explanation(*effects: str) -> Any:
     return SimpleNamespace(effects=effects)
+
+
+def fit(evidence: float, *effects: str) -> Any:
+    return SimpleNamespace(evidence=evidence, name=effects[-1], explanation=explanation(*effects))
+
+
+NULL = fit(-1000.0, "")
 
 
 def test_the_name_that_the_log_needs_least_goes():
@@ -129,7 +137,8 @@ def test_each_rival_is_fitted_in_the_place_of_the_one_that_leads(monkeypatch):
     )
 
 
-def test_a_path_goes_on_without_a_name():
+@pytest.mark.parametrize("explained", [(8.0, NULL), None])
+def test_a_path_goes_on_without_a_name(monkeypatch, explained):
     first, second = explanation("payload"), explanation("payload", "waves")
     path = Path(
         worth(0.0),
@@ -146,20 +155,19 @@ def test_a_path_goes_on_without_a_name():
         True,
     )
     path.without("waves", worth(7.0))
-    assert path.chosen == ["payload", "tether"] and path.current.evidence == 7.0 and path.rivals == []
+    assert path.chosen == ["payload", "tether"] and path.current.evidence == 7.0 and path.not_named == []
     assert [s["effects"] for s in path.steps] == [["payload", "trapped_water"], ["tether"]]
     assert path.groups == [[first, path.groups[0][1]]] and path.stands_out and path.explains
-    # What was known of the first name goes with it.
+    # What was known of the first name goes with it, but for what the others explain without it.
+    monkeypatch.setattr(
+        path_module, "explains_an_axis", lambda after, before: (after.evidence, before) == explained
+    )
+    path.null = NULL
     path.without("payload", worth(8.0))
     assert path.chosen == ["tether"] and path.dropped == ["waves", "payload"] and path.groups == []
-    assert not path.stands_out and not path.explains
+    assert not path.stands_out and path.explains is (explained == (8.0, NULL))
 
 
-def fit(evidence: float, *effects: str) -> Any:
-    return SimpleNamespace(evidence=evidence, name=effects[-1], explanation=explanation(*effects))
-
-
-NULL = fit(-1000.0, "")
 KNOWN = [
     fit(0.0, "tether"),
     # Not known to be confused with a cable.
@@ -182,9 +190,15 @@ def test_rivals_are_confused_with_a_name_and_gained_half_as_much():
     assert rivals_among([], NULL) == {}
 
 
-def test_rivals_among_fits_without_the_force_are_the_two_that_leave_least():
+def test_rivals_among_fits_without_the_force_come_by_what_they_leave():
+    sigma = np.arange(18.0)
+
     def tried(cost: float, *names: str) -> Any:
-        return SimpleNamespace(effects=names, fitted=SimpleNamespace(cost=cost))
+        def squared_error(by: Any) -> float:
+            assert by is sigma
+            return cost
+
+        return SimpleNamespace(effects=names, squared_error=squared_error)
 
     fits = [
         tried(9.0),
@@ -195,9 +209,9 @@ def test_rivals_among_fits_without_the_force_are_the_two_that_leave_least():
         tried(4.0, "payload", "constant_force"),
         tried(1.0, "constant_force", "waves"),
     ]
-    told = rivals_tried(["tether", "waves"], fits)
-    assert effects(told)["tether"] == ["constant_force", "ocean_current"]
-    assert told["tether"][0].fitted.cost == 4.0 and "tether" not in effects(told)["waves"]
+    told = rivals_tried(["tether", "waves"], fits, sigma)
+    assert effects(told)["tether"] == ["constant_force", "ocean_current", "net_buoyancy"]
+    assert told["tether"][0] is fits[5] and "tether" not in effects(told)["waves"]
 
 
 @pytest.mark.parametrize(
@@ -221,10 +235,16 @@ def test_a_plainer_cause_may_take_the_place_of_a_name_once_others_are_found(evid
     found = as_good_in_place(["tether"], current, rivals, refit)
     assert (None if found is None else (found[0], found[1].name)) == expected
     assert asked == [("tether", "constant_force"), ("tether", "net_buoyancy")]
+    # Two are fitted, of those that are not named.
+    more = {
+        "tether": [explanation(n) for n in ("tilted_vertical", "constant_force", "net_buoyancy", "waves")]
+    }
+    as_good_in_place(["tether"], current, more, refit)
+    assert asked[2:] == asked[:2]
     # A name that was found later has no rivals from the first round; one that is named has its own place.
     assert as_good_in_place(["tilted_vertical"], current, rivals, refit) is None
     named = fit(0.0, "tether", "net_buoyancy", "constant_force")
-    assert as_good_in_place(["tether"], named, rivals, refit) is None and len(asked) == 2
+    assert as_good_in_place(["tether"], named, rivals, refit) is None and len(asked) == 4
 
 
 @dataclass(frozen=True)
@@ -249,10 +269,21 @@ def test_a_rival_takes_the_place_of_a_name_on_the_path(tied):
     path.exchange("tether", other, tied=tied)
     assert path.chosen == ["net_buoyancy", "tilted_vertical"] and path.current is other
     assert path.dropped == ["tether"] and path.steps[1] == steps[1]
-    told = {"verdict": "ambiguous", "effects": ["net_buoyancy", "tether"], "p_value": 1e-9}
-    assert path.steps[0] == (told if tied else {**told, "verdict": "named", "effects": ["net_buoyancy"]})
-    assert [[e.effects for e in g] for g in path.groups] == (
-        [[("tilted_vertical", "net_buoyancy"), ("tilted_vertical", "tether")]] if tied else []
+    # What could not be told from the name is not refuted by that.
+    group = ["net_buoyancy", "tether", "waves"] if tied else ["net_buoyancy", "waves"]
+    assert path.steps[0] == {"verdict": "ambiguous", "effects": group, "p_value": 1e-9}
+    assert [[e.effects[-1] for e in g] for g in path.groups] == [group]
+    assert path.groups[0][0].effects == ("tilted_vertical", "net_buoyancy") and path.groups[0][-1] is waves
+    if tied:
+        assert path.groups[0][1].effects == ("tilted_vertical", "tether")
+    # A name without a group is exchanged for one without.
+    path.current = current
+    path.exchange("tilted_vertical", fit(4.0, "net_buoyancy", "cg_offset"), tied=False)
+    assert path.steps[1] == {"verdict": "named", "effects": ["cg_offset"], "p_value": 1e-5}
+    assert (
+        len(path.groups) == 1
+        and path.members("cg_offset") == 1
+        and path.members("net_buoyancy") == len(group)
     )
 
 
@@ -356,7 +387,8 @@ def test_a_path_to_names_of_another_search():
     steps: Any = [
         {"verdict": "named", "effects": ["payload"], "p_value": 0.01},
         {"verdict": "named", "effects": ["added_mass"], "p_value": 0.02},
-        {"verdict": "withdrawn", "effects": ["payload"], "p_value": 0.03},
+        # A step that withdraws one says nothing of it.
+        {"verdict": "withdrawn", "effects": ["payload", "added_mass"], "p_value": 0.03},
         {"verdict": "ambiguous", "effects": ["tilted_vertical", "cg_offset"], "p_value": 0.04},
         {"verdict": "unknown", "effects": [], "p_value": 0.05},
     ]

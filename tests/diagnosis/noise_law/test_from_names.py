@@ -30,15 +30,24 @@ def begun(monkeypatch, further: Any = None) -> tuple[Any, Any, list[str]]:
 
     asked.fits = lambda: SimpleNamespace(settled=settled, told=lambda e: e)
     asked.judged = lambda first, law: NULL
-    before: Any = SimpleNamespace(steps=STEPS, tried=(), p_value=0.5)
+    first: Any = SimpleNamespace(fitted=SimpleNamespace(sigma=None))
+    before: Any = SimpleNamespace(steps=STEPS, tried=(), groups=(), p_value=0.5, first=first)
+    asked.windows = asked.sigma = asked.response = asked.cell = "given"
+    begun: Any = SimpleNamespace(explanation=None, law=None)
+    monkeypatch.setattr(module, "first_law", lambda *given: begun if given[1:] == ("given",) * 4 else None)
     return asked, before, done
+
+
+def both(asked: Any, before: Any, most: int) -> Any:
+    path = asked.changed(NAMED, before)
+    return path and asked.go_on(path, None, before, most)
 
 
 def test_names_that_are_all_needed_stay_as_they_are(monkeypatch):
     asked, before, done = begun(monkeypatch)
     of: list[Any] = []
     monkeypatch.setattr(module, "no_longer_needed", lambda these, *_: of.append(list(these)))
-    assert asked.from_names(NAMED, None, before, 4) is None
+    assert both(asked, before, 4) is None
     # All of them are asked for, the last one too; and nothing is compared with the fit without any.
     assert of == [["payload", "waves"]] and done == ["settled waves None"]
 
@@ -52,15 +61,15 @@ def test_without_a_needless_name_the_search_goes_on(monkeypatch):
         "no_longer_needed",
         lambda these, *_: ("payload", found(101.0, "waves")) if "payload" in these else None,
     )
-    ended = asked.from_names(NAMED, None, before, 2)
+    ended = both(asked, before, 2)
     assert [(s["verdict"], s["effects"], s["p_value"]) for s in ended.steps] == [
         ("named", ["waves"], 0.02),
         ("named", ["tether"], 1e-9),
     ]
     assert ended.last.effects == ("waves", "tether") and ended.tried == [] and ended.p_value == 0.5
-    assert done[:2] == ["settled waves None", f"settled nothing {module.NULL_STEPS}"]
+    assert done[:2] == ["settled waves None", f"settled nothing {module.NULL_STEPS}"] and ended.stands_out
     # No more names than were asked for.
-    assert [s["effects"] for s in asked.from_names(NAMED, None, before, 1).steps] == [["waves"]]
+    assert [s["effects"] for s in both(asked, before, 1).steps] == [["waves"]]
 
 
 def test_where_no_name_is_needed_none_is_left(monkeypatch):
@@ -69,8 +78,30 @@ def test_where_no_name_is_needed_none_is_left(monkeypatch):
     monkeypatch.setattr(
         module, "no_longer_needed", lambda these, *_: (these[0], left[these[0]]) if these else None
     )
-    ended = asked.from_names(NAMED, None, before, 4)
-    assert ended.steps == [] and ended.last.effects == ()
+    path = asked.changed(NAMED, before)
+    assert path.chosen == [] and path.steps == [] and path.current.evidence == 102.0
+
+
+def test_what_could_not_be_told_apart_before_is_compared_again(monkeypatch):
+    """A needless name elsewhere decides no tie."""
+    asked, before, _ = begun(monkeypatch)
+    lead, rival, wrong = (SimpleNamespace(effects=(n,)) for n in ("waves", "tether", "gyro_bias"))
+    before.groups = ((lead, rival, wrong),)
+    monkeypatch.setattr(
+        module,
+        "refitted",
+        lambda *given, whole: found(99.0, "payload", "tether") if given[5] is rival else None,
+    )
+    monkeypatch.setattr(module, "no_longer_needed", lambda *_: None)
+    assert asked.changed(NAMED, before) is None
+    monkeypatch.setattr(
+        module,
+        "no_longer_needed",
+        lambda these, *_: ("payload", found(101.0, "waves")) if "payload" in these else None,
+    )
+    path = asked.changed(NAMED, before)
+    assert [(s["verdict"], s["effects"]) for s in path.steps] == [("ambiguous", ["waves", "tether"])]
+    assert [[e.effects[-1] for e in g] for g in path.groups] == [["waves", "tether"]]
 
 
 @pytest.mark.parametrize(("evidence", "order"), [(99.0, ["waves", "tether"]), (103.0, ["tether", "waves"])])
@@ -79,7 +110,7 @@ def test_a_rival_of_a_name_is_told_with_it(monkeypatch, evidence, order):
     asked._tested = lambda *_: SimpleNamespace(p_value=1.0, scores={})
     monkeypatch.setattr(module, "those_that_lose", lambda *_: set())
     rival = SimpleNamespace(effects=("tether",))
-    monkeypatch.setattr(module, "rivals_tried", lambda these, tried: {"waves": [rival]})
+    monkeypatch.setattr(module, "rivals_tried", lambda *_: {"waves": [rival]})
     offered: list[Any] = []
 
     def as_good(these: Any, current: Any, rivals: Any, refit: Any) -> Any:
@@ -87,10 +118,25 @@ def test_a_rival_of_a_name_is_told_with_it(monkeypatch, evidence, order):
         return ("waves", found(evidence, "payload", "tether")) if rivals["waves"] else None
 
     monkeypatch.setattr(module, "as_good_in_place", as_good)
-    ended = asked.from_names(NAMED, None, before, 2)
+    ended = both(asked, before, 2)
     assert [(s["verdict"], s["effects"]) for s in ended.steps] == [
         ("named", ["payload"]),
         ("ambiguous", order),
     ]
     assert [[e.effects[-1] for e in g] for g in ended.groups] == [order]
     assert ended.last.effects[-1] == order[0] and offered[0] == ["tether"] and offered[-1] == []
+
+
+def test_every_rival_that_does_as_well_is_told_three_in_a_group_at_most(monkeypatch):
+    asked, before, _ = begun(monkeypatch)
+    tied = ["tether", "gyro_bias", "payload_2", "cg_offset"]
+    of = [SimpleNamespace(effects=(n,)) for n in tied]
+    rivals = {"waves": of[:3], "payload": of[3:]}
+    monkeypatch.setattr(module, "rivals_tried", lambda *_: rivals)
+
+    def as_good(these: Any, current: Any, able: Any, refit: Any) -> Any:
+        return next(((n, found(99.0, n, e.effects[-1])) for n in these for e in able[n]), None)
+
+    monkeypatch.setattr(module, "as_good_in_place", as_good)
+    path = asked.changed(NAMED, before)
+    assert [s["effects"] for s in path.steps] == [["payload", "cg_offset"], ["waves", "tether", "gyro_bias"]]

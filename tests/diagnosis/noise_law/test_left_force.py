@@ -100,6 +100,10 @@ def test_what_changes_from_sample_to_sample_matters_by_its_mean_over_a_second(sh
         (["a", "b"], 0.6, ["a"], False),
         (["b", "a"], 0.4, ["a"], False),
         (["a", "b"], 0.4, [], False),
+        # Beside a further name a rival of the first one has lost, or one has come.
+        (["a", "b"], 0.4, ["a or c"], True),
+        (["a or c", "b"], 0.4, ["a"], False),
+        (["a"], 0.4, ["a", "b"], False),
     ],
 )
 def test_further_names_after_the_same_ones_stand_where_they_leave_less_than_half(
@@ -110,7 +114,7 @@ def test_further_names_after_the_same_ones_stand_where_they_leave_less_than_half
         # Slow before, fast after: of what changes within a second, a fifth of the mean square counts.
         after = ForceLaw(known * np.sqrt(5.0 * share), np.full(6, 0.1), 0.5, 5.0)
         return SimpleNamespace(
-            steps=[{"effects": [n]} for n in effects],
+            steps=[{"effects": n.split(" or ")} for n in effects],
             estimate=SimpleNamespace(law=after),
             first_law=ForceLaw(known, np.full(6, 4.0), 0.5, 5.0),
         )

@@ -79,7 +79,8 @@ def test_names_stand_only_where_the_log_needs_each_of_them_beside_the_force(monk
     end, first = SimpleNamespace(effects=("added_mass", "tilted_vertical")), SimpleNamespace(effects=())
     state: Any = SimpleNamespace(current=end, first=first, windows="windows", but=lambda **changes: changes)
     found = SimpleNamespace(name="found")
-    result = SimpleNamespace(steps=left, estimate=SimpleNamespace(law="law"), predicted="an input")
+    result = SimpleNamespace(estimate=SimpleNamespace(law="law"), predicted="an input")
+    path = None if left is None else SimpleNamespace(chosen=left)
 
     class Under:
         def __init__(self, asked: Any, windows: Any, *, closed_loop: bool) -> None:
@@ -88,9 +89,13 @@ def test_names_stand_only_where_the_log_needs_each_of_them_beside_the_force(monk
         def begin(self, *_: Any) -> Any:
             return found
 
-        def from_names(self, named: Any, without: Any, before: Any, most: int) -> Any:
-            assert named is found and without is first and before is state and most == 4
-            return None if left is None else result
+        def changed(self, named: Any, before: Any) -> Any:
+            assert named is found and before is state
+            return path
+
+        def go_on(self, along: Any, without: Any, before: Any, most: int) -> Any:
+            assert along is path and without is first and before is state and most == 4
+            return result
 
         def predicted(self, _: Any) -> Any:
             raise RuntimeError("the names stand")

@@ -3,9 +3,9 @@
 When a name is sought, causes that are found later are still in the force that is left, and the law of that force is no
 more than near the truth. A name may have taken up what a later one explains, and effects that are confused with the best
 are kept although they explain less. Beside all names the force has what is left of it: a name without which the log is as
-likely, everything else refitted, is needed no longer; and a rival that is refitted in the place of the one that leads
-loses where it falls short by more than any further effect would still gain, for that is how far the model is known to be
-wrong.
+likely, everything else refitted, is needed no longer; an effect that does better in the place of a name takes it; and a
+rival that is refitted in the place of the one that leads loses where it falls short by more than any further effect would
+still gain, for that is how far the model is known to be wrong.
 
 Reference: Miller (2002), Subset Selection in Regression, 2nd ed., section 3.3 (backward elimination); Burnham and
 Anderson (2002), Model Selection and Multimodel Inference, 2nd ed., chapter 2 (whole models are compared, not terms).
@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from contextlib import suppress
 
 import numpy as np
+from numpy.typing import NDArray
 
 from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
@@ -28,12 +29,13 @@ from auvnn.diagnosis.noise_law.rounds.looking_ahead import RIVALS_SHARE
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.estimation.priors import parameters_of, set_parameters
 
+Array = NDArray[np.float64]
 # Standard errors by which runs left out must be predicted better with the name that leads.
 SURE = 3.0
-# Logarithm of the odds by which a fit may fall short, what its next step promises included, before it is given up: a name
-# that is so much needed need not be fitted without to the end.
+# Logarithm of the odds by which a fit may fall short, what its next step promises included, before it is given up: where
+# a name is needed so much, the fit without it need not be finished.
 FAR = 1000.0
-# From the name of the one that leads, and a rival in its place or none, to all names fitted so.
+# Takes a name and a rival, or None; returns the fit of all names with the rival in the place of the name.
 Refit = Callable[[str, FittedHypothesis | None], Hypothesis | None]
 # Of each effect what might take its place.
 Rivals = Mapping[str, Sequence[FittedHypothesis]]
@@ -89,38 +91,36 @@ def no_longer_needed(
 
 
 def rivals_among(known: Sequence[Hypothesis], null: Hypothesis) -> Rivals:
-    """Return what might take the place of each of some effects, as it was fitted.
+    """Return what might take the place of each of some effects, as it was fitted, the most evident first.
 
     Rivals are effects that the catalogue knows to be confused with one, and that gained half as much as it, or more, when
-    the first name was sought; two of each.
+    the first name was sought.
 
     Args:
         known: what was fitted then, the most evident first.
         null: without any name.
     """
     gains = {h.name: h.evidence - null.evidence for h in known}
-    out = {}
-    for name, gain in gains.items():
-        able = [
+    return {
+        name: [
             h.explanation for h in known if gains[h.name] >= RIVALS_SHARE * gain and confused(h.name, name)
         ]
-        out[name] = able[:RIVALS]
-    return out
+        for name, gain in gains.items()
+    }
 
 
-def rivals_tried(names: Iterable[str], tried: Iterable[FittedHypothesis]) -> Rivals:
-    """Return what might take the place of each of some effects, of fits without the force, two of each.
+def rivals_tried(names: Iterable[str], tried: Iterable[FittedHypothesis], sigma: Array) -> Rivals:
+    """Return what might take the place of each of some effects, of fits without the force, what leaves least first.
 
     Args:
         names: of the effects.
         tried: explanations, perhaps with several effects, of which the last counts.
+        sigma: (18,) by which all of them are weighed.
     """
     least: dict[str, FittedHypothesis] = {}
-    for e in tried:
-        if e.effects and (e.effects[-1] not in least or e.fitted.cost < least[e.effects[-1]].fitted.cost):
-            least[e.effects[-1]] = e
-    order = sorted(least.values(), key=lambda e: e.fitted.cost)
-    return {name: [e for e in order if confused(e.effects[-1], name)][:RIVALS] for name in names}
+    for e in sorted((e for e in tried if e.effects), key=lambda e: e.squared_error(sigma)):
+        least.setdefault(e.effects[-1], e)
+    return {name: [e for n, e in least.items() if confused(n, name)] for name in names}
 
 
 def as_good_in_place(
@@ -133,13 +133,14 @@ def as_good_in_place(
     Args:
         names: whose places are asked for.
         current: with all names.
-        rivals: of each name.
+        rivals: of each name; the first two are fitted.
         refit: fits all names with a rival in the place of one.
     """
     found = []
     for name in names:
-        for rival in rivals.get(name, ()):
-            other = None if rival.effects[-1] in current.explanation.effects else refit(name, rival)
+        able = [e for e in rivals.get(name, ()) if e.effects[-1] not in current.explanation.effects]
+        for rival in able[:RIVALS]:
+            other = refit(name, rival)
             if other is not None and current.evidence - other.evidence < ODDS:
                 found.append((name, other))
     return max(found, key=lambda pair: pair[1].evidence, default=None)

@@ -107,7 +107,9 @@ class LeaderFits:
     def _beside(self, at: Round) -> list[Hypothesis]:
         """Return what was fitted beside an explanation, now and by an earlier search, the most evident first."""
         return _by_evidence(
-            h for (where, _), (_, h) in self.known.items() if where == id(at.current) and h is not None
+            h
+            for (where, name), (_, h) in self.known.items()
+            if where == id(at.current) and h is not None and name in at.tested.scores
         )
 
     def take(self, current: Hypothesis, found: Hypothesis) -> None:

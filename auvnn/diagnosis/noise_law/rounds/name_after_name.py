@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -52,7 +53,7 @@ class NameAfterName(UnderLaw):
         self.looks_further = False
         # What was asked at an explanation, for a second search that passes there: its tests, and where it went with a law
         # of its own.
-        self._tests: dict[int, Tested] = {}
+        self._tests: dict[int, tuple[frozenset[str], Tested]] = {}
         self._gone_on: dict[int, tuple[Hypothesis, Hypothesis]] = {}
         self._leaders: LeaderFits | None = None
         # Values of effects that were fitted when nothing was chosen.
@@ -76,8 +77,7 @@ class NameAfterName(UnderLaw):
         """Go on with one name after the other; return what was tried at first, and the p-value of there being nothing."""
         tried, whole = list[Hypothesis](), 1.0
         while len(path.chosen) < most:
-            passed = [*path.dropped, *[e.effects[-1] for g in path.groups for e in g]]
-            result = self._round(null, path.current, path.chosen, passed, fitted)
+            result = self._round(null, path.current, path.chosen, self._passed(path), fitted)
             if result is None:
                 break
             if not path.chosen:
@@ -87,7 +87,7 @@ class NameAfterName(UnderLaw):
                 )
             good = result.good
             if not good or (path.chosen and self._takes_up(good[0], path.chosen)):
-                path.rivals = result.found if path.chosen else []
+                path.not_named = result.found if path.chosen else []
                 break
             if not path.chosen and most > 1:
                 good = self._looking_ahead(null, good, fitted)
@@ -107,11 +107,20 @@ class NameAfterName(UnderLaw):
             path.chosen.append(group[0].name)
         return tried, whole
 
-    def rest(self, current: Hypothesis, chosen: Sequence[str]) -> float:
-        """Return what the best further effect promises beside names, in the logarithm of the odds."""
-        remaining = [n for n in self.usable if n not in chosen]
-        base = [*self.base, *[c for c in chosen if c not in self.base]]
-        scores = self._tested(current, remaining, base, list(chosen)).scores.values()
+    def _passed(self, path: Path) -> list[str]:
+        """Return the effects that are not asked for again."""
+        return [*path.dropped, *[e.effects[-1] for g in path.groups for e in g]]
+
+    def rest(self, path: Path) -> float:
+        """Return what the best further effect promises beside all names, in the logarithm of the odds.
+
+        Args:
+            path: with the names.
+        """
+        passed = self._passed(path)
+        remaining = [n for n in self.usable if n not in path.chosen and n not in passed]
+        base = [*self.base, *[c for c in path.chosen if c not in self.base]]
+        scores = self._tested(path.current, remaining, base, list(path.chosen)).scores.values()
         return max((s.evidence for s in scores if s.degrees), default=0.0)
 
     def _round(
@@ -170,13 +179,15 @@ class NameAfterName(UnderLaw):
     def _tested(
         self, current: Hypothesis, remaining: list[str], base: list[str], chosen: list[str]
     ) -> Tested:
-        """Return the tests of what remains beside an explanation."""
-        if id(current) not in self._tests:
+        """Return the tests of what remains beside an explanation; of more than that they may have been made before."""
+        asked, known = self._tests.get(id(current), (frozenset[str](), None))
+        if known is None or not asked.issuperset(remaining):
             self.say(f"testing {len(remaining)} effects together with the force")
             windows = self.about(current.explanation, current.estimate.law)
             tests = NullTests(self.layout, windows, self.say)
-            self._tests[id(current)] = tests(current.weighed, remaining, base, chosen)
-        return self._tests[id(current)]
+            known = tests(current.weighed, remaining, base, chosen)
+            self._tests[id(current)] = frozenset(remaining), known
+        return replace(known, scores={n: s for n, s in known.scores.items() if n in remaining})
 
     def _takes_up(self, further: Hypothesis, chosen: Sequence[str]) -> bool:
         """Whether a further effect only takes up what the shape of an earlier one gets wrong.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
+from auvnn.diagnosis.noise_law.hypothesis import GROUP, Hypothesis, explains_an_axis
 
 
 @dataclass
@@ -19,10 +19,11 @@ class Path:
         chosen: names found so far.
         steps: of the search.
         groups: explanations between which the log cannot decide.
-        dropped: names that later ones made needless.
-        rivals: explanations with one name more that were not named.
+        dropped: names that later ones made needless, or that gave their place to a rival; they are not asked for again.
+        not_named: explanations with one name more that were not named.
         stands_out: see `WithForce`.
         explains: see `WithForce`.
+        null: the explanation without any name, where it was the beginning.
     """
 
     current: Hypothesis
@@ -30,9 +31,10 @@ class Path:
     steps: list[SearchStep] = field(default_factory=list)
     groups: list[list[FittedHypothesis]] = field(default_factory=list)
     dropped: list[str] = field(default_factory=list)
-    rivals: list[Hypothesis] = field(default_factory=list)
+    not_named: list[Hypothesis] = field(default_factory=list)
     stands_out: bool = False
     explains: bool = False
+    null: Hypothesis | None = None
 
     @classmethod
     def of_names(cls, named: Hypothesis, steps: Sequence[SearchStep]) -> Path:
@@ -57,8 +59,10 @@ class Path:
             current: the explanation without it.
         """
         if name == self.chosen[0]:
-            self.stands_out = self.explains = False
-        self.current, self.rivals = current, []
+            null = self.null
+            self.stands_out = False
+            self.explains = self.explains and null is not None and explains_an_axis(current, null)
+        self.current, self.not_named = current, []
         self.dropped.append(name)
         self.chosen = [c for c in self.chosen if c != name]
         self.steps = [s for s in self.steps if s["effects"][0] != name]
@@ -68,17 +72,20 @@ class Path:
         """Go on with a rival in the place of a name.
 
         Args:
-            name: that gives its place.
+            name: whose place the rival takes.
             other: the explanation with the rival, which came last, in its place.
             tied: whether the log cannot tell the two apart.
         """
         before = replace(self.current.explanation, effects=_last(self.current, name))
+        members = next((g[1:] for g in self.groups if g[0].effects[-1] == name), [])
         self.groups = [g for g in self.groups if g[0].effects[-1] != name]
-        self.groups += [[other.explanation, before]] if tied else []
-        self._step(name, [other.name, name] if tied else [other.name])
+        # What could not be told from the name has not lost against the rival.
+        group = [other.explanation, *([before] if tied else []), *members][:GROUP]
+        self.groups += [group] if len(group) > 1 else []
+        self._step(name, [e.effects[-1] for e in group])
         self.chosen = [other.name if c == name else c for c in self.chosen]
         self.dropped.append(name)
-        self.current, self.rivals = other, []
+        self.current, self.not_named = other, []
 
     def tie(self, name: str, other: Hypothesis) -> None:
         """Say of a rival that the log cannot tell it from a name.
@@ -93,6 +100,20 @@ class Path:
             self.groups.append(group)
         group.append(other.explanation)
         self._step(name, [e.effects[-1] for e in group])
+
+    def members(self, name: str) -> int:
+        """Return how many effects, the name among them, the log cannot tell from a name.
+
+        Args:
+            name: that leads.
+        """
+        return next((len(g) for g in self.groups if g[0].effects[-1] == name), 1)
+
+    @property
+    def in_order(self) -> list[list[FittedHypothesis]]:
+        """The groups in the order of the steps that they belong to."""
+        at = {s["effects"][0]: k for k, s in enumerate(self.steps)}
+        return sorted(self.groups, key=lambda g: at[g[0].effects[-1]])
 
     def _step(self, name: str, names: list[str]) -> None:
         """Put names in the place of those of the step that a name leads."""
