@@ -30,6 +30,7 @@ SAMPLES = {
     "rows-10.jsonl": 9,
     "rows-11.jsonl": 10,
     "rows-12.jsonl": 11,
+    "rows-13.jsonl": 12,
 }
 
 

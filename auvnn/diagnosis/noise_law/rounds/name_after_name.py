@@ -74,7 +74,14 @@ class NameAfterName(UnderLaw):
     def names_after(
         self, path: Path, null: Hypothesis, fitted: Sequence[FittedHypothesis], most: int
     ) -> tuple[list[Hypothesis], float]:
-        """Go on with one name after the other; return what was tried at first, and the p-value of there being nothing."""
+        """Go on with one name after the other; return what was tried at first, and the p-value of there being nothing.
+
+        Args:
+            path: where the search has come; it goes on there.
+            null: the explanation without any name.
+            fitted: explanations of one effect that the first search has fitted.
+            most: look for at most this many.
+        """
         tried, whole = list[Hypothesis](), 1.0
         while len(path.chosen) < most:
             result = self._round(null, path.current, path.chosen, self._passed(path), fitted)
