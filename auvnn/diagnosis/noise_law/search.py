@@ -43,8 +43,7 @@ from auvnn.diagnosis.noise_law.rounds.name_after_name import NameAfterName
 from auvnn.diagnosis.noise_law.rounds.path import Path
 from auvnn.diagnosis.noise_law.under_law import NULL_STEPS
 from auvnn.diagnosis.selection.model_comparison import ODDS
-from auvnn.diagnosis.stages.state import Setting, State
-from auvnn.metrics.windows import Windows
+from auvnn.diagnosis.stages.state import State
 
 Array = NDArray[np.float64]
 
@@ -57,13 +56,6 @@ class ForceSearch(NameAfterName):
         windows: of the log, without a law.
         closed_loop: whether commands are known to answer the motion; else it is asked of the fit without any name.
     """
-
-    def __init__(self, asked: Setting, windows: Windows, *, closed_loop: bool = False) -> None:
-        """Begin without a law."""
-        super().__init__(asked, windows, closed_loop=closed_loop)
-        self._refits: dict[
-            tuple[int, str, int, bool], tuple[Hypothesis, FittedHypothesis | None, Hypothesis | None]
-        ] = {}
 
     def run(self, null: Hypothesis, fitted: Sequence[FittedHypothesis], most: int) -> WithForce:
         """Search for one effect after the other.

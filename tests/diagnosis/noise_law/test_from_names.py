@@ -29,11 +29,11 @@ def begun(monkeypatch, further: Any = None) -> tuple[Any, Any, list[str]]:
         return h
 
     asked.fits = lambda: SimpleNamespace(settled=settled, told=lambda e: e)
-    asked.judged = lambda first, law: NULL
+    asked.judged = lambda first, law: done.append(f"judged {first} by {law}") or NULL
     first: Any = SimpleNamespace(fitted=SimpleNamespace(sigma=None))
     before: Any = SimpleNamespace(steps=STEPS, tried=(), groups=(), p_value=0.5, first=first)
     asked.windows = asked.sigma = asked.response = asked.cell = "given"
-    begun: Any = SimpleNamespace(explanation=None, law=None)
+    begun: Any = SimpleNamespace(explanation="the first", law="all axes")
     monkeypatch.setattr(module, "first_law", lambda *given: begun if given[1:] == ("given",) * 4 else None)
     return asked, before, done
 
@@ -67,7 +67,12 @@ def test_without_a_needless_name_the_search_goes_on(monkeypatch):
         ("named", ["tether"], 1e-9),
     ]
     assert ended.last.effects == ("waves", "tether") and ended.tried == [] and ended.p_value == 0.5
-    assert done[:2] == ["settled waves None", f"settled nothing {module.NULL_STEPS}"] and ended.stands_out
+    # What is without a name may have a force in degrees of freedom in which the names leave none.
+    judged = "judged the first by all axes"
+    assert (
+        done[:3] == ["settled waves None", judged, f"settled nothing {module.NULL_STEPS}"]
+        and ended.stands_out
+    )
     # No more names than were asked for.
     assert [s["effects"] for s in both(asked, before, 1).steps] == [["waves"]]
 

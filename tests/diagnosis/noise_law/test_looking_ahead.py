@@ -16,6 +16,7 @@ from auvnn.diagnosis.noise_law.rounds import path as path_module
 from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import Branch, decided, shared, worth_following
 from auvnn.diagnosis.noise_law.search import ForceSearch
+from auvnn.diagnosis.score_tests.null_tests import Tested
 
 
 @dataclass(frozen=True)
@@ -367,7 +368,10 @@ def test_a_tie_is_decided_beside_all_names(monkeypatch, lost):
         "thrust_asymmetry": SimpleNamespace(evidence=30.0, degrees=1),
         "x": SimpleNamespace(evidence=90.0, degrees=0),
     }
-    asked._tested = lambda *_: SimpleNamespace(p_value=0.0, scores=scores)
+    remained: list[list[str]] = []
+    asked._tested = lambda current, remaining, *_: (
+        remained.append(remaining) or SimpleNamespace(p_value=0.0, scores=scores)
+    )
     monkeypatch.setattr(name_after_name, "tied", lambda _, good, before: good)
     monkeypatch.setattr(name_after_name, "decided", lambda good, *_: good)
     given: list[Any] = []
@@ -382,7 +386,7 @@ def test_a_tie_is_decided_beside_all_names(monkeypatch, lost):
 
     monkeypatch.setattr(module, "those_that_lose", those)
     ended = asked.run(found(-1000.0), [], 4)
-    assert wholes == [True]
+    assert wholes == [True] and remained[-1] == ["thrust_asymmetry"]
     # What the best further effect promises, of those of which the log says anything.
     assert given == [([[("payload",), ("trapped_water",)]], ("payload", "waves"), 30.0)]
     first = ended.steps[0]
@@ -454,3 +458,31 @@ def test_what_was_fitted_without_a_name_is_not_fitted_again(monkeypatch):
         (True, "payload", None),
         (False, "waves", None),
     ]
+
+
+def test_tests_of_more_effects_serve_for_fewer_and_not_the_other_way_round(monkeypatch):
+    made: list[list[str]] = []
+
+    def tests(weighed: Any, remaining: list[str], *_: Any) -> Tested:
+        made.append(remaining)
+        scores: Any = {n: SimpleNamespace(degrees=1, p_value=0.5) for n in remaining}
+        return Tested(scores, None, None)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(name_after_name, "NullTests", lambda *_: tests)
+    asked: Any = ForceSearch.__new__(ForceSearch)
+    asked.layout, asked._tests, asked.about, asked.say = None, {}, lambda *_: None, lambda _: None
+    current: Any = SimpleNamespace(explanation=None, estimate=SimpleNamespace(law=None), weighed=None)
+    assert [*asked._tested(current, ["payload", "waves"], [], []).scores] == ["payload", "waves"]
+    assert [*asked._tested(current, ["waves"], [], []).scores] == ["waves"]
+    assert made == [["payload", "waves"]]
+    assert [*asked._tested(current, ["waves", "tether"], [], []).scores] == ["waves", "tether"]
+    assert made[1:] == [["waves", "tether"]]
+
+
+def test_what_is_not_asked_for_is_no_further_name_though_it_was_fitted():
+    current: Any = found(1.0, "payload")
+    leaders = LeaderFits(None, None, print)  # type: ignore[arg-type]
+    leaders.take(current, found(9.0, "payload", "trapped_water"))
+    leaders.take(current, found(8.0, "payload", "waves"))
+    at: Any = SimpleNamespace(current=current, tested=SimpleNamespace(scores={"waves": None}))
+    assert names(leaders._beside(at)) == ["waves"]

@@ -173,13 +173,13 @@ def test_whether_commands_answer_is_asked_about_the_filtered_trajectories(monkey
     monkeypatch.setattr(under_law, "in_closed_loop", lambda end, _: about.append(end.around) or True)
     beside = search.ForceSearch(asked, windows)
     null = beside.begin(first, white(first, np.full(18, 1e-9)))
-    assert null is not None and beside.in_closed_loop
+    assert null is not None and beside.in_closed_loop and beside.names.in_closed_loop
     assert len(about) == 1 and about[0] is not None and about[0] is null.explanation.around
     # Of commands as they were read it was known before: what other laws make of them answers less.
     monkeypatch.setattr(under_law, "in_closed_loop", lambda end, _: False)
     for known in (True, False):
         beside = search.ForceSearch(asked, windows, closed_loop=known)
         assert beside.begin(first, white(first, np.full(18, 1e-9)), 0) is not None
-        assert beside.in_closed_loop is known
+        assert beside.in_closed_loop is known and beside.names.in_closed_loop is known
     coloured = replace(windows, noise=NoiseColour(np.full(18, 0.3)))
     assert beside.names.white_noise and not search.ForceSearch(asked, coloured).names.white_noise

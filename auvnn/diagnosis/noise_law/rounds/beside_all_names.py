@@ -7,8 +7,9 @@ likely, everything else refitted, is needed no longer; an effect that does bette
 rival that is refitted in the place of the one that leads loses where it falls short by more than any further effect would
 still gain, for that is how far the model is known to be wrong.
 
-Reference: Miller (2002), Subset Selection in Regression, 2nd ed., section 3.3 (backward elimination); Burnham and
-Anderson (2002), Model Selection and Multimodel Inference, 2nd ed., chapter 2 (whole models are compared, not terms).
+Reference: Miller (2002), Subset Selection in Regression, 2nd ed., chapter 3 (backward elimination and sequential
+replacement); Burnham and Anderson (2002), Model Selection and Multimodel Inference, 2nd ed., chapter 2 (whole models are
+compared, not terms).
 """
 
 from __future__ import annotations

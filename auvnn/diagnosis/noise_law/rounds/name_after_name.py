@@ -56,6 +56,10 @@ class NameAfterName(UnderLaw):
         self._tests: dict[int, tuple[frozenset[str], Tested]] = {}
         self._gone_on: dict[int, tuple[Hypothesis, Hypothesis]] = {}
         self._leaders: LeaderFits | None = None
+        # What was fitted without a name, or with a rival in its place, kept with what it came from.
+        self._refits: dict[
+            tuple[int, str, int, bool], tuple[Hypothesis, FittedHypothesis | None, Hypothesis | None]
+        ] = {}
         # Values of effects that were fitted when nothing was chosen.
         self._earlier: dict[str, Array] = {}
 
