@@ -10,6 +10,14 @@ T = TypeVar("T")
 AHEAD = 2
 
 
+def silent(words: str) -> None:
+    """Say nothing: for work whose progress somebody else tells.
+
+    Args:
+        words: what is being done.
+    """
+
+
 class Progress(str):
     """Words for `progress=`, with how many of how many equal steps are done.
 

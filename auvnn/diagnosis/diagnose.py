@@ -26,6 +26,8 @@ from auvnn.diagnosis.stages.what_is_left import settled
 from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.prediction_error import SINGULAR
 from auvnn.estimation.window_normal_equations import TRUST, motion
+from auvnn.executors import Executor, executor_for
+from auvnn.executors.serial import SERIAL
 from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.unmeasured import assumed, completed
@@ -55,6 +57,9 @@ def diagnose(
     force: bool = False,
     tolerance: Any = None,
     costs: bool = True,
+    workers: int = 1,
+    executor: str | None = None,
+    address: str | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """Say which physical effects a model lacks, by a log.
@@ -78,10 +83,13 @@ def diagnose(
             share of the actuators', or a mapping with `cost` and `force`; by default 0.1 and 0.02. At 0 everything
             matters that is there.
         costs: also work out what each name costs in free running, which takes about as long as naming it.
+        workers: how many fit effects side by side; the answer is the same. Worth it where a diagnosis takes minutes.
+        executor: who fits: `serial`, `processes`, `ray` or `dask`; by default processes where there are several workers.
+        address: of a Ray or Dask cluster that is running.
         progress: called with what is being done, in words.
 
     Raises:
-        ConfigError: an unknown effect.
+        ConfigError: an unknown effect or executor, or fewer than one worker.
         InputError: the log has too little that can be used, or contradicts itself.
 
     Example:
@@ -94,20 +102,22 @@ def diagnose(
     """
     log = as_log(log)
     model = as_model(model, log)
-    return searched(
-        model,
-        log,
-        effects,
-        max_effects=max_effects,
-        window=window,
-        advice=advice,
-        whiteness=whiteness,
-        stochastic=stochastic,
-        force=force,
-        tolerance=tolerance,
-        costs=costs,
-        progress=progress,
-    )[0]
+    with executor_for(executor, workers, address) as pool:
+        return searched(
+            model,
+            log,
+            effects,
+            max_effects=max_effects,
+            window=window,
+            advice=advice,
+            whiteness=whiteness,
+            stochastic=stochastic,
+            force=force,
+            tolerance=tolerance,
+            costs=costs,
+            pool=pool,
+            progress=progress,
+        )[0]
 
 
 def searched(
@@ -123,6 +133,7 @@ def searched(
     force: bool = False,
     tolerance: Any = None,
     costs: bool = True,
+    pool: Executor = SERIAL,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[Diagnosis, Searched]:
     """Return what `diagnose` does, and the search that led to it.
@@ -139,6 +150,7 @@ def searched(
         force: go on with a log that contradicts itself: signs, units, axes.
         tolerance: what counts as small: a `Tolerance`, its options, or None.
         costs: say what each name costs in free running.
+        pool: who makes fits of which none has to wait for another.
         progress: called with what is being done, in words.
     """
     say = Counted(progress, 8 + 4 * bool(costs) + bool(whiteness) + 3 * bool(advice), rough=True)
@@ -171,6 +183,7 @@ def searched(
         absorbed=absorbed,
         notes=(*assumed(log, model), *blind(log), *notes, *doubts(model, log)),
         say=say,
+        pool=pool,
     )
     try:
         state, told, words = search(asked, windows, until=ends_early if stochastic else None), {}, []

@@ -19,3 +19,7 @@ class Serial(Executor):
         """Yield the answers in the order of the tasks."""
         for task in tasks:
             yield function(shared, task)
+
+
+# For work that nobody has given workers.
+SERIAL = Serial()

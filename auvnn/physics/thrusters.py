@@ -50,15 +50,16 @@ def table_thrust(command: PerPart, command_grid: Knots, thrust_grid: Knots) -> P
         (..., n), N.
     """
     c = torch.clamp(command, command_grid[..., 0], command_grid[..., -1])
+    if command_grid.dim() == 1:
+        at = torch.bucketize(c.detach().contiguous(), command_grid[1:-1].contiguous(), right=True)
+        slope = (thrust_grid[1:] - thrust_grid[:-1]) / (command_grid[1:] - command_grid[:-1])
+        return thrust_grid[at] + slope[at] * (c - command_grid[at])
     piece = (c.unsqueeze(-1) >= command_grid[..., 1:-1]).sum(-1)
     left, base = torch.broadcast_tensors(command_grid[..., :-1], thrust_grid[..., :-1])
     pieces = torch.stack((left, base, (thrust_grid[..., 1:] - base) / (command_grid[..., 1:] - left)), -1)
-    if pieces.dim() == 2:
-        own = pieces[piece]
-    else:
-        rank = max(piece.dim() + 2, pieces.dim())
-        index = piece[(None,) * (rank - piece.dim() - 2)][..., None, None]
-        own = torch.take_along_dim(pieces[(None,) * (rank - pieces.dim())], index, -2).squeeze(-2)
+    rank = max(piece.dim() + 2, pieces.dim())
+    index = piece[(None,) * (rank - piece.dim() - 2)][..., None, None]
+    own = torch.take_along_dim(pieces[(None,) * (rank - pieces.dim())], index, -2).squeeze(-2)
     start, low, slope = own.unbind(-1)
     return low + slope * (c - start)
 

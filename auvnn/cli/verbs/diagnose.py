@@ -34,8 +34,10 @@ def _in_memory(job: Job) -> Diagnosis:
     from auvnn.diagnosis import diagnose
 
     log = job.log(partial=True)
-    options = {**_options(job), "stochastic": bool(job["stochastic"])}
-    return diagnose(job.model(log), log, _effects(job), progress=job.say.progress, **options)
+    return diagnose(
+        job.model(log), log, _effects(job),
+        stochastic=bool(job["stochastic"]), progress=job.say.progress, **_options(job), **_workers(job),
+    )  # fmt: skip
 
 
 def _in_parts(job: Job) -> Diagnosis:
@@ -65,7 +67,11 @@ def _shares(job: Job) -> dict[str, Any]:
 
     usual = {"windows": WINDOWS, "leading": LEADING}
     amounts = {k: {None: most, "all": None}.get(job[k], job[k]) for k, most in usual.items()}
-    return {**amounts, **{key: job[key] for key in ("search", "workers", "executor", "address")}}
+    return {**amounts, **_workers(job), "search": job["search"]}
+
+
+def _workers(job: Job) -> dict[str, Any]:
+    return {key: job[key] for key in ("workers", "executor", "address")}
 
 
 VERB = Verb(

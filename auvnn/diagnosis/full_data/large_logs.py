@@ -135,6 +135,7 @@ def diagnose_files(
             costs=costs,
             # The tests on more windows that follow hold the force for noise as the windows show it.
             stochastic=False,
+            pool=pool,
             progress=say,
         )
         parts = plan.spread(windows)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.first_law import first_law
 from auvnn.diagnosis.noise_law.hypothesis import (
     GROUP,
@@ -26,9 +27,10 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     WithForce,
     in_newtons,
 )
-from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
+from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
 from auvnn.diagnosis.noise_law.model_average import averaged
 from auvnn.diagnosis.noise_law.rounds.beside_all_names import (
+    Change,
     Refit,
     Rivals,
     as_good_in_place,
@@ -79,10 +81,10 @@ class ForceSearch(NameAfterName):
         """
         path = Path.of_names(self.fits().settled(named), before.steps)
         refit = self._refit(path.current)
-        for lead, *others in before.groups:
-            for other in [refit(lead.effects[-1], e) for e in others]:
-                if other is not None:
-                    path.tie(lead.effects[-1], other)
+        tied = [(lead.effects[-1], e) for lead, *others in before.groups for e in others]
+        for (name, _), other in zip(tied, refit(tied), strict=True):
+            if other is not None:
+                path.tie(name, other)
         known, anything = len(self._passed(path)), False
         rivals = rivals_tried(path.chosen, before.tried, before.first.fitted.sigma)
         while self._fewer(path, path.chosen) or self._exchanged(path, path.chosen, rivals):
@@ -152,13 +154,14 @@ class ForceSearch(NameAfterName):
     def _refit(self, current: Hypothesis, *, whole: bool = False) -> Refit:
         """Return what fits all names but one, perhaps with a rival in its place; what was asked before is kept."""
 
-        def refit(name: str, rival: FittedHypothesis | None) -> Hypothesis | None:
-            key = id(current), name, id(rival), whole
-            if key not in self._refits:
-                at = refitted(self.layout, self.fits(), current, self.base, name, rival, whole=whole)
+        def refit(changes: Sequence[Change]) -> list[Hypothesis | None]:
+            keys = [(id(current), name, id(rival), whole) for name, rival in changes]
+            new = {k: change for k, change in zip(keys, changes, strict=True) if k not in self._refits}
+            shared = self.layout, self.fits(), current, self.base, whole
+            for key, at in zip(new, self.pool.run(_changed, shared, list(new.values())), strict=True):
                 # Kept with what it came from: nothing else can have their places then.
-                self._refits[key] = current, rival, at
-            return self._refits[key][2]
+                self._refits[key] = current, new[key][1], at
+            return [self._refits[key][2] for key in keys]
 
         return refit
 
@@ -197,3 +200,11 @@ class ForceSearch(NameAfterName):
             with suppress(*UNSOLVED):
                 told.append(self.fits().told(h.explanation))
         return told
+
+
+def _changed(
+    shared: tuple[Layout, LawFits, Hypothesis, list[str], bool], change: Change
+) -> Hypothesis | None:
+    """Return all names with one left out, or a rival in its place, see `refitted`: a task of an executor."""
+    layout, fits, current, base, whole = shared
+    return refitted(layout, fits, current, base, *change, whole=whole)

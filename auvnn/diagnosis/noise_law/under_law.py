@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.commands.uncertain import in_closed_loop
 from auvnn.diagnosis.noise_law.first_law import first_law
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis, judged
@@ -26,6 +27,44 @@ Array = NDArray[np.float64]
 NULL_STEPS = 25
 
 
+@dataclass(frozen=True)
+class Judge:
+    """From an explanation and a law to what both are worth.
+
+    Attributes:
+        layout: stated values.
+        windows: of the log, without a law.
+        sigma: (18,) the sensors' white noise.
+        cell: the time over which the force is constant, s.
+        response: (6, 6) accelerations by the forces of the law.
+    """
+
+    layout: Layout
+    windows: Windows
+    sigma: Array
+    cell: float
+    response: Array | None
+
+    def __call__(self, explanation: FittedHypothesis, law: ForceLaw, held: bool = False) -> Hypothesis:
+        """Return an explanation with the law that is most likely with it, or with the one given, and what they are worth.
+
+        Args:
+            explanation: the explanation.
+            law: to begin from.
+            held: whether the law stays as it is.
+        """
+        return judged(self.layout, explanation, self.sums(explanation), self.sigma, law, 0 if held else STEPS)
+
+    def sums(self, explanation: FittedHypothesis) -> ForceSums:
+        """Return what the windows say of parameters and force, linear about an explanation's trajectories.
+
+        Args:
+            explanation: the explanation.
+        """
+        about = replace(self.windows, law=None, around=explanation.around)
+        return force_sums(explanation, about, self.sigma, self.cell, self.response)
+
+
 class UnderLaw:
     """One log under laws of the force.
 
@@ -38,6 +77,7 @@ class UnderLaw:
     def __init__(self, asked: Setting, windows: Windows, *, closed_loop: bool = False) -> None:
         """Begin without a law."""
         self.layout, self.windows, self.base, self.say = asked.layout, windows, list(asked.base), asked.say
+        self.pool = asked.pool
         self.in_closed_loop = closed_loop
         self.sigma = self.weights = np.full(18, np.inf)
         self.cell = CELL
@@ -73,26 +113,15 @@ class UnderLaw:
         """Return what fits under laws of the force."""
         return LawFits(self.windows, self.weights, self.judged)
 
-    def judged(self, explanation: FittedHypothesis, law: ForceLaw, held: bool = False) -> Hypothesis:
-        """Return an explanation with the law that is most likely with it, or with the one given, and what they are worth.
-
-        Args:
-            explanation: the explanation.
-            law: to begin from.
-            held: whether the law stays as it is.
-        """
-        return judged(
-            self.layout, explanation, self._sums(explanation), self.sigma, law, 0 if held else STEPS
-        )
-
-    def _sums(self, explanation: FittedHypothesis) -> ForceSums:
-        """Return what the windows say of parameters and force, linear about an explanation's trajectories."""
-        return force_sums(explanation, self.about(explanation), self.sigma, self.cell, self.response)
+    @property
+    def judged(self) -> Judge:
+        """Who says what an explanation is worth under a law."""
+        return Judge(self.layout, self.windows, self.sigma, self.cell, self.response)
 
     def predicted(self, found: Hypothesis) -> InputPrediction | None:
         """Return what measured inputs predict of the force that an explanation leaves; None where that is little."""
         self.say("asking how much of the force measured inputs predict")
         about, law = self.about(found.explanation), found.estimate.law
-        sums, closed = self._sums(found.explanation), self.in_closed_loop
+        sums, closed = self.judged.sums(found.explanation), self.in_closed_loop
         told = predicted_by_inputs(found.weighed, about, sums, law, closed_loop=closed)
         return told if told is not None and told.matters else None

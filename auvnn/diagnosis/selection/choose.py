@@ -14,14 +14,17 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, log_evidence
-from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, scales, shapes
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, scales, shapes
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.model_comparison import ALPHA_NEEDED, ODDS, ModelComparison, confused
 from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
 from auvnn.diagnosis.selection.prune import Pruning
+from auvnn.diagnosis.selection.refit_leaders import Beside, fitted_beside
 from auvnn.effects import effect_class
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
+from auvnn.executors import Executor
+from auvnn.executors.serial import SERIAL
 
 Array = NDArray[np.float64]
 ALPHA = 0.05
@@ -30,9 +33,6 @@ LEADERS, REACH, REACH_SHARE = 5, 30.0, 0.5
 # Where the errors fall by so many times what the slopes at the null promised, or by so small a share of it, these do not
 # rank the effects; so many of those that are known to be confused with the best one are fitted too.
 BENT, RIVALS = 1.5, 2
-# Parts of what a test estimates from which a fit is begun, the next where the one before diverged: near the
-# bottom the force grows faster than any slope says.
-SHARES = (1.0, 0.1)
 # Within this share of its plausible scale of its null, an effect does nothing.
 NOTHING = 1e-4
 
@@ -64,7 +64,10 @@ class Chooser(Pruning):
         layout: stated values.
         windows: of the log.
         say: called with what is being done, in words.
+        pool: who makes fits of which none has to wait for another.
     """
+
+    pool: Executor = SERIAL
 
     @property
     def rivals(self) -> ModelComparison:
@@ -96,15 +99,10 @@ class Chooser(Pruning):
         # Evidence counts an effect of many parameters low while it is small; a test that is clear even among
         # all the others lets it be judged by what it does on runs left out.
         clear = {s.effect for s in significant if s.p_value < ALPHA / len(scores)}
-        tried, failed = [], {}
-        for candidate in leading:
-            try:
-                tried.append(self._refitted(candidate, at, base, chosen, current))
-            except (FitError, np.linalg.LinAlgError) as problem:
-                failed[candidate.effect] = f"its fit failed: {problem}"
-        for candidate in self._beyond_slopes(tried, significant, current):
-            with suppress(FitError, np.linalg.LinAlgError):
-                tried.append(self._refitted(candidate, at, base, chosen, current))
+        beside = Beside(self.layout, self.windows, at, base, chosen, current)
+        tried, failed = fitted_beside(beside, leading, self.pool, self.say)
+        bent = self._beyond_slopes(tried, significant, current)
+        tried += fitted_beside(beside, bent, self.pool, self.say)[0]
         found = self._among(tried, clear, at, base, current)
         return replace(found, failed=failed)
 
@@ -254,37 +252,3 @@ class Chooser(Pruning):
         if gain < ODDS or not improves_predictive_density(both, best):
             return None
         return self._settled(both, at, base)
-
-    def _refitted(
-        self, candidate: Score, at: Layout, base: list[str], chosen: list[str], current: FittedHypothesis
-    ) -> FittedHypothesis:
-        name = candidate.effect
-        self.say(f"fitting {name}")
-        guess = at.model.rebuilt(at.model.copied_effects())
-        known = parameters_of(at.model, [name])
-        start, shape = initial_guess(self.layout, name, candidate.estimate), shapes(self.layout, name)
-        found: FittedHypothesis | None = None
-        problem: FitError | None = None
-        for share in SHARES:
-            begin = np.where(shape, start, known + share * (start - known))
-            set_parameters(guess, [name], begin)
-            try:
-                found = fit_hypothesis(
-                    self.layout,
-                    self.windows,
-                    base,
-                    [*chosen, name],
-                    start=current.fitted,
-                    guess=replace(at, model=guess),
-                    sigma=current.fitted.sigma,
-                    iterations=6,
-                )
-            except FitError as fault:
-                problem = fault
-                continue
-            # It holds the fit without the effect: one that is worse than that has diverged.
-            if found.fitted.cost <= current.fitted.cost:
-                break
-        if found is None:
-            raise problem or FitError(f"{name} has nowhere to begin")
-        return found

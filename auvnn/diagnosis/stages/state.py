@@ -18,6 +18,8 @@ from auvnn.diagnosis.residuals.additive_force_test import AdditiveForce
 from auvnn.diagnosis.residuals.variance_component_test import Unnamed
 from auvnn.diagnosis.score_tests.null_tests import NullTests
 from auvnn.diagnosis.selection.choose import Chooser
+from auvnn.executors import Executor
+from auvnn.executors.serial import SERIAL
 from auvnn.logs import Log
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
@@ -45,6 +47,7 @@ class Setting:
         absorbed: what the learned damping may have taken in that is no damping; None without any.
         notes: what to say about the model and the log besides.
         say: called with what is being done, in words.
+        pool: who makes fits of which none has to wait for another.
     """
 
     model: GreyBox
@@ -62,10 +65,11 @@ class Setting:
     absorbed: Any
     notes: tuple[str, ...]
     say: Callable[[str], None]
+    pool: Executor = SERIAL
 
     def chooser(self, windows: Windows) -> Chooser:
         """Return who weighs explanations of these windows."""
-        return Chooser(self.layout, windows, self.say)
+        return Chooser(self.layout, windows, self.say, self.pool)
 
     def tests(self, windows: Windows) -> NullTests:
         """Return who tests effects at their nulls on these windows."""

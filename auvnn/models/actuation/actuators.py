@@ -93,12 +93,16 @@ class Actuators(nn.Module):
         self.register_buffer("max_forward", _double([float(u.max_forward) for u in units]))
         self.register_buffer("max_reverse", _double([float(u.max_reverse) for u in units]))
         self.tables: list[int] = []
+        same: dict[tuple[float, ...], list[int]] = {}
         for index, unit in enumerate(units):
             curve = unit.curve
             if not isinstance(curve, str):
                 self.tables.append(index)
                 self.register_buffer(f"table_command_{index}", _double(list(curve.command)))
                 self.register_buffer(f"table_thrust_{index}", _double(list(curve.thrust)))
+                same.setdefault((*curve.command, *curve.thrust), []).append(index)
+        # Thrusters that have the same table are looked up together.
+        self.alike = list(same.values())
 
     @property
     def size(self) -> int:
@@ -110,13 +114,11 @@ class Actuators(nn.Module):
         if self.actuation == "wrench":
             return command
         thrust = quadratic_thrust(command, self.max_forward, self.max_reverse)
-        if not self.tables:
-            return thrust
-        columns = list(thrust.unbind(-1))
-        for index in self.tables:
-            grid = getattr(self, f"table_command_{index}")
-            columns[index] = table_thrust(command[..., index], grid, getattr(self, f"table_thrust_{index}"))
-        return torch.stack(columns, dim=-1)
+        for like in self.alike:
+            grid, of = (getattr(self, f"table_{what}_{like[0]}") for what in ("command", "thrust"))
+            looked_up = table_thrust(command[..., like], grid, of)
+            thrust = thrust.index_copy(-1, torch.tensor(like, device=thrust.device), looked_up)
+        return thrust
 
     def demand(self, command: Tensor, times: Tensor, effects: Sequence[Effect]) -> Tensor:
         """Return the settled thrust (..., T, n) of held commands, after the effects on commands.

@@ -9,7 +9,8 @@ from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.score_tests.score import Score
-from auvnn.diagnosis.selection.choose import Chooser
+from auvnn.diagnosis.selection.refit_leaders import Beside
+from auvnn.diagnosis.selection.refit_leaders import refitted as of_test
 from auvnn.improvement import add
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
@@ -25,10 +26,9 @@ def refitted(model, log, effect, estimate):
     layout, windows = lay_out(model, [effect]), windows_for(model, log)
     base = [n for n in layout.names if n != effect]
     current = fit_hypothesis(layout, windows, base, [])
-    chooser = Chooser(layout, windows, lambda words: None)
     estimated = np.array(estimate)
     score = Score(effect, 0.0, 0.0, 1, 1.0, estimated, np.ones_like(estimated), 0.0, 0.0)
-    return chooser._refitted(score, layout, base, [], current), current
+    return of_test(Beside(layout, windows, layout, base, [], current), score), current
 
 
 def test_a_fit_that_goes_astray_is_begun_again_nearer_to_the_null(model):

@@ -29,9 +29,15 @@ from auvnn.diagnosis.noise_law.rounds.path import Path
 from auvnn.diagnosis.noise_law.under_law import UnderLaw
 from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.estimation.priors import parameters_of, set_parameters
+from auvnn.executors.serial import SERIAL
 from auvnn.models import GreyBox
 from tests.diagnosis.noise_law.wandering import wandering_log
 from tests.small_logs import small_vehicle
+
+
+def one_by_one(refit: Any) -> Any:
+    """Return what fits several changes, from what fits one."""
+    return lambda changes: [refit(*change) for change in changes]
 
 
 def worth(evidence: float) -> Any:
@@ -51,7 +57,7 @@ NULL = fit(-1000.0, "")
 
 def test_the_name_that_the_log_needs_least_goes():
     without = {"added_mass": 6.1, "cg_offset": 2.6, "tilted_vertical": -117.6, "payload": None}
-    refit: Any = lambda name, rival: None if without[name] is None else worth(without[name])  # noqa: E731
+    refit: Any = one_by_one(lambda name, rival: None if without[name] is None else worth(without[name]))
     name, rest = no_longer_needed(without, worth(0.0), refit)  # type: ignore[misc,arg-type]
     assert name == "added_mass" and rest.evidence == 6.1
     # The log is 4.6 likelier with a name that is needed, in the logarithm: a hundred to one.
@@ -101,6 +107,7 @@ def test_each_rival_is_fitted_in_the_place_of_the_one_that_leads(monkeypatch):
     fits = {"current_shear": -900.0, "velocity_scale": -3.0}
     asked = []
 
+    @one_by_one
     def refit(name, rival):
         asked.append((name, rival.effects[-1]))
         return worth(fits[rival.effects[-1]]) if rival.effects[-1] in fits else None
@@ -226,6 +233,7 @@ def test_rivals_among_fits_without_the_force_come_by_what_they_leave():
 def test_a_plainer_cause_may_take_the_place_of_a_name_once_others_are_found(evidences, expected):
     asked = []
 
+    @one_by_one
     def refit(name: str, rival: Any) -> Any:
         asked.append((name, rival.effects[-1]))
         value = evidences[rival.effects[-1]]
@@ -316,7 +324,7 @@ def beside() -> tuple[UnderLaw, Any]:
     log = wandering_log(plant, rms, 1.0, runs=2, duration=40.0, seed=1)
     layout, windows = lay_out(model, ["net_buoyancy", "thruster_gain", "gyro_bias"]), windows_for(model, log)
     base = ["linear_damping", "quadratic_damping"]
-    asked: Any = SimpleNamespace(layout=layout, base=base, say=lambda _: None, log=log)
+    asked: Any = SimpleNamespace(layout=layout, base=base, say=lambda _: None, log=log, pool=SERIAL)
     first = fit_hypothesis(layout, windows, base, (), iterations=4)
     under = UnderLaw(asked, windows)
     null = under.begin(first, white(first, np.full(18, 1e-9)))
@@ -341,6 +349,7 @@ def test_a_name_that_took_up_what_a_later_one_explains_is_needed_no_longer(besid
     assert value == pytest.approx(8.0, abs=3.0)
     assert parameters_of(without.explanation.fitted.model, ["thruster_gain"]) == pytest.approx(1.0)
 
+    @one_by_one
     def refit(name: str, rival: Any) -> Any:
         return refitted(under.layout, under.fits(), both, under.base, name, rival)
 

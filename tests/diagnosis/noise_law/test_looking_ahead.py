@@ -17,6 +17,7 @@ from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import Branch, decided, shared, worth_following
 from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.diagnosis.score_tests.null_tests import Tested
+from auvnn.executors.serial import SERIAL
 
 
 @dataclass(frozen=True)
@@ -235,7 +236,7 @@ def scripted(
     asked.fits = lambda: SimpleNamespace(told=lambda e: diverging(e))
     asked.about = lambda *_: None
     asked.predicted, asked.in_closed_loop, asked.say = lambda _: None, False, lambda _: None
-    asked.averaged_with, asked._refits = [], {}
+    asked.averaged_with, asked._refits, asked.pool = [], {}, SERIAL
 
     def averaged(_: Any, current: Any, rivals: Any) -> Any:
         asked.averaged_with.append([h.explanation.effects for h in rivals])
@@ -380,7 +381,7 @@ def test_a_tie_is_decided_beside_all_names(monkeypatch, lost):
     monkeypatch.setattr(module, "refitted", lambda *_, whole: wholes.append(whole))
 
     def those(groups: Any, current: Any, refit: Any, rest: float) -> set[tuple[str, str]]:
-        refit("payload", groups[0][1])
+        refit([("payload", groups[0][1])])
         given.append(([[e.effects for e in g] for g in groups], current.explanation.effects, rest))
         return {("payload", "trapped_water")} if lost else set()
 
@@ -448,10 +449,10 @@ def test_what_was_fitted_without_a_name_is_not_fitted_again(monkeypatch):
         Effects(("tether",)),
     )
     refit = asked._refit(current)
-    assert [refit("waves", None), refit("waves", rival), refit("payload", None)] == [1, 2, 3]
-    assert [asked._refit(current)("waves", None), refit("waves", rival), refit("payload", None)] == [1, 2, 3]
+    assert refit([("waves", None), ("waves", rival), ("waves", None)]) == [1, 2, 1]
+    assert asked._refit(current)([("waves", None), ("payload", None), ("waves", rival)]) == [1, 3, 2]
     # Another explanation with the same names is another one.
-    assert asked._refit(other)("waves", None) == 4
+    assert asked._refit(other)([("waves", None)]) == [4]
     assert [(given[0] is current, *given[2:]) for given in fits] == [
         (True, "waves", None),
         (True, "waves", rival),

@@ -36,8 +36,10 @@ SURE = 3.0
 # Logarithm of the odds by which a fit may fall short, what its next step promises included, before it is given up: where
 # a name is needed so much, the fit without it need not be finished.
 FAR = 1000.0
-# Takes a name and a rival, or None; returns the fit of all names with the rival in the place of the name.
-Refit = Callable[[str, FittedHypothesis | None], Hypothesis | None]
+# A name, and a rival that is to take its place, or None.
+Change = tuple[str, FittedHypothesis | None]
+# Returns of each change the fit of all names with it, None where that fails; no fit has to wait for another.
+Refit = Callable[[Sequence[Change]], Sequence[Hypothesis | None]]
 # Of each effect what might take its place.
 Rivals = Mapping[str, Sequence[FittedHypothesis]]
 
@@ -86,7 +88,8 @@ def no_longer_needed(
         current: with all names.
         refit: fits all names but one.
     """
-    without = [(name, refit(name, None)) for name in names]
+    names = list(names)
+    without = zip(names, refit([(name, None) for name in names]), strict=True)
     spare = [(n, h) for n, h in without if h is not None and current.evidence - h.evidence < ODDS]
     return max(spare, key=lambda found: found[1].evidence, default=None)
 
@@ -137,13 +140,15 @@ def as_good_in_place(
         rivals: of each name; the first two are fitted.
         refit: fits all names with a rival in the place of one.
     """
-    found = []
+    changes: list[Change] = []
     for name in names:
         able = [e for e in rivals.get(name, ()) if e.effects[-1] not in current.explanation.effects]
-        for rival in able[:RIVALS]:
-            other = refit(name, rival)
-            if other is not None and current.evidence - other.evidence < ODDS:
-                found.append((name, other))
+        changes += [(name, rival) for rival in able[:RIVALS]]
+    found = [
+        (name, other)
+        for (name, _), other in zip(changes, refit(changes), strict=True)
+        if other is not None and current.evidence - other.evidence < ODDS
+    ]
     return max(found, key=lambda pair: pair[1].evidence, default=None)
 
 
@@ -171,13 +176,12 @@ def those_that_lose(
         refit: fits all names with a rival in the place of one.
         rest: what the best further effect gains beside the names, in the logarithm of the odds.
     """
-    lost = set()
-    for lead, *rivals in groups:
-        for rival in rivals:
-            other = refit(lead.effects[-1], rival)
-            if other is not None and loses(current, other, rest):
-                lost.add((lead.effects[-1], rival.effects[-1]))
-    return lost
+    pairs = [(lead.effects[-1], rival) for lead, *rivals in groups for rival in rivals]
+    return {
+        (name, rival.effects[-1])
+        for (name, rival), other in zip(pairs, refit(pairs), strict=True)
+        if other is not None and loses(current, other, rest)
+    }
 
 
 def without_lost(

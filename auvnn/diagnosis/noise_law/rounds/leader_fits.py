@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
 from auvnn.diagnosis.noise_law.rounds.leaders import rivals_of
 from auvnn.diagnosis.score_tests.null_tests import Tested
 from auvnn.estimation.priors import parameters_of, set_parameters
+from auvnn.executors import Executor
+from auvnn.executors.serial import SERIAL
+from auvnn.progress import silent
 
 Array = NDArray[np.float64]
 # Fitted in full beside those that the first search has fitted: so many of those that lead under the law, and so many more
@@ -72,6 +75,7 @@ class LeaderFits:
         layout: stated values.
         fits: under laws of the force.
         say: called with what is being done, in words.
+        pool: who fits effects of which none has to wait for another.
         known: what was fitted beside an explanation, by that and the effect's name: a search that passes there again asks
             for the same.
     """
@@ -79,6 +83,7 @@ class LeaderFits:
     layout: Layout
     fits: LawFits
     say: Callable[[str], None]
+    pool: Executor = SERIAL
     known: dict[tuple[int, str], tuple[Hypothesis, Hypothesis | None]] = field(default_factory=dict)
 
     def fitted(
@@ -181,13 +186,15 @@ class LeaderFits:
     def _each(
         self, names: Iterable[str], at: Round, known: Mapping[str, FittedHypothesis] | None = None
     ) -> list[Hypothesis]:
-        found = []
-        for name in names:
-            key = id(at.current), name
+        names = list(dict.fromkeys(names))
+        new = [n for n in names if (id(at.current), n) not in self.known]
+        alone = replace(self, say=silent, pool=SERIAL, known={})
+        fitted = self.pool.run(_fitted, (alone, at), [(n, (known or {}).get(n)) for n in new])
+        for name in new:
+            self.say(f"fitting {name} together with the force")
             # The explanation is kept with what was fitted: no other one can have its place then.
-            if key not in self.known:
-                self.known[key] = at.current, self._one(name, at, (known or {}).get(name))
-            found.append(self.known[key][1])
+            self.known[id(at.current), name] = at.current, next(fitted)
+        found = [self.known[id(at.current), name][1] for name in names]
         return [h for h in found if h is not None]
 
     def _one(self, name: str, at: Round, known: FittedHypothesis | None) -> Hypothesis | None:
@@ -202,7 +209,6 @@ class LeaderFits:
             at: the round.
             known: its fit by the first search.
         """
-        self.say(f"fitting {name} together with the force")
         tested, found = at.tested, []
         null = parameters_of(tested.at.model, [name])
         # At its null place and time an effect says nothing of them: they are where its test has found them.
@@ -219,6 +225,12 @@ class LeaderFits:
                 asked = [*at.chosen, name]
                 found.append(self.fits.from_null(self.layout, model, at.current, at.base, asked, least))
         return max(found, key=lambda h: h.evidence, default=None)
+
+
+def _fitted(shared: tuple[LeaderFits, Round], task: tuple[str, FittedHypothesis | None]) -> Hypothesis | None:
+    """Return an effect fitted under the law, see `LeaderFits._one`: a task of an executor."""
+    looks, at = shared
+    return looks._one(task[0], at, task[1])
 
 
 def _by_evidence(found: Iterable[Hypothesis]) -> list[Hypothesis]:

@@ -155,7 +155,7 @@ class NameAfterName(UnderLaw):
         odds = max(ODDS, share * (current.evidence - null.evidence))
         at = Round(tests, current, base, list(chosen), self._earlier if chosen else {})
         good_of = partial(self.names.good, at, len(remaining))
-        self._leaders = self._leaders or LeaderFits(self.layout, self.fits(), self.say)
+        self._leaders = self._leaders or LeaderFits(self.layout, self.fits(), self.say, self.pool)
         found, good = self._leaders.fitted(at, fitted, odds, ALPHA_NAME, good_of)
         if not chosen:
             self._earlier = {h.name: parameters_of(h.explanation.fitted.model, [h.name]) for h in found}
