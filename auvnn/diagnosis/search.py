@@ -9,6 +9,7 @@ import numpy as np
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.measured_start import GROSS, above_noise, noise_share
 from auvnn.diagnosis.residuals.variance_component_test import variance_component_test, white
+from auvnn.diagnosis.stages.rivals_again import compared_again
 from auvnn.diagnosis.stages.search_round import ALPHA_UNKNOWN, fit_null, regroup, search_round
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.diagnosis.stages.what_is_left import what_is_left
@@ -47,6 +48,8 @@ def search(
             return state
         if until is not None and not state.ended and until(asked, state):
             state = state.step("unknown", [], state.p_value).but(ended=True, interrupted=True)
+        if state.ended and not state.interrupted:
+            state = compared_again(asked, state)
     return what_is_left(asked, regroup(asked, state))
 
 

@@ -32,12 +32,10 @@ from auvnn.diagnosis.noise_law.model_average import averaged
 from auvnn.diagnosis.noise_law.rounds.beside_all_names import (
     Change,
     Refit,
-    Rivals,
     as_good_in_place,
     no_longer_needed,
     refitted,
     rivals_among,
-    rivals_tried,
     those_that_lose,
     without_lost,
 )
@@ -45,6 +43,7 @@ from auvnn.diagnosis.noise_law.rounds.name_after_name import NameAfterName
 from auvnn.diagnosis.noise_law.rounds.path import Path
 from auvnn.diagnosis.noise_law.under_law import NULL_STEPS
 from auvnn.diagnosis.selection.model_comparison import ODDS
+from auvnn.diagnosis.selection.rivals import Rivals, rivals_tried
 from auvnn.diagnosis.stages.state import State
 
 Array = NDArray[np.float64]

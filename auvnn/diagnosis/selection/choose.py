@@ -20,6 +20,7 @@ from auvnn.diagnosis.selection.model_comparison import ALPHA_NEEDED, ODDS, Model
 from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
 from auvnn.diagnosis.selection.prune import Pruning
 from auvnn.diagnosis.selection.refit_leaders import Beside, fitted_beside
+from auvnn.diagnosis.selection.rivals import Rivals
 from auvnn.effects import effect_class
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
@@ -236,6 +237,46 @@ class Chooser(Pruning):
         if left[0].effects[-1] == name:
             return left
         return [self._settled(left[0], self.layout, list(base)), *left[1:]]
+
+    def in_place(
+        self, taken: FittedHypothesis, base: Sequence[str], rivals: Rivals
+    ) -> tuple[tuple[str, FittedHypothesis] | None, dict[str, list[FittedHypothesis]]]:
+        """Compare an explanation with rivals in the place of its names, everything else refitted.
+
+        Args:
+            taken: the explanation with all names.
+            base: effects that are free whatever is chosen.
+            rivals: of names, explanations with each rival as the last effect.
+
+        Returns:
+            the name that has to give its place, and the explanation that takes it: more likely by the odds that a name
+            needs, and better on what is left out; None where there is none. And by names those from which the log cannot
+            tell them, the one to be taken first.
+        """
+        found: list[tuple[str, FittedHypothesis]] = []
+        for name, rival in [(n, e) for n, of in rivals.items() for e in of]:
+            with suppress(FitError, np.linalg.LinAlgError):
+                found.append((name, self._instead(taken, base, name, rival)))
+        factor = min(self._factor(e) for e in [taken, *(e for _, e in found)])
+        taken = log_evidence(self.layout, taken, factor)
+        weighed = [(name, log_evidence(self.layout, e, factor)) for name, e in found]
+        better = [
+            (name, e)
+            for name, e in weighed
+            if e.evidence - taken.evidence > ODDS and improves_predictive_density(e, taken)
+        ]
+        if better:
+            name, best = max(better, key=lambda pair: pair[1].evidence)
+            return (name, self._settled(best, self.layout, list(base))), {}
+        groups: dict[str, list[FittedHypothesis]] = {}
+        for name in rivals:
+            own = replace(taken, effects=(*(e for e in taken.effects if e != name), name))
+            alike = [e for n, e in weighed if n == name and not self.rivals.told_apart(own, e)]
+            plainer = effect_class(name).plainer
+            first, *rest = sorted([own, *alike], key=lambda e: e.effects[-1] not in plainer)
+            settled = first if first is own else self._settled(first, self.layout, list(base))
+            groups[name] = [settled, *rest]
+        return None, {name: group for name, group in groups.items() if len(group) > 1}
 
     def _joined(
         self, best: FittedHypothesis, other: FittedHypothesis, at: Layout, base: list[str], factor: float

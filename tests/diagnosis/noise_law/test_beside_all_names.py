@@ -21,13 +21,13 @@ from auvnn.diagnosis.noise_law.rounds.beside_all_names import (
     no_longer_needed,
     refitted,
     rivals_among,
-    rivals_tried,
     those_that_lose,
     without_lost,
 )
 from auvnn.diagnosis.noise_law.rounds.path import Path
 from auvnn.diagnosis.noise_law.under_law import UnderLaw
 from auvnn.diagnosis.residuals.variance_component_test import white
+from auvnn.diagnosis.selection.rivals import rivals_tried
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.executors.serial import SERIAL
 from auvnn.models import GreyBox

@@ -14,7 +14,7 @@ compared, not terms).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Sequence, Set
 from contextlib import suppress
 
 import numpy as np
@@ -28,6 +28,7 @@ from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
 from auvnn.diagnosis.noise_law.rounds.leaders import RIVALS
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import RIVALS_SHARE
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
+from auvnn.diagnosis.selection.rivals import Rivals
 from auvnn.estimation.priors import parameters_of, set_parameters
 
 Array = NDArray[np.float64]
@@ -40,8 +41,6 @@ FAR = 1000.0
 Change = tuple[str, FittedHypothesis | None]
 # Returns of each change the fit of all names with it, None where that fails; no fit has to wait for another.
 Refit = Callable[[Sequence[Change]], Sequence[Hypothesis | None]]
-# Of each effect what might take its place.
-Rivals = Mapping[str, Sequence[FittedHypothesis]]
 
 
 def refitted(
@@ -111,20 +110,6 @@ def rivals_among(known: Sequence[Hypothesis], null: Hypothesis) -> Rivals:
         ]
         for name, gain in gains.items()
     }
-
-
-def rivals_tried(names: Iterable[str], tried: Iterable[FittedHypothesis], sigma: Array) -> Rivals:
-    """Return what might take the place of each of some effects, of fits without the force, what leaves least first.
-
-    Args:
-        names: of the effects.
-        tried: explanations, perhaps with several effects, of which the last counts.
-        sigma: (18,) by which all of them are weighed.
-    """
-    least: dict[str, FittedHypothesis] = {}
-    for e in sorted((e for e in tried if e.effects), key=lambda e: e.squared_error(sigma)):
-        least.setdefault(e.effects[-1], e)
-    return {name: [e for n, e in least.items() if confused(n, name)] for name in names}
 
 
 def as_good_in_place(
