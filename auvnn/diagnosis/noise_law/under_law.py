@@ -111,17 +111,30 @@ class UnderLaw:
 
     def fits(self) -> LawFits:
         """Return what fits under laws of the force."""
-        return LawFits(self.windows, self.weights, self.judged)
+        return LawFits(self.windows, self.weights, self.judge)
 
     @property
-    def judged(self) -> Judge:
+    def judge(self) -> Judge:
         """Who says what an explanation is worth under a law."""
         return Judge(self.layout, self.windows, self.sigma, self.cell, self.response)
+
+    def judged(self, explanation: FittedHypothesis, law: ForceLaw) -> Hypothesis:
+        """Return an explanation with the law that is most likely with it, and what they are worth.
+
+        Args:
+            explanation: the explanation.
+            law: to begin from.
+        """
+        return self.judge(explanation, law)
+
+    def _sums(self, explanation: FittedHypothesis) -> ForceSums:
+        """Return what the windows say of parameters and force, linear about an explanation's trajectories."""
+        return self.judge.sums(explanation)
 
     def predicted(self, found: Hypothesis) -> InputPrediction | None:
         """Return what measured inputs predict of the force that an explanation leaves; None where that is little."""
         self.say("asking how much of the force measured inputs predict")
         about, law = self.about(found.explanation), found.estimate.law
-        sums, closed = self.judged.sums(found.explanation), self.in_closed_loop
+        sums, closed = self._sums(found.explanation), self.in_closed_loop
         told = predicted_by_inputs(found.weighed, about, sums, law, closed_loop=closed)
         return told if told is not None and told.matters else None
