@@ -18,6 +18,7 @@ from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round
 from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of
+from auvnn.executors.serial import SERIAL
 from auvnn.metrics.coloured_noise import NoiseColour
 from auvnn.models import GreyBox
 from tests.diagnosis.noise_law.wandering import wandering_log
@@ -168,7 +169,7 @@ def test_whether_commands_answer_is_asked_about_the_filtered_trajectories(monkey
     layout, windows, about = lay_out(model, []), windows_for(model, log), []
     first = fit_hypothesis(layout, windows, list(layout.names), (), iterations=4)
     asked: Any = SimpleNamespace(
-        layout=layout, tolerance=None, usable=(), base=layout.names, say=lambda _: None, log=log
+        layout=layout, tolerance=None, usable=(), base=layout.names, say=lambda _: None, log=log, pool=SERIAL
     )
     monkeypatch.setattr(under_law, "in_closed_loop", lambda end, _: about.append(end.around) or True)
     beside = search.ForceSearch(asked, windows)
