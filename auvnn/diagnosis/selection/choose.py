@@ -132,9 +132,10 @@ class Chooser(Pruning):
         best, standing = self.rivals.standing(paying, at, base, factor)
         rivals = [e for e in standing if not self.rivals.told_apart(best, e)]
         if rivals:
-            both = self._joined(best, rivals[0], at, base, factor)
-            if both is not None:
-                return Choice("named", both, tried, [])
+            for other in rivals:
+                both = self._joined(best, other, at, base, factor)
+                if both is not None:
+                    return Choice("named", both, tried, [])
             plainer = effect_class(best.effects[-1]).plainer
             group = sorted([best, *rivals], key=lambda e: e.effects[-1] not in plainer)
             # The first stands for all of them while more is asked for.

@@ -64,12 +64,12 @@ def _with_steps(state: State, instead: Mapping[str, list[str]]) -> State:
     """Return the state with other effects in the steps that gave some names."""
     told: list[SearchStep] = []
     for step in state.steps:
-        name = next((n for n in step["effects"] if n in instead), None)
-        if name is None or step["verdict"] == "withdrawn":
-            told.append(step)
-            continue
-        new = instead[name]
-        told.append({**step, "verdict": "ambiguous" if len(new) > 1 else "named", "effects": new})
+        names = [n for n in step["effects"] if n in instead and step["verdict"] != "withdrawn"]
+        # Of several names that one step gave together the others stay.
+        others = [n for n in step["effects"] if n not in names]
+        told += [{**step, "effects": others}] if others or not names else []
+        for new in (instead[n] for n in names):
+            told.append({**step, "verdict": "ambiguous" if len(new) > 1 else "named", "effects": new})
     return state.but(steps=tuple(told))
 
 

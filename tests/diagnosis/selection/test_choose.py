@@ -99,6 +99,31 @@ def test_two_effects_that_do_as_badly_alone_are_named_together(model, two, monke
     assert set(found.missing) == set(NAMES)
 
 
+def test_every_rival_is_tried_together_with_the_best(model, two, monkeypatch):
+    """A rival that explains the same must not hide another cause in the same group."""
+    chooser, base, both = asked(model, two)
+    best, same, other = (
+        SimpleNamespace(effects=(n,), evidence=100.0) for n in ("tether", "waves", "payload")
+    )
+    compare: Any = SimpleNamespace(standing=lambda *_: (best, [same, other]), told_apart=lambda *_: False)
+    monkeypatch.setattr(Chooser, "rivals", property(lambda self: compare))
+    monkeypatch.setattr(Chooser, "_factor", staticmethod(lambda e: 1.0))
+    module = sys.modules[Chooser.__module__]
+    monkeypatch.setattr(module, "log_evidence", lambda layout, e, factor: e)
+    monkeypatch.setattr(module, "improves_predictive_density", lambda *_: True)
+    monkeypatch.setattr(Chooser, "_without", lambda *_: None)
+    tried: list[str] = []
+
+    def joined(self: Any, one: Any, rival: Any, *_: Any) -> Any:
+        tried.append(rival.effects[-1])
+        return both if rival is other else None
+
+    monkeypatch.setattr(Chooser, "_joined", joined)
+    first = SimpleNamespace(evidence=0.0)
+    choice = chooser._among([best, same, other], set(), chooser.layout, base, first)  # type: ignore[list-item,arg-type]
+    assert tried == ["waves", "payload"] and choice.verdict == "named" and choice.best is both
+
+
 # Six forces of which none alone is much, so that what they might have been counts against them.
 SPREAD = {"X": 2.7, "Y": -2.7, "Z": 5.4, "K": 0.27, "M": -0.27, "N": 0.54}
 

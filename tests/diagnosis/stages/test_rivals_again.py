@@ -155,6 +155,19 @@ def test_one_plainer_rival_alone_changes_the_explanation():
     ]
 
 
+def test_of_names_that_one_step_gave_together_the_others_stay():
+    whole = ended("thruster_lag", "gyro_bias")
+    together = whole.but(
+        steps=({"verdict": "named", "effects": ["thruster_lag", "gyro_bias"], "p_value": 0.0},)
+    )
+    group = [fit(1.0, "gyro_bias", n) for n in ("thruster_lag", "actuation_delay")]
+    state = compared_again(Asked(alike={"thruster_lag": group}), together)  # type: ignore[arg-type]
+    assert [(s["verdict"], s["effects"]) for s in state.steps] == [
+        ("named", ["gyro_bias"]),
+        ("ambiguous", ["thruster_lag", "actuation_delay"]),
+    ]
+
+
 def test_a_step_that_gave_a_name_up_stays_as_it_is():
     whole = ended("thruster_lag", "gyro_bias").step("withdrawn", ["thruster_lag"], 0.0)
     group = [fit(1.0, "gyro_bias", n) for n in ("thruster_lag", "actuation_delay")]
