@@ -451,13 +451,15 @@ def test_what_was_fitted_without_a_name_is_not_fitted_again(monkeypatch):
     refit = asked._refit(current)
     assert refit([("waves", None), ("waves", rival), ("waves", None)]) == [1, 2, 1]
     assert asked._refit(current)([("waves", None), ("payload", None), ("waves", rival)]) == [1, 3, 2]
-    # Another explanation with the same names is another one.
+    # Another explanation with the same names is another one, and a fit that goes on to its end is.
     assert asked._refit(other)([("waves", None)]) == [4]
+    assert asked._refit(current, whole=True)([("waves", None)]) == [5]
     assert [(given[0] is current, *given[2:]) for given in fits] == [
         (True, "waves", None),
         (True, "waves", rival),
         (True, "payload", None),
         (False, "waves", None),
+        (True, "waves", None),
     ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.diagnosis.stages.rivals_again import compared_again
@@ -217,3 +218,25 @@ def test_rivals_that_explain_as_much_are_told_with_a_name_the_plainer_one_first(
     both = fit_hypothesis(layout, windows, base, ["thruster_gain", "net_buoyancy"])
     _, alike = chooser.in_place(both, base, {"thruster_gain": [one]})
     assert all(group[0].effects[-1] == name for name, group in alike.items())
+
+
+@pytest.mark.parametrize(
+    ("ahead", "predicts", "exchanged"), [(9.0, True, True), (9.0, False, False), (2.0, True, False)]
+)
+def test_a_rival_that_is_ahead_by_chance_takes_no_place(monkeypatch, ahead, predicts, exchanged):
+    """Odds of a hundred are 4.6 in the logarithm; what has no place is told with the name."""
+    module = importlib.import_module(Chooser.__module__)
+    chooser = Chooser(None, None, lambda _: None)  # type: ignore[arg-type]
+    taken, rival = (
+        FittedHypothesis((n,), None, (), evidence, np.zeros(0), np.zeros(0))  # type: ignore[arg-type]
+        for n, evidence in (("thruster_lag", 100.0), ("actuation_delay", 100.0 + ahead))
+    )
+    monkeypatch.setattr(Chooser, "_instead", lambda *_: rival)
+    monkeypatch.setattr(Chooser, "_factor", staticmethod(lambda e: 1.0))
+    monkeypatch.setattr(Chooser, "_settled", lambda self, best, *_: best)
+    monkeypatch.setattr(module, "log_evidence", lambda layout, e, factor: e)
+    monkeypatch.setattr(module, "improves_predictive_density", lambda *_: predicts)
+    better, alike = chooser.in_place(taken, [], {"thruster_lag": [rival]})
+    assert (better == ("thruster_lag", rival)) is exchanged and (better is None) is not exchanged
+    told = [e.effects[-1] for e in alike.get("thruster_lag", [])]
+    assert sorted(told) == ([] if exchanged else ["actuation_delay", "thruster_lag"])

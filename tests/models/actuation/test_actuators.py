@@ -37,6 +37,20 @@ def test_static_thrust_follows_each_units_own_curve():
         np.testing.assert_allclose(thrust[:, k], expected, rtol=1e-14, atol=1e-14)
 
 
+def test_tables_at_the_same_commands_stay_each_units_own():
+    vehicle = load_vehicle("bluerov2_heavy")
+    assert not isinstance(vehicle.thrusters[0].curve, str)
+    units = [
+        replace(u, curve=replace(u.curve, thrust=np.asarray(u.curve.thrust) * (1.0 + 0.1 * (k % 3))))  # type: ignore[type-var]
+        for k, u in enumerate(vehicle.thrusters)
+    ]
+    command = torch.linspace(-1.1, 1.1, 40, dtype=DOUBLE).reshape(5, 8)
+    thrust = Actuators(replace(vehicle, thrusters=tuple(units)), "thrusters").static(command).numpy()
+    for k, unit in enumerate(units):
+        expected = np.interp(command[:, k].numpy(), unit.curve.command, unit.curve.thrust)  # type: ignore[union-attr]
+        np.testing.assert_allclose(thrust[:, k], expected, rtol=1e-13, atol=1e-13)
+
+
 def test_a_commanded_wrench_is_its_own_thrust():
     actuators = Actuators(load_vehicle("rov95"), "wrench")
     wrench = torch.randn(4, 6, dtype=DOUBLE)
