@@ -39,11 +39,12 @@ def test_static_thrust_follows_each_units_own_curve():
 
 def test_tables_at_the_same_commands_stay_each_units_own():
     vehicle = load_vehicle("bluerov2_heavy")
-    assert not isinstance(vehicle.thrusters[0].curve, str)
-    units = [
-        replace(u, curve=replace(u.curve, thrust=np.asarray(u.curve.thrust) * (1.0 + 0.1 * (k % 3))))  # type: ignore[type-var]
-        for k, u in enumerate(vehicle.thrusters)
-    ]
+    units = []
+    for k, unit in enumerate(vehicle.thrusters):
+        less, curve = 1.0 - 0.1 * (k % 3), unit.curve
+        assert not isinstance(curve, str)
+        most = {"max_forward": less * unit.max_forward, "max_reverse": less * unit.max_reverse}
+        units.append(replace(unit, curve=replace(curve, thrust=less * curve.thrust), **most))
     command = torch.linspace(-1.1, 1.1, 40, dtype=DOUBLE).reshape(5, 8)
     thrust = Actuators(replace(vehicle, thrusters=tuple(units)), "thrusters").static(command).numpy()
     for k, unit in enumerate(units):
