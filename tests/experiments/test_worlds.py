@@ -31,6 +31,7 @@ SAMPLES = {
     "rows-11.jsonl": 10,
     "rows-12.jsonl": 11,
     "rows-13.jsonl": 12,
+    "rows-14.jsonl": 13,
 }
 
 
