@@ -11,6 +11,8 @@ from auvnn.errors import ConfigError
 if TYPE_CHECKING:
     from auvnn.diagnosis import Diagnosis
 
+WORKERS = ("workers", "executor", "address")
+
 
 def _run(job: Job) -> Answering:
     from auvnn.comparison.baseline import words
@@ -34,10 +36,8 @@ def _in_memory(job: Job) -> Diagnosis:
     from auvnn.diagnosis import diagnose
 
     log = job.log(partial=True)
-    return diagnose(
-        job.model(log), log, _effects(job),
-        stochastic=bool(job["stochastic"]), progress=job.say.progress, **_options(job), **_workers(job),
-    )  # fmt: skip
+    options = {**_options(job, *WORKERS), "stochastic": bool(job["stochastic"])}
+    return diagnose(job.model(log), log, _effects(job), progress=job.say.progress, **options)
 
 
 def _in_parts(job: Job) -> Diagnosis:
@@ -58,8 +58,8 @@ def _effects(job: Job) -> list[str] | None:
     return None if job["effects"] is None else job.names("effects")
 
 
-def _options(job: Job) -> dict[str, Any]:
-    return {key: job[key] for key in ("max_effects", "window", "force", "tolerance", "costs")}
+def _options(job: Job, *more: str) -> dict[str, Any]:
+    return {key: job[key] for key in ("max_effects", "window", "force", "tolerance", "costs", *more)}
 
 
 def _shares(job: Job) -> dict[str, Any]:
@@ -67,11 +67,7 @@ def _shares(job: Job) -> dict[str, Any]:
 
     usual = {"windows": WINDOWS, "leading": LEADING}
     amounts = {k: {None: most, "all": None}.get(job[k], job[k]) for k, most in usual.items()}
-    return {**amounts, **_workers(job), "search": job["search"]}
-
-
-def _workers(job: Job) -> dict[str, Any]:
-    return {key: job[key] for key in ("workers", "executor", "address")}
+    return {**amounts, **{key: job[key] for key in ("search", *WORKERS)}}
 
 
 VERB = Verb(
