@@ -67,7 +67,8 @@ def _with_steps(state: State, instead: Mapping[str, list[str]]) -> State:
         names = [n for n in step["effects"] if n in instead and step["verdict"] != "withdrawn"]
         # Of several names that one step gave together the others stay.
         others = [n for n in step["effects"] if n not in names]
-        told += [{**step, "effects": others}] if others or not names else []
+        if others or not names:
+            told.append({**step, "effects": others})
         for new in (instead[n] for n in names):
             told.append({**step, "verdict": "ambiguous" if len(new) > 1 else "named", "effects": new})
     return state.but(steps=tuple(told))
