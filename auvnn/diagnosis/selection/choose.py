@@ -270,9 +270,12 @@ class Chooser(Pruning):
             name, best = max(better, key=lambda pair: pair[1].evidence)
             return (name, self._settled(best, self.layout, list(base))), {}
         groups: dict[str, list[FittedHypothesis]] = {}
+        # A rival of two names is told once, with the one in whose place it explains most.
+        nearest = {e.effects[-1]: n for n, e in sorted(weighed, key=lambda pair: pair[1].evidence)}
         for name in rivals:
             own = replace(taken, effects=(*(e for e in taken.effects if e != name), name))
-            alike = [e for n, e in weighed if n == name and not self.rivals.told_apart(own, e)]
+            mine = [e for n, e in weighed if n == name == nearest[e.effects[-1]]]
+            alike = [e for e in mine if not self.rivals.told_apart(own, e)]
             plainer = effect_class(name).plainer
             first, *rest = sorted([own, *alike], key=lambda e: e.effects[-1] not in plainer)
             settled = first if first is own else self._settled(first, self.layout, list(base))

@@ -240,3 +240,22 @@ def test_a_rival_that_is_ahead_by_chance_takes_no_place(monkeypatch, ahead, pred
     assert (better == ("thruster_lag", rival)) is exchanged and (better is None) is not exchanged
     told = [e.effects[-1] for e in alike.get("thruster_lag", [])]
     assert sorted(told) == ([] if exchanged else ["actuation_delay", "thruster_lag"])
+
+
+def test_a_rival_of_two_names_is_told_with_the_nearer_one(monkeypatch):
+    module = importlib.import_module(Chooser.__module__)
+    chooser = Chooser(None, None, lambda _: None)  # type: ignore[arg-type]
+
+    def explained(evidence: float, *effects: str) -> FittedHypothesis:
+        return FittedHypothesis(effects, None, (), evidence, np.zeros(0), np.zeros(0))  # type: ignore[arg-type]
+
+    taken, rival = explained(100.0, "net_buoyancy", "tether"), explained(0.0, "payload")
+    ends = {
+        "net_buoyancy": explained(98.0, "tether", "payload"),
+        "tether": explained(99.0, "net_buoyancy", "payload"),
+    }
+    monkeypatch.setattr(Chooser, "_instead", lambda self, taken, base, name, rival: ends[name])
+    monkeypatch.setattr(Chooser, "_factor", staticmethod(lambda e: 1.0))
+    monkeypatch.setattr(module, "log_evidence", lambda layout, e, factor: e)
+    _, alike = chooser.in_place(taken, [], {"net_buoyancy": [rival], "tether": [rival]})
+    assert {n: [e.effects[-1] for e in of] for n, of in alike.items()} == {"tether": ["tether", "payload"]}
