@@ -9,10 +9,13 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
+from scipy.optimize import lsq_linear
 
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
+# Share of the largest eigenvalue below which normal equations say nothing of a direction.
+NEGLIGIBLE = 1e-13
 
 
 @dataclass(frozen=True)
@@ -107,23 +110,26 @@ def limits(model: GreyBox, names: Sequence[str], priors: Priors) -> tuple[Array,
 def bounded_step(normal: Array, gradient: Array, low: Array, high: Array) -> Array:
     """Return the step that minimises x^T N x / 2 - g^T x between `low` and `high`, all (P,) but N (P, P).
 
-    Parameters that would leave their range are put at its end, and the others solved for again.
+    Where the free minimum is out of range, bounded-variable least squares. Putting what is out of range at its end and
+    solving for the others is no minimum: where parameters are correlated it may be worse than no step at all.
 
     Args:
-        normal: N, positive definite or nearly so, (P, P).
+        normal: N, positive definite or nearly so, (P, P); what it says nothing of stays where it is.
         gradient: g, (P,).
         low: least steps, (P,).
         high: largest steps, (P,).
+
+    Reference: Stark and Parker (1995), Computational Statistics 10(2) 129-141.
     """
-    fixed = np.zeros(len(gradient), dtype=bool)
-    step = np.zeros(len(gradient))
-    for _ in range(len(gradient) + 1):
-        free = ~fixed
-        rest = gradient[free] - normal[np.ix_(free, fixed)] @ step[fixed]
-        step[free] = np.linalg.lstsq(normal[np.ix_(free, free)], rest, rcond=1e-13)[0]
-        out = free & ((step < low) | (step > high))
-        step = np.clip(step, low, high)
-        if not out.any():
-            break
-        fixed |= out
+    step = np.linalg.lstsq(normal, gradient, rcond=NEGLIGIBLE)[0]
+    if bool(((low <= step) & (step <= high)).all()):
+        return step
+    step = np.clip(0.0, low, high)
+    free = low < high
+    values, vectors = np.linalg.eigh(normal[np.ix_(free, free)])
+    told = values > NEGLIGIBLE * values[-1]
+    root, vectors = np.sqrt(values[told]), vectors[:, told]
+    right = vectors.T @ (gradient[free] - normal[np.ix_(free, ~free)] @ step[~free]) / root
+    found = lsq_linear(root[:, None] * vectors.T, right, (low[free], high[free]), method="bvls")
+    step[free] = np.clip(found.x, low[free], high[free])
     return step

@@ -26,7 +26,7 @@ from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.noise_law.left_force import leaves_force
 from auvnn.diagnosis.noise_law.noise_colour import Colour, clearly_coloured, noise_colour
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
-from auvnn.diagnosis.noise_law.rounds.leaders import fitted_alone
+from auvnn.diagnosis.noise_law.rounds.leaders import fitted_alone, sensing_alone
 from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.diagnosis.noise_law.split_windows import fitted_over_parts
 from auvnn.diagnosis.noise_law.standing_names import beside_names, stand
@@ -90,7 +90,7 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         uncertain = UncertainWrench(np.zeros(6), np.zeros(6), 0.0)
     asked.say("asking whether the sensors' noise is white")
     try:
-        colour = noise_colour(least, windows, asked.floor)
+        colour = noise_colour(least, windows, asked.floor, sensing_alone(asked, state))
     except UNSOLVED:
         colour = Colour(None, 0.0)
     if held.odds > 0.0 or colour.noise is not None:

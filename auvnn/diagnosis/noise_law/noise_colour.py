@@ -8,6 +8,8 @@ sensor may have a time of its own, or go back to white.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +19,7 @@ from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.commands.holding import cost_at_best
+from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.noise_law.likelihood.estimate_law import estimate
 from auvnn.diagnosis.noise_law.likelihood.law_likelihood import Likelihood
 from auvnn.diagnosis.noise_law.likelihood.sums import force_sums
@@ -66,23 +69,31 @@ class Colour:
         return {name: time for name, time in times.items() if time > 0.0}
 
 
-def noise_colour(explanation: FittedHypothesis, windows: Windows, floor: Array) -> Colour:
+def noise_colour(
+    explanation: FittedHypothesis, windows: Windows, floor: Array, others: Iterable[FittedHypothesis] = ()
+) -> Colour:
     """Ask a log for the colour of its noise.
 
     Args:
         explanation: a fit that leaves little.
         windows: those it was fitted to, as if noise were white.
         floor: (18,) below which no channel is trusted.
+        others: other fits, perhaps made one after the other as they are asked for. What an absent effect does to the
+            sensors looks like a colour of their noise: where white noise beside one of these is likelier than any colour,
+            it is white.
     """
     windows = replace(windows, mask=without_outliers(explanation, windows))
     cost_of = _Costs(explanation, windows, floor)
-    plain, best = cost_of(np.zeros(18)), (np.inf, np.zeros(18))
-    for time in TIMES:
-        times = np.where(np.arange(18) < 12, time, 0.0)
-        best = min(best, (cost_of(times), times), key=lambda found: found[0])
+    plain, best = cost_of(np.zeros(18)), _best_time(cost_of)
     # Said so that numbers which are none answer no.
     if not 0.5 * (plain - best[0]) > ODDS:
         return Colour(None, 0.0)
+    for other in others:
+        beside = _Costs(other, windows, floor)
+        with suppress(*UNSOLVED):
+            likely = beside(np.zeros(18))
+            if likely < best[0] and likely < _best_time(beside)[0]:
+                return Colour(None, 0.0)
     for place in SENSORS.values():
         if not np.isfinite(explanation.fitted.sigma[place]).any():
             continue
@@ -91,6 +102,12 @@ def noise_colour(explanation: FittedHypothesis, windows: Windows, floor: Array) 
             times[place] *= factor
             best = min(best, (cost_of(times), times), key=lambda found: found[0])
     return Colour(NoiseColour(best[1]), 0.5 * (plain - best[0]), windows.mask)
+
+
+def _best_time(cost_of: _Costs) -> tuple[float, Array]:
+    """Return the least cost of noise of one correlation time in all sensors, and the times (18,)."""
+    all_times = (np.where(np.arange(18) < 12, time, 0.0) for time in TIMES)
+    return min(((cost_of(times), times) for times in all_times), key=lambda found: found[0])
 
 
 def clearly_coloured(explanation: FittedHypothesis, windows: Windows, floor: Array) -> bool:

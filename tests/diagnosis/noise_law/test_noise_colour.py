@@ -71,3 +71,33 @@ def test_a_clear_colour_is_seen_beside_what_is_missing(time, clear):
     windows, layout = windows_for(model, log), lay_out(model, [])
     first = fit_hypothesis(layout, windows, list(layout.names), (), iterations=4)
     assert clearly_coloured(first, windows, TRUST * motion(windows) + 1e-9) is clear
+
+
+def test_what_a_sensor_does_wrong_is_no_colour():
+    """Beside a force of 1 N, velocities measured 0.3 m ahead of the origin look like coloured noise without that."""
+    model = GreyBox(small_vehicle())
+    log = wandering_log(model.with_effects({"velocity_lever_arm": {"x": 0.3, "z": 0.15}}), 1.0, 0.5, runs=3)
+    windows, layout = windows_for(model, log), lay_out(model, ["velocity_lever_arm", "constant_force"])
+    base = [n for n in layout.names if n not in ("velocity_lever_arm", "constant_force")]
+    first = fit_hypothesis(layout, windows, base, (), iterations=6)
+    floor = TRUST * motion(windows) + 1e-9
+
+    def beside(name):
+        yield fit_hypothesis(
+            layout, windows, base, (name,), start=first.fitted, sigma=first.fitted.sigma, iterations=6
+        )
+
+    assert noise_colour(first, windows, floor).odds > 100.0
+    assert noise_colour(first, windows, floor, beside("constant_force")).odds > 100.0
+    assert noise_colour(first, windows, floor, beside("velocity_lever_arm")).to_dict() == {}
+
+
+def test_noise_that_remembers_keeps_its_colour_beside_a_sensor_that_is_wrong():
+    model = GreyBox(small_vehicle())
+    log = remembering(make_log(model.with_effects({"velocity_lever_arm": {"x": 0.3}}), runs=3), 0.3)
+    windows, layout = windows_for(model, log), lay_out(model, ["velocity_lever_arm"])
+    base = [n for n in layout.names if n != "velocity_lever_arm"]
+    first = fit_hypothesis(layout, windows, base, (), iterations=4)
+    other = fit_hypothesis(layout, windows, base, ("velocity_lever_arm",), iterations=4)
+    found = noise_colour(first, windows, TRUST * motion(windows) + 1e-9, [other])
+    assert set(found.to_dict()) == set(SIZES)

@@ -6,17 +6,23 @@ first search may have found it together with others only; its values there are w
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.model_comparison import confused
 from auvnn.diagnosis.stages.state import Setting, State
+from auvnn.effects import effect_class
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
 
+Array = NDArray[np.float64]
 STEPS = 6
 # Effects that are known to be confused with the one that leads: so many of them are fitted in full.
 RIVALS = 2
@@ -58,23 +64,39 @@ def fitted_alone(asked: Setting, state: State) -> list[FittedHypothesis]:
         source = next((e for e in reversed(state.tried) if name in e.effects), None)
         if source is None or any(e.effects == (name,) for e in alone):
             continue
-        asked.say(f"fitting {name} alone")
-        model = asked.layout.model.rebuilt(asked.layout.model.copied_effects())
-        set_parameters(model, state.first.names, state.first.fitted.theta)
-        set_parameters(model, [name], parameters_of(source.fitted.model, [name]))
-        try:
-            alone.append(
-                fit_hypothesis(
-                    asked.layout,
-                    state.windows,
-                    asked.base,
-                    [name],
-                    start=state.first.fitted,
-                    guess=replace(asked.layout, model=model),
-                    sigma=state.first.fitted.sigma,
-                    iterations=STEPS,
-                )
-            )
-        except FitError:
-            continue
+        with suppress(FitError):
+            alone.append(_alone(asked, state, name, parameters_of(source.fitted.model, [name])))
     return alone
+
+
+def sensing_alone(asked: Setting, state: State) -> Iterator[FittedHypothesis]:
+    """Yield fits of the effects that change what the sensors report, each alone; one is fitted as it is asked for.
+
+    Args:
+        asked: what is asked.
+        state: where the first search ended.
+    """
+    tried = {e.effects[0]: e for e in state.tried if len(e.effects) == 1}
+    for name in asked.usable:
+        if "sense" in effect_class(name).hooks():
+            with suppress(FitError):
+                yield tried[name] if name in tried else _alone(asked, state, name)
+
+
+def _alone(asked: Setting, state: State, name: str, values: Array | None = None) -> FittedHypothesis:
+    """Return an effect fitted alone, from values of its parameters or from the null."""
+    asked.say(f"fitting {name} alone")
+    model = asked.layout.model.rebuilt(asked.layout.model.copied_effects())
+    set_parameters(model, state.first.names, state.first.fitted.theta)
+    if values is not None:
+        set_parameters(model, [name], values)
+    return fit_hypothesis(
+        asked.layout,
+        state.windows,
+        asked.base,
+        [name],
+        start=state.first.fitted,
+        guess=replace(asked.layout, model=model),
+        sigma=state.first.fitted.sigma,
+        iterations=STEPS,
+    )
