@@ -19,15 +19,15 @@ from auvnn.metrics.free_run import initial_states
 from auvnn.models import load
 from auvnn.simulation import simulate
 
-NAME = "added_mass_coriolis"
+NAME, TRUTH = "added_mass_coriolis", 0.1
 
 
 @pytest.fixture(scope="module")
 def stuck():
-    """Return a log of a REMUS without the Coriolis force of its added mass, and the fit of the model that has it."""
+    """Return a log of a REMUS with a tenth of the Coriolis force of its added mass, and a fit without that effect."""
     model = load("remus100")
     made = simulate(
-        model, "survey", "realistic", hidden={NAME: {"factor": 0.0}}, seed=1, runs=2, duration=30.0, rate=10.0,
+        model, "survey", "realistic", hidden={NAME: {"factor": TRUTH}}, seed=1, runs=2, duration=30.0, rate=10.0,
         max_step=0.05,
     )  # fmt: skip
     windows, layout = windows_for(model, made.log), lay_out(model, [NAME])
@@ -59,14 +59,14 @@ def test_the_right_effect_is_found_from_the_measured_states_where_a_wrong_models
         patch.setattr("auvnn.diagnosis.hypotheses.fit.better_from_measured", lambda best, *_, **__: best)
         held_up = fitted(stuck)
     found = fitted(stuck)
-    # The truth is zero. From the wrong model's states neither the value nor the errors come near it.
-    assert abs(float(held_up.theta[-1])) > 0.05 and noise_share(held_up) < 0.5
-    assert float(found.theta[-1]) == pytest.approx(0.0, abs=0.01)
+    # From the wrong model's states neither the value nor the errors come near the truth.
+    assert abs(float(held_up.theta[-1]) - TRUTH) > 0.05 and noise_share(held_up) < 0.5
+    assert float(found.theta[-1]) == pytest.approx(TRUTH, abs=0.01)
     assert noise_share(found) > 0.7 and found.cost < 0.4 * held_up.cost
 
 
 def test_with_weights_that_follow_the_errors_the_better_fit_is_the_likelier_one(stuck):
-    assert float(fitted(stuck, sigma=None).theta[-1]) == pytest.approx(0.0, abs=0.02)
+    assert float(fitted(stuck, sigma=None).theta[-1]) == pytest.approx(TRUTH, abs=0.02)
 
 
 def begun(stuck, monkeypatch, best, initial):
