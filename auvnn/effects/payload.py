@@ -42,7 +42,7 @@ class Payload(Effect):
     told_apart_by = "the same motion before and after the load is taken, turning included"
     levers = PLACES
     carried = ("mass", "buoyancy")
-    plainer = ("net_buoyancy", "trapped_water")
+    plainer = ("net_buoyancy", "trapped_water", "cg_offset")
     time_varying = True
 
     @classmethod
