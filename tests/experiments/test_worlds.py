@@ -32,6 +32,7 @@ SAMPLES = {
     "rows-12.jsonl": 11,
     "rows-13.jsonl": 12,
     "rows-14.jsonl": 13,
+    "rows-15.jsonl": 14,
 }
 
 
