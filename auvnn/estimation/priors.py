@@ -121,7 +121,7 @@ def bounded_step(normal: Array, gradient: Array, low: Array, high: Array) -> Arr
 
     Reference: Stark and Parker (1995), Computational Statistics 10(2) 129-141.
     """
-    step = np.linalg.lstsq(normal, gradient, rcond=NEGLIGIBLE)[0]
+    step: Array = np.asarray(np.linalg.lstsq(normal, gradient, rcond=NEGLIGIBLE)[0], dtype=float)
     if bool(((low <= step) & (step <= high)).all()):
         return step
     step = np.clip(0.0, low, high)
