@@ -11,7 +11,7 @@ import pytest
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.noise_law.rounds.leaders import fitted_alone, rivals_of
+from auvnn.diagnosis.noise_law.rounds.leaders import fitted_alone, rivals_of, sensing_alone
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
 
@@ -34,6 +34,23 @@ def test_an_effect_that_was_named_second_is_fitted_by_itself():
     assert found[("constant_force",)] is alone
     value = float(found[("net_buoyancy",)].fitted.theta[0])
     assert value == pytest.approx(5.0, abs=0.5)
+
+
+def test_effects_that_change_what_sensors_report_are_fitted_by_themselves_one_as_it_is_asked_for():
+    truth = GreyBox(small_vehicle()).with_effects({"velocity_scale": {"factor": 1.2}})
+    log, model = make_log(truth, noise=1.0), GreyBox(small_vehicle())
+    names = ("constant_force", "gyro_bias", "velocity_scale")
+    windows, layout = windows_for(model, log), lay_out(model, names)
+    first = fit_hypothesis(layout, windows, (), (), iterations=3)
+    tried = fit_hypothesis(layout, windows, (), ["gyro_bias"], iterations=3)
+    said: list[str] = []
+    asked: Any = SimpleNamespace(layout=layout, base=(), say=said.append, usable=names)
+    state: Any = SimpleNamespace(windows=windows, first=first, tried=(tried,))
+    found = sensing_alone(asked, state)
+    assert next(found) is tried and not said
+    (other,) = found
+    assert other.effects == ("velocity_scale",) and said == ["fitting velocity_scale alone"]
+    assert float(other.fitted.theta[0]) == pytest.approx(1.2, abs=0.02)
 
 
 def test_what_is_known_to_be_confused_with_the_leader_is_fitted_too():
