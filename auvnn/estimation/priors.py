@@ -127,7 +127,9 @@ def bounded_step(normal: Array, gradient: Array, low: Array, high: Array) -> Arr
     step = np.clip(0.0, low, high)
     free = low < high
     values, vectors = np.linalg.eigh(normal[np.ix_(free, free)])
-    told = values > NEGLIGIBLE * values[-1]
+    told = values > NEGLIGIBLE * values.max(initial=0.0)
+    if not told.any():
+        return step
     root, vectors = np.sqrt(values[told]), vectors[:, told]
     right = vectors.T @ (gradient[free] - normal[np.ix_(free, ~free)] @ step[~free]) / root
     found = lsq_linear(root[:, None] * vectors.T, right, (low[free], high[free]), method="bvls")

@@ -257,6 +257,13 @@ def test_a_bounded_step_between_wide_bounds_is_that_of_least_squares():
     assert wide == pytest.approx(np.linalg.lstsq(a, b, rcond=None)[0])
 
 
+def test_a_bounded_step_of_parameters_that_cannot_move_is_none():
+    none, one = np.zeros(2), np.ones(2)
+    assert bounded_step(np.eye(2), one, none, none) == pytest.approx(0.0)
+    # Out of their ranges, and nothing is said of them: they go to the nearest end.
+    assert bounded_step(np.zeros((2, 2)), none, 0.5 * one, one) == pytest.approx(0.5)
+
+
 def test_a_bounded_step_stays_where_nothing_is_said_of_a_parameter():
     """Two parameters of which only the sum shows, and one that does not show at all."""
     a = np.array([[1.0, 1.0, 0.0]])

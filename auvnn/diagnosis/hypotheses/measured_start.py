@@ -2,8 +2,8 @@
 
 Over several seconds the motion of a vehicle that is barely stable depends so strongly on where it begins that the squared
 error has many local minima. Of a model that is wrong, the initial states that fit best may be far from those that were
-measured; a fit of the right effect that goes out from them stays there. Where the Coriolis force of the added mass of a
-REMUS was missing, the right effect left five times the squared error that it leaves from the measured states.
+measured; a fit of the right effect that goes out from them stays there. Where a REMUS has a tenth of the Coriolis force
+of its added mass, the right effect left four times the squared error that it leaves from the measured states.
 """
 
 from __future__ import annotations

@@ -24,10 +24,14 @@ NAME, TRUTH = "added_mass_coriolis", 0.1
 
 @pytest.fixture(scope="module")
 def stuck():
-    """Return a log of a REMUS with a tenth of the Coriolis force of its added mass, and a fit without that effect."""
+    return without_coriolis(TRUTH)
+
+
+def without_coriolis(factor):
+    """Return a log of a REMUS with a part of the Coriolis force of its added mass, and a fit without that effect."""
     model = load("remus100")
     made = simulate(
-        model, "survey", "realistic", hidden={NAME: {"factor": TRUTH}}, seed=1, runs=2, duration=30.0, rate=10.0,
+        model, "survey", "realistic", hidden={NAME: {"factor": factor}}, seed=1, runs=2, duration=30.0, rate=10.0,
         max_step=0.05,
     )  # fmt: skip
     windows, layout = windows_for(model, made.log), lay_out(model, [NAME])
@@ -63,6 +67,13 @@ def test_the_right_effect_is_found_from_the_measured_states_where_a_wrong_models
     assert abs(float(held_up.theta[-1]) - TRUTH) > 0.05 and noise_share(held_up) < 0.5
     assert float(found.theta[-1]) == pytest.approx(TRUTH, abs=0.01)
     assert noise_share(found) > 0.7 and found.cost < 0.4 * held_up.cost
+
+
+@pytest.mark.xfail(strict=True, reason="with steps that are the constrained minimum both fits end near 0.14")
+def test_the_right_effect_is_found_from_the_measured_states_where_the_force_is_missing_altogether():
+    """Asked of earlier steps, and met by them with this seed (and by chance: not with three others)."""
+    found = fitted(without_coriolis(0.0))
+    assert float(found.theta[-1]) == pytest.approx(0.0, abs=0.01) and noise_share(found) > 0.7
 
 
 def test_with_weights_that_follow_the_errors_the_better_fit_is_the_likelier_one(stuck):
