@@ -19,8 +19,9 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, folds, left_out
 from auvnn.diagnosis.noise_law.likelihood.estimate_law import estimate
 from auvnn.diagnosis.noise_law.likelihood.known_forces import with_known_forces
 from auvnn.diagnosis.noise_law.likelihood.law_likelihood import Likelihood
-from auvnn.diagnosis.noise_law.likelihood.sums import SAME_MOMENT, ForceSums
+from auvnn.diagnosis.noise_law.likelihood.sums import ForceSums
 from auvnn.diagnosis.residuals.input_forces import ANGLES, AXES, InputForces
+from auvnn.estimation.trajectories.windows_in_turn import SAME_MOMENT
 from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.free_run import predict

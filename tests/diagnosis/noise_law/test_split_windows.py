@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
-from auvnn.diagnosis.noise_law.likelihood.sums import CHAIN, followed
 from auvnn.diagnosis.noise_law.split_windows import split
+from auvnn.estimation.trajectories.windows_in_turn import CHAIN, followed
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle

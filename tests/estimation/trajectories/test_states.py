@@ -12,6 +12,7 @@ from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.estimation.trajectories.filtered_states import filtered_states
 from auvnn.estimation.trajectories.smoothed_states import smoothed_states
 from auvnn.estimation.window_normal_equations import linearise
+from auvnn.metrics.coloured_noise import NoiseColour
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.free_run import initial_states, moved, predict
 from auvnn.models import GreyBox
@@ -85,15 +86,68 @@ def test_smoothed_states_are_nearer_to_what_was_measured_than_free_running_is():
 def test_filtered_states_know_nothing_of_what_is_measured_later():
     model, windows, initial = wandering()
     smoothed = smoothed_states(model, windows, initial, (), SIGMA, np.zeros(0))
-    row = windows.nu.shape[1] // 2
+    row, number = windows.nu.shape[1] // 2, int(windows.run[0])
+    times = windows.times[:, windows.warmup :]
+    moment = float(times[windows.run == number][:, row].median())
+    own = torch.as_tensor(windows.run == number)[:, None]
+    earlier, later = own & (times < moment - 1e-9), own & (times >= moment - 1e-9)
     nu = windows.nu.clone()
-    nu[:, row:] += 0.05
+    nu[later] += 0.05
     about = replace(windows, around=smoothed)
     before, after = (filtered_states(model, w, SIGMA) for w in (about, replace(about, nu=nu)))
-    torch.testing.assert_close(before[:, :row], after[:, :row], atol=1e-12, rtol=0.0)
-    assert bool(((after - before)[:, row, 7:].abs() > 0.01).any())
+    torch.testing.assert_close(before[earlier], after[earlier], atol=1e-12, rtol=0.0)
+    torch.testing.assert_close(before[~own[:, 0]], after[~own[:, 0]], atol=0.0, rtol=0.0)
+    assert bool(((after - before)[later][:, 7:].abs() > 0.01).any())
     # At the end of a window the filter knows all that the smoother does, with cells in the place of a process.
     assert float((before - smoothed)[:, -1, 7:].abs().mean()) < 0.004
+
+
+def test_a_window_begins_with_what_the_one_before_knew():
+    """Two windows say what one over both says, whose filter passes where they meet."""
+    model, short, initial = wandering()
+    log = wandering_log(model, RMS, TIME, runs=2, duration=15.0, seed=3)
+    long = replace(windows_for(model, log, 4.0), law=short.law)
+    around = motion(model, long, initial_states(model, long))
+    whole = filtered_states(model, replace(long, around=around), SIGMA)
+    begin, places = short.times[:, short.warmup], []
+    for k, number in enumerate(long.run):
+        times = long.times[k, long.warmup :]
+        first, second = (
+            int(np.flatnonzero((short.run == number) & ((begin - t).abs() < 1e-9).numpy())[0])
+            for t in (times[0], times[short.nu.shape[1] - 1])
+        )
+        places.append((k, first, second))
+    size, own = short.nu.shape[1], torch.zeros(*short.nu.shape[:2], 13, dtype=torch.float64)
+    own[...] = smoothed_states(model, short, initial, (), SIGMA, np.zeros(0))
+    for k, first, second in places:
+        own[first], own[second] = around[k, :size], around[k, size - 1 : 2 * size - 1]
+    parts, begins = filtered_states(model, replace(short, around=own), SIGMA), 0
+    for k, first, second in places:
+        if (short.run == short.run[first]).argmax() == first:
+            begins += 1
+            torch.testing.assert_close(parts[first], whole[k, :size], atol=1e-9, rtol=1e-9)
+            torch.testing.assert_close(parts[second], whole[k, size - 1 : 2 * size - 1], atol=1e-6, rtol=1e-6)
+    assert begins == 2
+
+
+def test_of_noise_that_is_not_white_a_mean_over_a_long_time_is_as_uncertain_as_the_filter_takes_it():
+    model, windows, initial = wandering()
+    smoothed = smoothed_states(model, windows, initial, (), SIGMA, np.zeros(0))
+    step = float(windows.times[0, -1] - windows.times[0, -2])
+    time = np.zeros(18)
+    time[3:12] = -step / np.log(0.8)
+    coloured = replace(windows, around=smoothed, noise=NoiseColour(time))
+    generator = np.random.default_rng(0)
+    noise = np.zeros((4000, 400))
+    noise[:, 0] = generator.normal(size=4000)
+    for k in range(1, 400):
+        noise[:, k] = 0.8 * noise[:, k - 1] + 0.6 * generator.normal(size=4000)
+    # Of a mean of n independent values the standard deviation is sqrt(1 / n).
+    louder = SIGMA.copy()
+    louder[3:12] *= noise.mean(1).std() * np.sqrt(400)
+    one = filtered_states(model, coloured, SIGMA)
+    two, white = (filtered_states(model, replace(coloured, noise=None), s) for s in (louder, SIGMA))
+    assert float((one - two).abs().max()) < 0.1 * float((one - white).abs().max())
 
 
 def test_slopes_up_to_a_moment_do_not_change_with_the_trajectory_from_there_on():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -14,19 +13,15 @@ from torch import Tensor
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.estimation.priors import Priors, limits
 from auvnn.estimation.sensitivity import Response
+from auvnn.estimation.trajectories.windows_in_turn import followed, offsets
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.force_law import ForceLaw
-from auvnn.metrics.free_run import away
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
 # Cells of the force while its law is looked for, s.
 CELL = 0.5
-# Windows of a chain.
-CHAIN = 10
-# Times that are nearer to one another are one moment, s.
-SAME_MOMENT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -118,7 +113,8 @@ def force_sums(
     offset, follows = np.zeros((len(windows), 12)), np.zeros(len(windows), dtype=bool)
     if windows.around is not None and windows.noise is None:
         # Noise that is not white would go on from window to window, too: then each begins with a state of its own.
-        offset, follows = _offsets(windows, windows.around, before)
+        offset, same = offsets(windows, windows.around, before)
+        offset, follows = offset.numpy(), same.numpy()
         # The sample that two windows share was measured once.
         mask = windows.mask.clone()
         mask[torch.as_tensor(follows), 0] = 0.0
@@ -181,35 +177,3 @@ def _of_states(answer: Response, whole: Tensor, weight: Tensor) -> tuple[Tensor,
     heavy = (answer.state * weight[:told, None] ** 2).flatten(1, 2).mT
     error = heavy @ answer.error[..., :told].flatten(1, 2).unsqueeze(-1)
     return heavy @ answer.state.flatten(1, 2), torch.cat([error, heavy @ whole.flatten(1, 2)], dim=-1)
-
-
-def _offsets(windows: Windows, around: Tensor, before: NDArray[np.int64]) -> tuple[Array, NDArray[np.bool_]]:
-    """Return what leads from each first state to the last one of the window before, and whether both are one moment."""
-    other = torch.as_tensor(np.maximum(before, 0))
-    times = windows.times[:, windows.warmup :]
-    same = (times[:, 0] - times[other, -1]).abs() < SAME_MOMENT
-    return away(around[:, 0], around[other, -1]).numpy(), same.numpy() & (before >= 0)
-
-
-def followed(windows: Windows, reach: float) -> tuple[NDArray[np.int64], Array]:
-    """Return the window that each one follows in its run, -1 where none does, and the time between them, s, (B,) each.
-
-    A chain begins anew after so many windows: what is known of a force ten windows ago says no more.
-
-    Args:
-        windows: B windows.
-        reach: time from a window's start to the end of its last cell, s.
-    """
-    times = windows.times[:, windows.warmup :].numpy()
-    begin, end = times[:, 0], times[:, -1]
-    before, gap = np.full(len(begin), -1), np.zeros(len(begin))
-    linked = 0
-    order = np.lexsort((begin, windows.run))
-    for one, other in itertools.pairwise(order):
-        whole = end[one] - begin[one] > 0.9 * reach
-        same = windows.run[one] == windows.run[other] and begin[other] >= end[one] - 1e-9
-        linked = linked + 1 if same and whole and linked + 1 < CHAIN else 0
-        if linked:
-            before[other] = one
-            gap[other] = max(begin[other] - begin[one] - reach, 0.0)
-    return before, gap
