@@ -71,7 +71,8 @@ def fit_with_outlier_restart(
         cost = best.statistics.cost
         middle = max(float(np.median(cost)), 1e-300)
         near = cost <= NEAR * middle
-        settled = (cost <= DIVERGED * middle).all() if plain else (cost <= WILD * middle).all()
+        stuck = not best.converged and best.iterations < iterations
+        settled = (cost <= (DIVERGED if plain or stuck else WILD) * middle).all()
         if near.all() or (settled and (best.converged or not plain)):
             break
         try:
