@@ -47,6 +47,8 @@ FALLING, PATIENCE = 0.01, 5
 # logarithms of the weights change by less than this.
 LITTLE, TINY, DRIFT = 0.05, 1e-6, 0.02
 AS_PROMISED = 0.25
+# Share of the squared error that a step promises without bringing any of it, where a fit is stuck.
+STUCK = 1e-4
 
 
 class FitError(InputError):
@@ -68,6 +70,7 @@ class Fitted:
         cost: weighted squared error at the fitted point, prior terms included.
         converged: whether the last step was negligible.
         iterations: steps taken.
+        stuck: whether it ended where the equations promise much and no share of their step brings any of it.
     """
 
     model: GreyBox
@@ -80,6 +83,7 @@ class Fitted:
     cost: float
     converged: bool
     iterations: int
+    stuck: bool = False
 
     def covariance(self) -> Array:
         """Return the covariance (P, P) of the parameters under white noise of `sigma`."""
@@ -143,7 +147,7 @@ def fit(
         # The errors of the model as given set the first weights, once the initial states fit them.
         for _ in range(2):
             sigma = residual_std(normal_equations(windows, here, sigma)[0], floor, 0)
-    converged, taken, allowed, damping = False, 0, iterations, 0.0
+    converged, stuck, taken, allowed, damping = False, False, 0, iterations, 0.0
     drift = 0.0 if fixed else np.inf
     settled: tuple[Statistics, Array, Array] | None = None
 
@@ -204,6 +208,7 @@ def fit(
             damping = max(4 * damping, 1e-2)
         else:
             set_parameters(model, names, theta)
+            stuck = promised > STUCK * now
             break
         gain = now - then
         # Where a step did much less than the equations have it, a longer one would do worse.
@@ -240,7 +245,7 @@ def fit(
         at = better_of(model, windows, names, sigma, costs, initial, at)
     initial = at
     total = float(statistics.cost.sum()) + penalty(theta)
-    return Fitted(model, names, theta, initial, sigma, statistics, priors, total, converged, taken)
+    return Fitted(model, names, theta, initial, sigma, statistics, priors, total, converged, taken, stuck)
 
 
 def _answered(

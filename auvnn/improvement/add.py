@@ -92,7 +92,7 @@ def add(
     if "5" not in horizons:
         raise ConfigError(f"horizons={list(horizons)}: '5' must be among them, the gain is measured there")
     fits = fit_steps(model, log, names, objective=objective, window=window, derivative=derivative, say=say)
-    notes += unseen(fits.layout, fits.best, names, log)
+    notes += [*fits.notes, *unseen(fits.layout, fits.best, names, log)]
     steps = 2 * len(names) + 1 if len(names) > 1 else 3
     say(Progress("free running on the held-out data", steps - 1, steps))
     judged = judge(fits, names, test, horizons, derivative, objective == "one_step")

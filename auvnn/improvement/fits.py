@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from auvnn.diagnosis.cross_validation.fitters import fitter_for
+import numpy as np
+
+from auvnn.diagnosis.cross_validation.fitters import ByWindows, Fitter, fitter_for
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.put_into_model import with_fitted_parameters
 from auvnn.diagnosis.hypotheses.standard_errors import determined
@@ -17,6 +19,8 @@ from auvnn.logs import Log
 from auvnn.models import GreyBox
 from auvnn.progress import Counted
 
+# Shares of the usual windows that are tried where no step of a fit over these leads on, and samples that they must have.
+SHORTER, SAMPLES = (0.5, 0.25), 8
 GIVEN, REFITTED = "as given", "coefficients refitted"
 
 
@@ -29,12 +33,14 @@ class Fits:
         steps: the models of the waterfall, by name of the step.
         fits: those behind all steps but the first.
         without: effect to the model with all others; only where there are several.
+        notes: what to say of the windows that were taken.
     """
 
     layout: Layout
     steps: list[tuple[str, GreyBox]]
     fits: list[FittedHypothesis]
     without: dict[str, GreyBox]
+    notes: tuple[str, ...] = ()
 
     @property
     def final(self) -> GreyBox:
@@ -45,6 +51,11 @@ class Fits:
     def best(self) -> FittedHypothesis:
         """The fit with all effects."""
         return self.fits[-1]
+
+    @property
+    def stuck(self) -> bool:
+        """Whether a fit of those that are compared ended where no step leads on."""
+        return any(found.fitted.stuck for found in self.fits)
 
 
 def fit_steps(
@@ -59,12 +70,15 @@ def fit_steps(
 ) -> Fits:
     """Fit the uncertain coefficients alone, then with one effect after the other, then without each of them.
 
+    Where a few windows are so far from linear that no step leads on, and their length was not asked for, shorter ones are
+    taken.
+
     Args:
         model: as known.
         log: what to fit on.
         names: effects to add.
         objective: "rollout" or "one_step".
-        window: length of the windows that are fitted, s.
+        window: length of the windows that are fitted, s; chosen by the log where None.
         derivative: how accelerations are obtained.
         say: called with what is being done, in words.
 
@@ -72,8 +86,29 @@ def fit_steps(
         ConfigError: the objective cannot fit one of the effects.
         InputError: the log says nothing about an effect, or a fit has nowhere to begin.
     """
-    layout = lay_out(model, list(names))
     fitter = fitter_for(model, log, objective, window=window, derivative=derivative)
+    first = _fitted_by(fitter, model, names, say)
+    if window is not None or not isinstance(fitter, ByWindows) or not first.stuck:
+        return first
+    step = float(np.median([run.dt for run in log.runs]))
+    longest = step * (fitter.windows.mask.shape[1] - 1)
+    for share in SHORTER:
+        if longest * share < SAMPLES * step:
+            break
+        say(
+            f"no step of a fit over windows of {longest:.3g} s leads on: fitting windows of {longest * share:.3g} s"
+        )
+        shorter = fitter_for(model, log, objective, window=longest * share, derivative=derivative)
+        found = _fitted_by(shorter, model, names, say)
+        if not found.stuck:
+            note = f"windows of {longest * share:.3g} s were fitted: over {longest:.3g} s no step of the fit leads on"
+            return replace(found, notes=(note,))
+    return first
+
+
+def _fitted_by(fitter: Fitter, model: GreyBox, names: Sequence[str], say: Callable[[str], None]) -> Fits:
+    """Return what one fitter makes of a model; arguments as in `fit_steps`."""
+    layout = lay_out(model, list(names))
     base = [n for n in layout.names if n not in names or n in layout.nuisance]
     say = Counted(say, 2 * len(names) + 1 if len(names) > 1 else 3)
     say("refitting the uncertain coefficients alone")

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.measured_start import better_from_measured
 from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
+from auvnn.diagnosis.hypotheses.parts_first import better_from_parts
 from auvnn.diagnosis.hypotheses.plausible_sizes import departure, sizes_of
 from auvnn.diagnosis.hypotheses.standard_errors import of_timing
 from auvnn.diagnosis.hypotheses.stated_priors import (
@@ -176,6 +177,7 @@ def fit_hypothesis(
         fitted = better_from_measured(
             fitted, model, windows, names, held, initial=initial, sigma=sigma, iterations=iterations
         )
+    fitted = better_from_parts(fitted, windows, names, held, sigma=sigma, iterations=iterations)
     judged = plausible(layout, names, effects, held, fitted.theta)
     cost = left_out(fitted.statistics, fitted.theta, judged, folds(windows.run))
     count = fitted.statistics.count[:, np.isfinite(fitted.sigma)].sum(1)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
+from auvnn.diagnosis.hypotheses.parts_first import leaves_less
 from auvnn.estimation.prediction_error import FitError, Fitted
 from auvnn.estimation.priors import Priors
 from auvnn.estimation.trajectories.initial_steps import costs_from
@@ -88,11 +89,7 @@ def better_from_measured(
         )
     except FitError:
         return best
-    if sigma is not None:
-        return again if again.cost < best.cost else best
-    # Each at its own weights: the negative log-likelihood, up to a constant.
-    count, known = best.statistics.count.sum(0), np.isfinite(best.sigma) & np.isfinite(again.sigma)
-    return again if count[known] @ np.log(again.sigma[known] / best.sigma[known]) < 0.0 else best
+    return again if leaves_less(again, best, sigma) else best
 
 
 def _far(best: Fitted, measured: Tensor) -> bool:

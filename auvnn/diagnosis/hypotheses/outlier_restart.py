@@ -47,8 +47,8 @@ def fit_with_outlier_restart(
 ) -> Fitted:
     """Fit; where windows end as outliers, again from a fit without them.
 
-    A fit that goes out from another one, by initial states or weights, is begun again only where a window is so far out
-    that it outweighs all others: the other fit had no outlier.
+    A fit that goes out from another one, by initial states or weights, is begun again only where no step leads on, or a
+    window is so far out that it outweighs all others: the other fit had no outlier.
 
     Args:
         model: holds the named effects; it is not changed.
@@ -71,8 +71,7 @@ def fit_with_outlier_restart(
         cost = best.statistics.cost
         middle = max(float(np.median(cost)), 1e-300)
         near = cost <= NEAR * middle
-        stuck = not best.converged and best.iterations < iterations
-        settled = (cost <= (DIVERGED if plain or stuck else WILD) * middle).all()
+        settled = (cost <= (DIVERGED if plain or best.stuck else WILD) * middle).all()
         if near.all() or (settled and (best.converged or not plain)):
             break
         try:

@@ -105,7 +105,7 @@ def test_a_wrong_model_is_not_begun_again_for_next_to_nothing(monkeypatch, sigma
 
     def fitted(sigma):
         sums = SimpleNamespace(cost=np.array([1.0, 1.0, 1.0, 10.0]), count=np.full((4, 18), 100.0))
-        return SimpleNamespace(statistics=sums, sigma=np.full(18, sigma), converged=False, iterations=1)
+        return SimpleNamespace(statistics=sums, sigma=np.full(18, sigma), converged=False)
 
     ends = [fitted(s) for s in sigmas]
     monkeypatch.setattr(outliers, "fit", lambda *_, **__: ends[0])
@@ -115,23 +115,6 @@ def test_a_wrong_model_is_not_begun_again_for_next_to_nothing(monkeypatch, sigma
     found = fit_with_outlier_restart(nothing, nothing, (), nothing, iterations=1)
     assert found.sigma[0] == min(sigmas[: begun + 1])
     assert len(list(following)) == len(sigmas) - 1 - begun
-
-
-@pytest.mark.parametrize(
-    ("converged", "steps", "begun"), [(False, 2, True), (False, 15, False), (True, 2, False)]
-)
-def test_a_fit_from_another_one_is_begun_again_where_no_step_leads_on(monkeypatch, converged, steps, begun):
-    """One that is still on its way, or has settled, is left alone: the fit that it goes out from had no outlier."""
-    sums = SimpleNamespace(cost=np.array([1.0, 1.0, 1.0, 10.0]), count=np.full((4, 18), 100.0))
-
-    def fitted(sigma, settled):
-        return SimpleNamespace(statistics=sums, sigma=np.full(18, sigma), converged=settled, iterations=steps)
-
-    monkeypatch.setattr(outliers, "fit", lambda *_, **__: fitted(1.0, converged))
-    monkeypatch.setattr(outliers, "_begun_again", lambda *_: fitted(0.8, True))
-    nothing: Any = None
-    found = fit_with_outlier_restart(nothing, nothing, (), nothing, iterations=15, initial=torch.zeros(4, 13))
-    assert found.sigma[0] == (0.8 if begun else 1.0)
 
 
 @pytest.mark.parametrize(("errors", "steps"), [(0.999, [15, 4]), (0.9, [15, 4, 11])])

@@ -18,8 +18,8 @@ from auvnn.diagnosis.noise_law.law_fit import LawFits
 from auvnn.diagnosis.noise_law.likelihood.estimate_law import estimate
 from auvnn.diagnosis.noise_law.likelihood.law_likelihood import Likelihood
 from auvnn.diagnosis.noise_law.likelihood.sums import force_sums
-from auvnn.diagnosis.noise_law.split_windows import split
 from auvnn.diagnosis.residuals.variance_component_test import white
+from auvnn.estimation.window_parts import split
 from auvnn.models import GreyBox
 from tests.diagnosis.noise_law.wandering import wandering_log
 from tests.small_logs import make_log, small_vehicle
@@ -127,7 +127,7 @@ def test_a_fit_from_the_null_finds_the_value_and_is_at_least_as_likely_as_one_of
     truth = GreyBox(small_vehicle()).with_effects({NAME: {"force": HIDDEN}})
     log = wandering_log(truth, RMS, TIME, runs=3, duration=40.0, seed=seed)
     model = GreyBox(small_vehicle())
-    (windows, *_), layout = split(windows_for(model, log)), lay_out(model, [NAME])
+    (windows, *_), layout = split(windows_for(model, log), 2.0), lay_out(model, [NAME])
     base = ["added_mass", "linear_damping", "quadratic_damping", "inertia"]
     first = fit_hypothesis(layout, windows, base, (), iterations=4)
     sigma = white(first, np.zeros(18))
