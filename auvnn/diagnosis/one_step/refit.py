@@ -37,11 +37,13 @@ class RefittedEffect:
         theta: parameters of everything else, then of the effect, (P,).
         after: (N,) weighted squared error of each sample when its fifth is left out; NaN where there is none.
         values: the effect's parameters by name.
+        fell: by how much the weighted squared error of what is fitted, and the departure from what was stated, fall.
     """
 
     theta: Array
     after: Array
     values: dict[str, float]
+    fell: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -123,11 +125,14 @@ class OneStepRefit:
         gap, begin = world.gap(), theta
         slopes = np.zeros((*gap.shape, len(theta)))
         slopes[..., : self.fit.slopes.shape[-1]] = self.fit.slopes
-        cost, point = np.inf, None
+
+        def left_at(there: Array, at: Array) -> Array:
+            """Return the gap at some values; everything else follows along slopes that stay as they were."""
+            return there - slopes[..., others] @ (at - begin)[others]
+
+        left, point, fell = left_at(gap, theta), None, 0.0
         for _ in range(LINEARISED):
             slopes[..., own] = world.slopes([name], gap)
-            # Everything else follows along slopes that stay as they were.
-            left = gap - slopes[..., others] @ (theta - begin)[others]
             rows = self.good & np.isfinite(left).all(1) & np.isfinite(slopes[..., own]).all((1, 2))
             if rows.sum() < SAID * self.good.sum() or not np.abs(slopes[rows][..., own]).max() > 0.0:
                 break
@@ -135,17 +140,30 @@ class OneStepRefit:
             weight = self.weight[rows]
             step = np.zeros(len(theta))
             step[free] = solve(left[rows], x, precision, weight, mean)
-            error = left[rows] - x @ step[free]
-            now = float((weight * error**2).sum() + held.precision @ (theta + step - held.mean) ** 2)
             after = np.full(len(gap), np.nan)
             after[rows] = left_out(left[rows], x, precision, mean, weight, self.fifth[rows])
-            theta = np.clip(theta + step, low, high)
-            fell, cost = cost - now, now
-            point = RefittedEffect(theta, after, _values(world.model, name, theta[own]))
-            if fell < SETTLED * now:
+            now = self._cost(left, rows, theta, held)
+            for half in range(HALVED):
+                trial = np.clip(theta + 0.5**half * step, low, high)
+                gap = world.at([name], trial[own])
+                reached = left_at(gap, trial)
+                then = self._cost(reached, rows, trial, held)
+                if then <= now:
+                    break
+            else:
+                world.at([name], theta[own])
+                point = point or RefittedEffect(theta, after, _values(world.model, name, theta[own]))
                 break
-            gap = world.at([name], theta[own])
+            theta, left, fell = trial, reached, fell + now - then
+            point = RefittedEffect(theta, after, _values(world.model, name, theta[own]), fell)
+            if now - then < SETTLED * then:
+                break
         return point
+
+    def _cost(self, left: Array, rows: NDArray[np.bool_], theta: Array, held: Priors) -> float:
+        """Return the weighted squared error of some samples and the departure from what was stated."""
+        value = (self.weight[rows] * left[rows] ** 2).sum() + held.precision @ (theta - held.mean) ** 2
+        return float(value) if np.isfinite(value) else float("inf")
 
     def _promise(self, world: AccelerationSlopes, name: str, start: Array) -> float:
         """Return by how much the cost falls with an effect of a given shape, as its slopes at the null have it."""

@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 # Fitted in full beside those that the first search has fitted: so many of those that lead under the law, and so many more
 # of those whose tests are significant where none of these stands.
 LEADERS, FURTHER_LEADERS = 3, 5
+# So many of those that lead one step ahead are fitted in full, too.
+LEADERS_ONE_STEP = 2
 # Share of the odds that a further name needs, which its test must promise before it is fitted; of no more than these
 # odds, however large the gain of the names before it. A first name that is ahead by less is compared with more effects.
 WORTH_A_FIT, LARGE_ODDS = 0.3, 300.0
@@ -76,6 +78,7 @@ class LeaderFits:
         fits: under laws of the force.
         say: called with what is being done, in words.
         pool: who fits effects of which none has to wait for another.
+        one_step: values of effects fitted one step ahead, the one that explains most first, see `one_step_leaders`.
         known: what was fitted beside an explanation, by that and the effect's name: a search that passes there again asks
             for the same.
     """
@@ -84,6 +87,7 @@ class LeaderFits:
     fits: LawFits
     say: Callable[[str], None]
     pool: Executor = SERIAL
+    one_step: Mapping[str, Array] = field(default_factory=dict)
     known: dict[tuple[int, str], tuple[Hypothesis, Hypothesis | None]] = field(default_factory=dict)
 
     def fitted(
@@ -140,7 +144,10 @@ class LeaderFits:
             level: at which chance among all effects is rejected.
         """
         known = self._known(at, fitted)
-        found = self._each([*known, *self._worth(at, known, WORTH_A_FIT * min(odds, LARGE_ODDS))], at, known)
+        told = [n for n, s in at.tested.scores.items() if s.degrees]
+        ahead = [] if at.chosen else [n for n in self.one_step if n in told][:LEADERS_ONE_STEP]
+        worth = self._worth(at, known, WORTH_A_FIT * min(odds, LARGE_ODDS))
+        found = self._each([*known, *worth, *ahead], at, known)
         # Beside what was found tests are weaker: a rival of a further name need not be clear among all effects.
         rivals = rivals_of(found, at.tested.scores, level, among_all=not at.chosen)
         return _by_evidence([*found, *self._each(rivals, at)])
@@ -216,6 +223,7 @@ class LeaderFits:
         begins = [np.where(shape, initial_guess(self.layout, name, tested.scores[name].estimate), null)]
         begins += [at.earlier[name]] if name in at.earlier else []
         begins += [] if known is None else [parameters_of(known.fitted.model, [name])]
+        begins += [] if at.chosen or name not in self.one_step else [self.one_step[name]]
         for begin in begins:
             model = tested.at.model.rebuilt(tested.at.model.copied_effects())
             set_parameters(model, [name], begin)

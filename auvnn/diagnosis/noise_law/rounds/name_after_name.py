@@ -20,6 +20,7 @@ from auvnn.diagnosis.noise_law.hypothesis import (
 from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round, RoundResult
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import Branch, decided, shared, worth_following
 from auvnn.diagnosis.noise_law.rounds.names_given import ALPHA_NAME, FIRST_COST, NamesGiven
+from auvnn.diagnosis.noise_law.rounds.one_step_leaders import fitted_one_step
 from auvnn.diagnosis.noise_law.rounds.path import Path
 from auvnn.diagnosis.noise_law.under_law import NULL_STEPS, UnderLaw
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
@@ -47,6 +48,7 @@ class NameAfterName(UnderLaw):
     def __init__(self, asked: Setting, windows: Windows, *, closed_loop: bool = False) -> None:
         """Begin without a law."""
         super().__init__(asked, windows, closed_loop=closed_loop)
+        self.asked = asked
         self.usable = list(asked.usable)
         self.names = NamesGiven(asked.layout, asked.log, scale_of(asked.log), asked.tolerance)
         self.names.white_noise = windows.noise is None
@@ -155,7 +157,9 @@ class NameAfterName(UnderLaw):
         odds = max(ODDS, share * (current.evidence - null.evidence))
         at = Round(tests, current, base, list(chosen), self._earlier if chosen else {})
         good_of = partial(self.names.good, at, len(remaining))
-        self._leaders = self._leaders or LeaderFits(self.layout, self.fits(), self.say, self.pool)
+        if self._leaders is None:
+            one_step = fitted_one_step(self.asked)
+            self._leaders = LeaderFits(self.layout, self.fits(), self.say, self.pool, one_step)
         found, good = self._leaders.fitted(at, fitted, odds, ALPHA_NAME, good_of)
         if not chosen:
             self._earlier = {h.name: parameters_of(h.explanation.fitted.model, [h.name]) for h in found}
