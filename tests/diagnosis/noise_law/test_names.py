@@ -220,6 +220,9 @@ def test_in_open_loop_free_running_must_not_get_worse(monkeypatch):
     # One that is less likely does not stand in the way of another one.
     assert paying({"tether": (0.2, 0.2), "waves": (-0.2, 0.3)}, monkeypatch) == ["tether"]
     assert paying({"waves": (-0.01, 0.3), "tether": (0.2, 0.2)}, monkeypatch) == []
+    assert paying({"waves": (-0.2, 0.01), "tether": (0.2, 0.2)}, monkeypatch) == []
+    # Where predictions hardly move, half of a tenth being enough, neither stands against the other.
+    assert paying({"waves": (-0.01, 0.03), "tether": (0.2, 0.2)}, monkeypatch) == ["tether"]
 
 
 def test_in_closed_loop_it_is_enough_that_predictions_move(monkeypatch):

@@ -101,7 +101,9 @@ def _moved(before: Array, last: Rolled) -> Array:
     return (np.nan_to_num(last.predicted - before) ** 2 * mask).sum(1)
 
 
-def paying(likely: Sequence[Hypothesis], costs: Sequence[float], enough: float) -> list[Hypothesis]:
+def paying(
+    likely: Sequence[Hypothesis], costs: Sequence[float], enough: float, worse: Sequence[bool]
+) -> list[Hypothesis]:
     """Return those explanations that cost enough, and those that the data prefer to the likeliest of them.
 
     A less likely one must not be named because a likelier one that makes free running better costs little: then
@@ -114,14 +116,13 @@ def paying(likely: Sequence[Hypothesis], costs: Sequence[float], enough: float) 
         likely: explanations, the most evident first.
         costs: of each of them.
         enough: the cost that is enough.
+        worse: whether each makes free running worse by more than does not matter.
     """
     paid = [k for k, cost in enumerate(costs) if cost > enough]
     if not paid:
         return []
     first = paid[0]
-    if any(
-        c <= 0.0 and h.evidence > likely[first].evidence + ODDS for h, c in zip(likely, costs, strict=True)
-    ):
+    if any(w and h.evidence > likely[first].evidence + ODDS for h, w in zip(likely, worse, strict=True)):
         return []
     good = [k for k in range(len(likely)) if k in paid or (k < first and costs[k] > 0.0)]
     best = likely[good[0]].name

@@ -117,11 +117,14 @@ class NamesGiven:
         if self.tolerance.strict:
             return list(likely)
         enough = 0.0 if self.ignores_cost else share * self.tolerance.cost
-        costs = []
+        costs, worse = [], []
         for h in likely:
             if h.evidence > current.evidence + DECISIVE:
                 costs.append(float("inf"))
+                worse.append(False)
                 continue
-            cost = cost_of_name(self.layout, h, current, self.log, self.scale)
-            costs.append(max(cost) if self.in_closed_loop else cost[0])
-        return paying(likely, costs, enough)
+            error, moves = cost_of_name(self.layout, h, current, self.log, self.scale)
+            costs.append(max(error, moves) if self.in_closed_loop else error)
+            # What hardly moves predictions contradicts nothing, be its error a thousandth larger or smaller.
+            worse.append(costs[-1] <= 0.0 and max(-error, moves) > share * self.tolerance.cost)
+        return paying(likely, costs, enough, worse)
