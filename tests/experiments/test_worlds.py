@@ -33,6 +33,7 @@ SAMPLES = {
     "rows-13.jsonl": 12,
     "rows-14.jsonl": 13,
     "rows-15.jsonl": 14,
+    "rows-16.jsonl": 15,
 }
 
 
