@@ -49,25 +49,26 @@ def test_a_step_that_promises_much_and_brings_nothing_leaves_a_fit_stuck(turning
     )
 
 
-def test_a_fit_that_settles_is_not_stuck_and_stays():
+def settled():
+    """A fit that has settled, its windows, the effects that were free, and what is known of them."""
     model = GreyBox(small_vehicle())
     log = make_log(model, runs=2, duration=20.0, noise=1.0)
     layout, windows = lay_out(model, []), windows_for(model, log)
     names = tuple(layout.nuisance)
     known = priors(layout, names)
     found = fit(layout.model, windows, names, known)
+    return found, windows, names, known
+
+
+def test_a_fit_that_settles_is_not_stuck_and_stays():
+    found, windows, names, known = settled()
     assert found.converged and not found.stuck
     assert better_from_parts(found, windows, names, known, sigma=None, iterations=15) is found
 
 
 def test_a_promise_that_is_next_to_nothing_leaves_no_fit_stuck(monkeypatch):
     """Near the minimum rounding may be all that a step could bring."""
-    model = GreyBox(small_vehicle())
-    log = make_log(model, runs=2, duration=20.0, noise=1.0)
-    layout, windows = lay_out(model, []), windows_for(model, log)
-    names = tuple(layout.nuisance)
-    known = priors(layout, names)
-    found = fit(layout.model, windows, names, known)
+    found, windows, names, known = settled()
     real = prediction_error._answered
 
     def none_lower(*args: Any) -> Any:
