@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
-from auvnn.diagnosis.hypotheses.parts_first import leaves_less
+from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart, gain
 from auvnn.estimation.prediction_error import FitError, Fitted
 from auvnn.estimation.priors import Priors
 from auvnn.estimation.trajectories.initial_steps import costs_from
@@ -89,7 +88,7 @@ def better_from_measured(
         )
     except FitError:
         return best
-    return again if leaves_less(again, best, sigma) else best
+    return again if gain(best, again, sigma) > 0.0 else best
 
 
 def _far(best: Fitted, measured: Tensor) -> bool:

@@ -78,7 +78,7 @@ def fit_with_outlier_restart(
             again = _begun_again(best, model, windows, names, priors, near, sigma, iterations)
         except FitError:
             break
-        if not _gain(best, again, sigma) > 0.0:
+        if not gain(best, again, sigma) > 0.0:
             break
         pays, best = _pays(best, again, sigma), again
         if not pays:
@@ -123,13 +123,21 @@ def _begun_again(
     )
 
 
-def _gain(best: Fitted, again: Fitted, sigma: NDArray[np.float64] | None) -> float:
+def gain(best: Fitted, again: Fitted, sigma: NDArray[np.float64] | None) -> float:
+    """Return by how much another fit to the same windows leaves less.
+
+    Args:
+        best: the fit.
+        again: the other one.
+        sigma: (18,) fixed weights of both, and squared errors are compared; None where the weights follow the errors of
+            each: then the negative log-likelihoods are.
+    """
     return _errors(best) - _errors(again) if sigma is None else best.cost - again.cost
 
 
 def _pays(best: Fitted, again: Fitted, sigma: NDArray[np.float64] | None) -> bool:
     """Whether another fit has brought windows back: its errors are smaller by more than a little."""
-    return _gain(best, again, sigma) >= (
+    return gain(best, again, sigma) >= (
         WORTH * best.statistics.count.sum() if sigma is None else WORTH * best.cost
     )
 

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart
+from auvnn.diagnosis.hypotheses.outlier_restart import fit_with_outlier_restart, gain
 from auvnn.estimation.prediction_error import FitError, Fitted
 from auvnn.estimation.priors import Priors
 from auvnn.estimation.window_parts import split
@@ -65,19 +65,4 @@ def better_from_parts(
         )
     except FitError:
         return best
-    return again if leaves_less(again, best, sigma) else best
-
-
-def leaves_less(one: Fitted, other: Fitted, sigma: NDArray[np.float64] | None) -> bool:
-    """Whether a fit leaves smaller errors than another one to the same windows.
-
-    Args:
-        one: the fit.
-        other: the other one.
-        sigma: (18,) fixed weights of both; None where they follow the errors, each its own: then the negative
-            log-likelihoods are compared.
-    """
-    if sigma is not None:
-        return one.cost < other.cost
-    count, known = other.statistics.count.sum(0), np.isfinite(other.sigma) & np.isfinite(one.sigma)
-    return float(count[known] @ np.log(one.sigma[known] / other.sigma[known])) < 0.0
+    return again if gain(best, again, sigma) > 0.0 else best

@@ -229,7 +229,7 @@ def scripted(
         likely=lambda at, among, given, odds: given,
         paying=lambda likely, *_: likely,
     )
-    asked._leaders = SimpleNamespace(fitted=fitted, take=lambda *_: None)
+    asked._leaders, asked._one_step = SimpleNamespace(fitted=fitted, take=lambda *_: None), {}
     asked._tested = lambda *_: SimpleNamespace(p_value=0.0)
     asked._settled = lambda h: h
     asked._takes_up = lambda *_: False
@@ -274,7 +274,7 @@ def test_the_search_begins_with_what_the_likeliest_pairs_have_in_common(monkeypa
     # A further name is fitted from where it was as the first one, too.
     first, second = ["payload"], ["thrust_asymmetry"]
     assert [at.chosen for at in rounds] == [[], first, second, second, [*second, "trapped_water"]]
-    assert rounds[0].earlier == {} and [*rounds[-1].earlier] == ["payload", "thrust_asymmetry", "waves"]
+    assert rounds[0].begins == {} and [*rounds[-1].begins] == ["payload", "thrust_asymmetry", "waves"]
     # Of one name alone no pair is asked for.
     asked, rounds = scripted(monkeypatch, further)
     assert [s["effects"] for s in asked.run(found(-1000.0), [], 1).steps] == [["payload"]]

@@ -10,8 +10,9 @@ import pytest
 
 import auvnn
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.noise_law.rounds import one_step_leaders
+from auvnn.diagnosis.noise_law.rounds import name_after_name, one_step_leaders
 from auvnn.diagnosis.noise_law.rounds.leader_fits import LEADERS_ONE_STEP, LeaderFits, Round
+from auvnn.diagnosis.noise_law.rounds.name_after_name import NameAfterName
 from auvnn.diagnosis.noise_law.rounds.one_step_leaders import fitted_one_step, thinned
 from auvnn.errors import InputError
 from auvnn.estimation.priors import parameters_of
@@ -75,13 +76,23 @@ def test_what_leads_one_step_ahead_is_fitted_as_a_first_name(monkeypatch, chosen
     asked: list[str] = []
     monkeypatch.setattr(LeaderFits, "_one", lambda self, name, at, known: asked.append(name))
     values = {n: np.zeros(1) for n in "gfeb"}
-    looks = LeaderFits(None, None, lambda _: None, one_step=values)  # type: ignore[arg-type]
-    looks.leading(Round(SimpleNamespace(scores=scores), None, [], chosen), [], 10.0, 0.01)  # type: ignore[arg-type]
+    looks = LeaderFits(None, None, lambda _: None)  # type: ignore[arg-type]
+    at = Round(SimpleNamespace(scores=scores), None, [], chosen, values)  # type: ignore[arg-type]
+    looks.leading(at, [], 10.0, 0.01)
     assert LEADERS_ONE_STEP == 2 and set(asked) == expected
 
 
-@pytest.mark.parametrize(("chosen", "begins"), [([], [0.0, 30.0]), (["waves"], [0.0])])
-def test_a_first_name_begins_where_it_was_fitted_one_step_ahead_too(chosen, begins):
+def test_effects_are_fitted_one_step_ahead_once(monkeypatch):
+    asked: list[str] = []
+    monkeypatch.setattr(
+        name_after_name, "fitted_one_step", lambda _: asked.append("log") or {"waves": np.ones(1)}
+    )
+    search: Any = NameAfterName.__new__(NameAfterName)
+    search.asked = None
+    assert not asked and search._one_step is search._one_step and asked == ["log"]
+
+
+def test_a_first_name_begins_where_it_was_fitted_one_step_ahead_too():
     name = "net_buoyancy"
     model = GreyBox(small_vehicle())
     layout = lay_out(model, ["waves", name])
@@ -92,8 +103,9 @@ def test_a_first_name_begins_where_it_was_fitted_one_step_ahead_too(chosen, begi
         return SimpleNamespace(evidence=-50.0)
 
     fits: Any = SimpleNamespace(from_null=from_null)
-    looks = LeaderFits(layout, fits, lambda _: None, one_step={name: np.array([30.0])})
+    looks = LeaderFits(layout, fits, lambda _: None)
     tested: Any = SimpleNamespace(scores={name: SimpleNamespace(estimate=np.zeros(1))}, at=layout)
     current: Any = SimpleNamespace(evidence=-100.0)
-    assert looks._one(name, Round(tested, current, [], chosen), None) is not None
-    assert seen == begins
+    at = Round(tested, current, [], [], {name: np.array([30.0])})
+    assert looks._one(name, at, None) is not None
+    assert seen == [0.0, 30.0]

@@ -40,14 +40,15 @@ class Round:
         current: the explanation without any of them.
         base: effects that are free whatever is chosen.
         chosen: effects found before.
-        earlier: values of effects that were fitted when nothing was chosen.
+        begins: values from which effects are fitted, too: while nothing is chosen those fitted one step ahead, the one
+            that explains most first (`one_step_leaders`); then those fitted when nothing was chosen.
     """
 
     tested: Tested
     current: Hypothesis
     base: list[str]
     chosen: list[str]
-    earlier: Mapping[str, Array] = field(default_factory=dict)
+    begins: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,6 @@ class LeaderFits:
         fits: under laws of the force.
         say: called with what is being done, in words.
         pool: who fits effects of which none has to wait for another.
-        one_step: values of effects fitted one step ahead, the one that explains most first, see `one_step_leaders`.
         known: what was fitted beside an explanation, by that and the effect's name: a search that passes there again asks
             for the same.
     """
@@ -87,7 +87,6 @@ class LeaderFits:
     fits: LawFits
     say: Callable[[str], None]
     pool: Executor = SERIAL
-    one_step: Mapping[str, Array] = field(default_factory=dict)
     known: dict[tuple[int, str], tuple[Hypothesis, Hypothesis | None]] = field(default_factory=dict)
 
     def fitted(
@@ -145,7 +144,7 @@ class LeaderFits:
         """
         known = self._known(at, fitted)
         told = [n for n, s in at.tested.scores.items() if s.degrees]
-        ahead = [] if at.chosen else [n for n in self.one_step if n in told][:LEADERS_ONE_STEP]
+        ahead = [] if at.chosen else [n for n in at.begins if n in told][:LEADERS_ONE_STEP]
         worth = self._worth(at, known, WORTH_A_FIT * min(odds, LARGE_ODDS))
         found = self._each([*known, *worth, *ahead], at, known)
         # Beside what was found tests are weaker: a rival of a further name need not be clear among all effects.
@@ -221,9 +220,8 @@ class LeaderFits:
         # At its null place and time an effect says nothing of them: they are where its test has found them.
         shape = shapes(self.layout, name)
         begins = [np.where(shape, initial_guess(self.layout, name, tested.scores[name].estimate), null)]
-        begins += [at.earlier[name]] if name in at.earlier else []
         begins += [] if known is None else [parameters_of(known.fitted.model, [name])]
-        begins += [] if at.chosen or name not in self.one_step else [self.one_step[name]]
+        begins += [at.begins[name]] if name in at.begins else []
         for begin in begins:
             model = tested.at.model.rebuilt(tested.at.model.copied_effects())
             set_parameters(model, [name], begin)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,11 @@ class NameAfterName(UnderLaw):
         ] = {}
         # Values of effects that were fitted when nothing was chosen.
         self._earlier: dict[str, Array] = {}
+
+    @cached_property
+    def _one_step(self) -> dict[str, Array]:
+        """Values of effects fitted one step ahead; worked out where a search begins without any name."""
+        return fitted_one_step(self.asked)
 
     def begin(self, first: FittedHypothesis, sigma: Array, steps: int = NULL_STEPS) -> Hypothesis | None:
         """Return an explanation under the law of the force; None where no variance is above zero.
@@ -155,11 +160,9 @@ class NameAfterName(UnderLaw):
             return None
         share = 0.0 if self.looks_further else FURTHER_SHARE
         odds = max(ODDS, share * (current.evidence - null.evidence))
-        at = Round(tests, current, base, list(chosen), self._earlier if chosen else {})
+        at = Round(tests, current, base, list(chosen), self._earlier if chosen else self._one_step)
         good_of = partial(self.names.good, at, len(remaining))
-        if self._leaders is None:
-            one_step = fitted_one_step(self.asked)
-            self._leaders = LeaderFits(self.layout, self.fits(), self.say, self.pool, one_step)
+        self._leaders = self._leaders or LeaderFits(self.layout, self.fits(), self.say, self.pool)
         found, good = self._leaders.fitted(at, fitted, odds, ALPHA_NAME, good_of)
         if not chosen:
             self._earlier = {h.name: parameters_of(h.explanation.fitted.model, [h.name]) for h in found}
