@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.one_step import refit
 from auvnn.diagnosis.one_step.rank import Ranked, _plainer_first
 from auvnn.diagnosis.one_step.refit import OneStepRefit
 from auvnn.diagnosis.one_step.slopes import AccelerationSlopes, extent_of_log
@@ -127,3 +128,17 @@ def test_of_those_that_are_tied_the_plainer_comes_first():
     assert [r.effect for r in _plainer_first(order)] == ["net_buoyancy", "payload", "tether"]
     clear = [ranked("payload", 1.0, 0.0), ranked("net_buoyancy", 1.5, 0.5)]
     assert _plainer_first(clear) == clear and _plainer_first([]) == []
+
+
+def test_a_step_that_is_too_long_is_shortened(monkeypatch):
+    """Four times too long, each time: a quarter of it is taken, and the error falls as far as with the right one."""
+    truth = MODEL.with_effects({"net_buoyancy": {"force": 12.0}})
+    log = make_log(truth, runs=2, duration=20.0, noise=1.0)
+    beside = OneStepRefit(MODEL, log, choose_derivative(log, None))
+    found = beside.alone("net_buoyancy")
+    real = refit.solve
+    monkeypatch.setattr(refit, "solve", lambda *given: 4.0 * real(*given))
+    again = beside.alone("net_buoyancy")
+    assert found is not None and again is not None and found.fell > 0.0
+    assert again.values["force"] == pytest.approx(found.values["force"], rel=0.02)
+    assert again.fell == pytest.approx(found.fell, rel=0.02)
