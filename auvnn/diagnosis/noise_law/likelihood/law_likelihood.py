@@ -12,13 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 from torch import Tensor
 
+from auvnn.diagnosis.noise_law.likelihood.bounded_minimum import bounded_minimum
+from auvnn.diagnosis.noise_law.likelihood.law_information import law_information
 from auvnn.diagnosis.noise_law.likelihood.sums import ForceSums
 from auvnn.diagnosis.noise_law.likelihood.window_filter import WindowFilter
 from auvnn.estimation.priors import bounded_step
@@ -31,8 +33,8 @@ Index = NDArray[np.int64]
 STARTS, FIRST_TIME = np.logspace(-3.0, 1.0, 9), 1.0
 # Standard deviations of the law's parameters as they are likely to be, in logarithms: a proper, weak prior.
 VAGUE = 3.0
-# Steps of the search for the likeliest law.
-STEPS = 40
+# Steps of the search for the likeliest law, and what one must promise of minus twice the log likelihood.
+STEPS, PROMISED = 40, 0.01
 
 
 class Likelihood:
@@ -109,7 +111,7 @@ class Likelihood:
         return self.filter.free > 0 or (law is not None and bool(law.axes))
 
     def _under(self, law: ForceLaw | None) -> list[tuple[Index, Tensor, Tensor]]:
-        """Return what `_windows` yields under a law; of the last law that was asked for it is known."""
+        """Return what the filter yields under a law; of the last law that was asked for it is known."""
         law = self.law([], np.zeros(0), np.zeros(0)) if law is None else law
         key = law.rms.tobytes(), law.time.tobytes()
         if self._last is None or self._last[0] != key:
@@ -134,17 +136,22 @@ class Likelihood:
         At the parameters that follow a law the slope in them is zero: they are held while the law's is taken.
         """
         count = len(axes)
-        law = self.law(axes, np.exp(x[:count]), np.exp(x[count:]))
-        value, whole = self._whole(law)
-        step, square, pull = self._followed(whole)
-        follow = np.concatenate([[1.0], -step])
-        along = torch.as_tensor(follow)[:, None]
         free = torch.tensor(x, requires_grad=True)
-        parts = self.filter.windows(axes, free[:count].exp(), free[count:].exp(), along)
-        total = torch.stack([square.sum() + volume.sum() for _, square, volume in parts]).sum()
+        whole, volume = torch.zeros_like(self.filter.plain[0]), torch.zeros((), dtype=torch.float64)
+        for _, square, own in self.filter.windows(axes, free[:count].exp(), free[count:].exp()):
+            whole, volume = whole + square.sum(0), volume + own.sum()
+        plain = whole.detach().numpy()
+        step, square, pull = self._followed(plain)
+        follow = torch.as_tensor(np.concatenate([[1.0], -step]))
+        total = follow @ whole @ follow + volume
         (slope,) = torch.autograd.grad(total, free)
         away = x - self._likely(axes)
-        value += float(whole[0, 0]) + self.prior - _gain(step, square + self.precision, pull)
+        value = (
+            float(volume.detach())
+            + float(plain[0, 0])
+            + self.prior
+            - _gain(step, square + self.precision, pull)
+        )
         return value + float(away @ away) / VAGUE**2, slope.numpy() + 2.0 * away / VAGUE**2
 
     def _likely(self, axes: Sequence[int]) -> Array:
@@ -165,32 +172,23 @@ class Likelihood:
         high = np.concatenate(
             [np.log(1e2 * self.sums.sizes[axes]), np.full(len(axes), np.log(self.sums.times[1]))]
         )
-        if start is None:
-            start = self._start(axes)
-        start = np.clip(start, low, high)
-        unit = 1.0 / np.sqrt(self._information(start))
+        start = np.clip(self._start(axes) if start is None else start, low, high)
+        count = len(axes)
+        shown = self._seen(axes)
 
-        def scaled(z: Array) -> tuple[float, Array]:
-            value, slope = self.sloped(axes, z * unit)
-            return value, slope * unit
+        def curved(x: Array) -> Array:
+            known = law_information(shown, self.sums.cell, np.exp(x[:count]), np.exp(x[count:]))
+            return known + 2.0 / VAGUE**2 * np.eye(len(x))
 
-        found = minimize(
-            scaled, start / unit, jac=True, method="L-BFGS-B",
-            bounds=list(zip(low / unit, high / unit, strict=True)), options={"maxiter": most, "ftol": 1e-7},
-        )  # fmt: skip
-        # Scaled back and forth, a bound may be missed by a rounding.
-        return float(found.fun), np.clip(np.asarray(found.x) * unit, low, high)
+        return bounded_minimum(
+            partial(self.sloped, axes), curved, start, low, high, most=most, enough=PROMISED
+        )
 
-    def _information(self, x: Array) -> Array:
-        """Return roughly how curved minus twice the log likelihood is in log rms and log time, (2 A,).
-
-        Of a process of correlation time T, a span of 2 T is worth one independent value; each adds 4 to the curvature in
-        the logarithm of their rms, and about 1 to that of the time. A search in these units needs a quarter fewer steps.
-        """
-        count = len(x) // 2
-        whole = len(self.sums.statistics.cost) * self.sums.span
-        independent = np.maximum(0.5 * whole / np.exp(x[count:]), 10.0)
-        return np.concatenate([4.0 * independent, independent])
+    def _seen(self, axes: Sequence[int]) -> Array:
+        """Return what windows say of the forces in some degrees of freedom, states integrated out, (B, A K, A K)."""
+        known, size = self.sums.known, self.sums.cells
+        places = known + np.concatenate([np.arange(i * size, (i + 1) * size) for i in axes])
+        return self.sums.statistics.hessian[:, places[:, None], places]
 
     def _start(self, axes: list[int]) -> Array:
         """Return the best of a few sizes, one degree of freedom after the other."""

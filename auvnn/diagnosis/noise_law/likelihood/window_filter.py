@@ -2,16 +2,20 @@
 
 In every window the force is a Gaussian vector: its means over cells (`ForceLaw`), and its value at the end. The next
 window of the run depends on what was before by that value and, where it begins with the sample with which this one ends,
-by the last state s = E v + d, with v the initial state and the force, of which E is the linear map to the end. With m and
-P what is known of both from there, G the regression on them, and C what is left of the covariance,
-
-    v ~ N(G m, G P G^T + C).
-
-So windows count as conditional on their past, as one filter through the whole run would have it (up to chains of ten
+by the last state s = E v + d, with v the initial state and the force, of which E is the linear map to the end. So
+windows count as conditional on their past, as one filter through the whole run would have it (up to chains of ten
 windows): a slow force is not taken for as many independent ones as there are windows, and commands that answer the force
-are conditional on it. With L L^T the covariance of v and mu its mean, minus twice the log likelihood of a window is
+are conditional on it.
 
-    c - 2 g^T mu + mu^T H mu - b^T (I + L^T H L)^-1 b + log |I + L^T H L|,    b = L^T (g - H mu).
+The force as a window begins, f0, is a variable of its own: given it, the means over cells and the value at the end are
+Gaussian with mean G f0 and the covariance C of a process that begins at a known value, the same in all windows. With P
+the covariance of f0 and the initial state, from what is known of the window before, all of them have the precision
+
+    Q = [[P^-1 + G^T C^-1 G, -G^T C^-1], [-C^-1 G, C^-1]]
+
+(G with zeros for the state). With mu their mean, minus twice the log likelihood of a window is
+
+    c - 2 g^T mu + mu^T H mu - b^T (Q + H)^-1 b + log |Q + H| + log |P| + log |C|,    b = g - H mu.
 
 Where windows are linear about free running, states are free in every window and the force alone goes on.
 
@@ -21,11 +25,13 @@ Reference: Kristensen, Madsen and Joergensen (2004), Automatica 40(2) 225-237, f
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
+from torch.nn.functional import pad
 
 from auvnn.diagnosis.noise_law.likelihood.sums import ForceSums
 from auvnn.estimation.force_marginalisation.sums import LOOSE
@@ -74,69 +80,56 @@ class WindowFilter:
         before = np.full(len(own), -1) if sums.before is None else sums.before
         self.waves = _waves(before)
         self.gap = torch.as_tensor(np.zeros(len(own)) if sums.gap is None else sums.gap)
+        self.loose = [torch.diag(torch.as_tensor(LOOSE**2.0))] if states is not None else []
         if states is not None:
             self.offset = torch.as_tensor(states.offset)
             self.follows = torch.as_tensor(states.follows.astype(float))
 
     def windows(
-        self, axes: Sequence[int], rms: Tensor, time: Tensor, along: Tensor | None = None
+        self, axes: Sequence[int], rms: Tensor, time: Tensor
     ) -> Iterator[tuple[Index, Tensor, Tensor]]:
-        """Yield windows, their squares (n, M, M) with forces and states integrated out, and log determinants (n,).
+        """Yield windows, their squares (n, 1 + P, 1 + P), forces and states integrated out, and log determinants (n,).
 
         Args:
             axes: degrees of freedom with a force.
             rms: of each of them, (A,).
             time: of each of them, (A,), s.
-            along: combinations of errors and parameters that are looked at, (1 + P, M); by default each by itself.
         """
         size, count, free = self.sums.cells, len(axes), self.free
         if self._asked is None or self._asked[0] != tuple(axes):
             self._asked = tuple(axes), *self._of_axes(axes)
         index, force, ends = self._asked[1:]
-        columns, plain, led = self.columns[:, index] * (index >= 0)[:, None], self.plain, self.led
-        if along is not None:
-            columns, plain, led = columns @ along, along.mT @ plain @ along, led @ along
-        # Means over the cells, and the value at their end, on which alone the next window depends.
-        cell = self.sums.cell
-        own = _blocks([rms[k] ** 2 * covariance_with_end(size, cell, time[k]) for k in range(count)])
-        onto = _blocks(
-            [torch.cat([after(size, cell, t), torch.exp(-size * cell / t)[None]])[:, None] for t in time]
-        )
-        variance = torch.diag(rms**2)
-        loose = torch.diag(torch.as_tensor(LOOSE**2.0)[:free])
-        begun = torch.linalg.cholesky(_blocks([loose, own]))
-        # What goes on to the next window: the last state, and the force's last values.
+        columns = self.columns[:, index] * (index >= 0)[:, None]
+        prior = self._within(rms, time)
+        begun = torch.linalg.cholesky(_blocks([torch.diag(rms**2), *self.loose]))
+        # What goes on to the next window: the force's last values, and the last state.
         last = torch.zeros(count, len(index), dtype=torch.float64)
         last[torch.arange(count), free + torch.arange(1, count + 1) * (size + 1) - 1] = 1.0
-        eye = torch.eye(len(index), dtype=torch.float64)
         mean = spread = None
         for where, before in self.waves:
             here = torch.as_tensor(where)
-            h, g = force[here], columns[here]
+            h, g, square = force[here], columns[here], self.plain[here]
             if before is None or mean is None or spread is None:
-                expected, root = None, begun.expand(len(where), -1, -1)
+                begins, root = None, begun.expand(len(where), -1, -1)
             else:
-                expected, root = self._expected(here, mean[before], spread[before], own, onto, variance, time)
-            square, ahead = plain[here], g
-            if expected is not None:
-                ahead = g - h @ expected
-                cross = g.mT @ expected
-                square = square - cross - cross.mT + expected.mT @ h @ expected
-            inner = torch.linalg.cholesky(root.mT @ h @ root + eye)
-            half = torch.linalg.solve_triangular(inner, root.mT @ ahead, upper=False)
-            yield (
-                where,
-                square - half.mT @ half,
-                2.0 * torch.log(torch.diagonal(inner, dim1=-2, dim2=-1)).sum(-1),
-            )
+                begins, root = self._begins(here, mean[before], spread[before], rms, time)
+                within = torch.cat([begins[:, count:], prior.onto @ begins[:, :count]], dim=1)
+                cross = g.mT @ within
+                square = square - cross - cross.mT + within.mT @ h @ within
+                g = g - h @ within
+                begins = torch.cat([begins, within[:, free:]], dim=1)
+            # No measurement shows the force as the window begins, but for what it makes likely within.
+            inner = torch.linalg.cholesky(prior.precision(root) + pad(h, (count, 0, count, 0)))
+            half = torch.linalg.solve_triangular(inner, pad(g, (0, 0, count, 0)), upper=False)
+            yield where, square - half.mT @ half, prior.volume + _volume(root) + _volume(inner)
             if len(self.waves) > 1:
-                on = torch.cat([ends[here], last.expand(len(where), -1, -1)], dim=1)
-                known = torch.linalg.solve_triangular(inner, (on @ root).mT, upper=False)
+                on = pad(torch.cat([last.expand(len(where), -1, -1), ends[here]], dim=1), (count, 0))
+                known = torch.linalg.solve_triangular(inner, on.mT, upper=False)
                 mean, spread = known.mT @ half, known.mT @ known
-                if expected is not None:
-                    mean = mean + on @ expected
+                if begins is not None:
+                    mean = mean + on @ begins
                 if free:
-                    mean = torch.cat([mean[:, :free] + led[here], mean[:, free:]], dim=1)
+                    mean = torch.cat([mean[:, :count], mean[:, count:] + self.led[here]], dim=1)
 
     def _of_axes(self, axes: Sequence[int]) -> tuple[Tensor, Tensor, Tensor]:
         """Return which variables are the states and the force's of some degrees of freedom, their squares, and ends.
@@ -152,40 +145,89 @@ class WindowFilter:
         force = self.force[:, index][:, :, index] * there[:, None] * there
         return index, force, self.ends[:, :, index] * there
 
-    def _expected(
-        self, here: Tensor, mean: Tensor, spread: Tensor, own: Tensor, onto: Tensor, variance: Tensor, time: Tensor
-    ) -> tuple[Tensor, Tensor]:  # fmt: skip
-        """Return what is expected of states and force of windows, (n, S + A K, M), and the root of its covariance.
+    def _within(self, rms: Tensor, time: Tensor) -> Within:
+        """Return what the forces as a window begins make of those within it.
+
+        Args:
+            rms: of each degree of freedom with a force, (A,).
+            time: of each of them, (A,), s.
+        """
+        size, cell = self.sums.cells, self.sums.cell
+        onto, inverse, volume = list[Tensor](), list[Tensor](), torch.zeros((), dtype=torch.float64)
+        for k in range(len(rms)):
+            on = torch.cat([after(size, cell, time[k]), torch.exp(-size * cell / time[k])[None]])[:, None]
+            root = torch.linalg.cholesky(covariance_with_end(size, cell, time[k]) - on @ on.mT)
+            onto.append(on)
+            inverse.append(torch.cholesky_inverse(root) / rms[k] ** 2)
+            volume = volume + _volume(root) + 2.0 * (size + 1) * torch.log(rms[k])
+        return Within(_blocks(onto), _blocks(inverse), volume)
+
+    def _begins(
+        self, here: Tensor, mean: Tensor, spread: Tensor, rms: Tensor, time: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Return what is expected of forces and states as windows begin, (n, A + S, 1 + P), and their covariance's root.
 
         Args:
             here: the windows.
-            mean: of the last states and forces of the windows that they follow, (n, S + A, M).
+            mean: of the last forces and states of the windows that they follow, (n, A + S, 1 + P).
             spread: their covariance.
-            own: covariance of a window's cells and last forces.
-            onto: their regression on the force as the window begins.
-            variance: of that force, where nothing is known of it.
-            time: correlation times, s, (A,).
+            rms: of each degree of freedom with a force, (A,).
+            time: of each of them, (A,), s.
         """
-        free, size = self.free, self.sums.cells
-        since = torch.exp(-self.gap[here, None] / time).repeat_interleave(size + 1, dim=1)
-        regression = onto * since[..., None]
-        force = regression @ mean[:, free:]
-        covariance = own + regression @ (spread[:, free:, free:] - variance) @ regression.mT
-        if not free:
+        count = len(rms)
+        since = torch.exp(-self.gap[here, None] / time)[..., None]
+        force = since * mean[:, :count]
+        covariance = since * spread[:, :count, :count] * since.mT + torch.diag_embed(
+            rms**2 * (1.0 - since[..., 0] ** 2)
+        )
+        if not self.free:
             return force, torch.linalg.cholesky(covariance)
         follows = self.follows[here, None, None]
-        state = mean[:, :free] * follows
+        state = mean[:, count:] * follows
         offset = torch.zeros_like(state)
         offset[..., :1] = (self.offset[here, :, None] * follows)[..., :1]
-        across = spread[:, :free, free:] @ regression.mT * follows
-        least = torch.diag(torch.as_tensor((LOOSE * LEAST) ** 2))
-        first = follows * (spread[:, :free, :free] + least) + (1.0 - follows) * torch.diag(
-            torch.as_tensor(LOOSE**2.0)
+        across = since * spread[:, :count, count:] * follows
+        own = (
+            follows * (spread[:, count:, count:] + LEAST**2 * self.loose[0]) + (1.0 - follows) * self.loose[0]
         )
         whole = torch.cat(
-            [torch.cat([first, across], dim=-1), torch.cat([across.mT, covariance], dim=-1)], dim=1
+            [torch.cat([covariance, across], dim=-1), torch.cat([across.mT, own], dim=-1)], dim=1
         )
-        return torch.cat([state + offset, force], dim=1), torch.linalg.cholesky(whole)
+        return torch.cat([force, state + offset], dim=1), torch.linalg.cholesky(whole)
+
+
+@dataclass(frozen=True)
+class Within:
+    """What forces as a window begins make of those within it: of means over cells and, last, the value at the end.
+
+    Attributes:
+        onto: (A (K + 1), A) what they are expected to be, by the forces as the window begins.
+        inverse: (A (K + 1), A (K + 1)) of their covariance, given these.
+        volume: logarithm of its determinant.
+    """
+
+    onto: Tensor
+    inverse: Tensor
+    volume: Tensor
+
+    def precision(self, root: Tensor) -> Tensor:
+        """Return the precision of the forces as windows begin, the states there, and the forces within.
+
+        Args:
+            root: of the covariance of forces and states as windows begin, (n, A + S, A + S).
+        """
+        free = root.shape[-1] - self.onto.shape[1]
+        aside = -self.inverse @ self.onto
+        own = pad(-self.onto.mT @ aside, (0, free, 0, free))
+        back = pad(aside, (0, free)).expand(len(root), -1, -1)
+        inside = self.inverse.expand(len(root), -1, -1)
+        first = torch.cholesky_inverse(root) + own
+        return torch.cat([torch.cat([first, back.mT], dim=-1), torch.cat([back, inside], dim=-1)], dim=1)
+
+
+def _volume(root: Tensor) -> Tensor:
+    """Return the logarithm of the determinant of matrices by their Cholesky factors."""
+    return 2.0 * torch.log(torch.diagonal(root, dim1=-2, dim2=-1)).sum(-1)
 
 
 def _blocks(parts: Sequence[Tensor]) -> Tensor:

@@ -1,0 +1,68 @@
+"""Minima within bounds, against another solver and by the conditions that hold there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize, rosen, rosen_der
+
+from auvnn.diagnosis.noise_law.likelihood.bounded_minimum import bounded_minimum
+
+SIZE = 4
+
+
+def at_minimum(sloped, low, high, seed, *, curved=lambda x: 50.0 * np.eye(len(x))):
+    start = np.random.default_rng(seed).uniform(low, high)
+    return bounded_minimum(sloped, curved, start, low, high, most=500, enough=1e-12)
+
+
+def rosenbrock(x):
+    return float(rosen(x)), rosen_der(x)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("high", [2.0, 0.7])
+def test_the_minimum_is_that_of_another_solver(seed, high):
+    low, high = np.full(SIZE, -0.5), np.full(SIZE, high)
+    value, x = at_minimum(rosenbrock, low, high, seed)
+    begin = np.random.default_rng(seed).uniform(low, high)
+    other = minimize(rosen, begin, jac=rosen_der, method="L-BFGS-B", bounds=list(zip(low, high, strict=True)))
+    assert value <= other.fun + 1e-6
+    assert (low <= x).all() and (x <= high).all()
+
+
+def test_a_quadratic_whose_curvature_is_known_takes_one_step():
+    rng, asked = np.random.default_rng(3), []
+    root = rng.normal(size=(SIZE, SIZE))
+    normal, best = root @ root.T + np.eye(SIZE), rng.uniform(-0.4, 0.4, size=SIZE)
+
+    def sloped(x):
+        asked.append(x)
+        return float(0.5 * (x - best) @ normal @ (x - best)), normal @ (x - best)
+
+    wide = np.full(SIZE, 10.0)
+    _, x = bounded_minimum(sloped, lambda x: normal, np.zeros(SIZE), -wide, wide, most=20, enough=1e-9)
+    assert x == pytest.approx(best, abs=1e-9)
+    assert len(asked) == 2
+
+
+def test_a_step_that_does_not_bring_enough_is_shortened():
+    # A curvature that is a hundred times too small: the whole step goes far beyond the minimum.
+    def sloped(x):
+        return float(50.0 * x @ x), 100.0 * x
+
+    wide = np.full(1, 100.0)
+    _, x = bounded_minimum(sloped, lambda x: np.eye(1), np.ones(1), -wide, wide, most=20, enough=1e-9)
+    assert x == pytest.approx([0.0], abs=1e-4)
+
+
+def test_nothing_is_asked_where_no_step_promises_anything():
+    asked = []
+
+    def sloped(x):
+        asked.append(x)
+        return 1.0, np.zeros(2)
+
+    wide = np.full(2, 1.0)
+    bounded_minimum(sloped, lambda x: np.eye(2), np.zeros(2), -wide, wide, most=20, enough=1e-9)
+    assert len(asked) == 1
