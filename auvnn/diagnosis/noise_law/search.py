@@ -129,7 +129,7 @@ class ForceSearch(NameAfterName):
             self.say("comparing effects that could not be told apart, beside all names")
             rest = self.rest(path)
             refit = self._refit(path.current, whole=True)
-            lost = those_that_lose(path.groups, path.current, refit, rest)
+            lost = those_that_lose(self.layout, path.groups, path.current, refit, rest)
             path.steps, path.groups = without_lost(path.steps, path.groups, lost)
 
     def _ended(self, path: Path, null: Hypothesis, tried: Sequence[Hypothesis], whole: float) -> WithForce:

@@ -87,14 +87,59 @@ def test_a_rival_loses_by_more_than_the_model_is_known_to_be_wrong(
         return predicted
 
     monkeypatch.setattr(module, "predicts_better", better)
-    assert loses(worth(short), worth(0.0), rest) is expected
+    assert loses(worth(short), worth(0.0), rest, 0) is expected
     assert all(given == (short, 0.0, 3.0, False) for given in asked)
+
+
+@pytest.mark.parametrize(
+    ("short", "gained", "extra", "expected"),
+    [
+        # A payload of twelve parameters that fits as well as a buoyancy of one, and better by chance.
+        (21.0, 6.4, 11, True),
+        (21.0, -300.0, 11, True),
+        # Better than by chance: the 0.01 quantile of chi-squared with eleven degrees of freedom is 24.7.
+        (21.0, 24.6, 11, True),
+        (21.0, 24.8, 11, False),
+        # As likely, or short by less than a further effect still gains.
+        (4.5, 6.4, 11, False),
+        (12.9, 6.4, 11, False),
+        # No more parameters than the one that leads: runs left out decide.
+        (21.0, 6.4, 0, False),
+    ],
+)
+def test_a_rival_that_contains_the_leader_loses_by_evidence(monkeypatch, short, gained, extra, expected):
+    monkeypatch.setattr(module, "predicts_better", lambda *_, **__: False)
+    leader, rival = worth(short), worth(0.0)
+    leader.misfit, rival.misfit = 1000.0, 1000.0 - gained
+    assert loses(leader, rival, 13.0 if short < 13.0 else 1.5, extra) is expected
+
+
+def test_a_plainer_cause_does_not_lose_by_its_parameters(monkeypatch):
+    asked: list[int] = []
+    monkeypatch.setattr(module, "loses", lambda current, rival, rest, extra: asked.append(extra))
+    layout: Any = SimpleNamespace(
+        columns={
+            "payload": range(12),
+            "net_buoyancy": range(1),
+            "trapped_water": range(3),
+            "added_mass": range(6),
+        }
+    )
+    groups = [
+        [explanation("net_buoyancy"), explanation("payload")],
+        [explanation("payload"), explanation("net_buoyancy")],
+        [explanation("trapped_water"), explanation("added_mass")],
+    ]
+    those_that_lose(layout, groups, worth(0.0), one_by_one(lambda name, rival: worth(0.0)), 1.0)  # type: ignore[arg-type]
+    assert asked == [11, 0, 0]
 
 
 def test_each_rival_is_fitted_in_the_place_of_the_one_that_leads(monkeypatch):
     monkeypatch.setattr(
-        module, "loses", lambda current, rival, rest: current.evidence - rival.evidence > rest
+        module, "loses", lambda current, rival, rest, extra: current.evidence - rival.evidence > rest
     )
+    names = ("ocean_current", "current_shear", "velocity_scale", "thruster_lag", "waves")
+    layout: Any = SimpleNamespace(columns={n: range(1) for n in names})
     current, shear, scale = (
         explanation("ocean_current"),
         explanation("current_shear"),
@@ -112,7 +157,7 @@ def test_each_rival_is_fitted_in_the_place_of_the_one_that_leads(monkeypatch):
         asked.append((name, rival.effects[-1]))
         return worth(fits[rival.effects[-1]]) if rival.effects[-1] in fits else None
 
-    lost = those_that_lose(groups, worth(0.0), refit, 100.0)  # type: ignore[arg-type]
+    lost = those_that_lose(layout, groups, worth(0.0), refit, 100.0)  # type: ignore[arg-type]
     # One that cannot be fitted has not lost.
     assert lost == {("ocean_current", "current_shear")}
     assert asked == [
@@ -364,7 +409,8 @@ def test_a_rival_takes_the_place_of_a_name_with_what_it_was_fitted_to(beside, mo
     found = refitted(under.layout, under.fits(), right, under.base, "net_buoyancy", wrong.explanation)
     assert found is not None and found.explanation.effects == ("gyro_bias",)
     assert found.evidence == pytest.approx(wrong.evidence, abs=1.0)
-    assert loses(right, found, 0.0) and not loses(right, found, right.evidence - found.evidence + 1.0)
+    short = right.evidence - found.evidence
+    assert loses(right, found, 0.0, 0) and not loses(right, found, short + 1.0, 0)
     # It begins with its own values, and the name it takes the place of is as it was stated.
     began: list[Any] = []
     model = wrong.explanation.fitted.model

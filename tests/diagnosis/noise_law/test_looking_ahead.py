@@ -380,7 +380,7 @@ def test_a_tie_is_decided_beside_all_names(monkeypatch, lost):
     wholes: list[bool] = []
     monkeypatch.setattr(module, "refitted", lambda *_, whole: wholes.append(whole))
 
-    def those(groups: Any, current: Any, refit: Any, rest: float) -> set[tuple[str, str]]:
+    def those(layout: Any, groups: Any, current: Any, refit: Any, rest: float) -> set[tuple[str, str]]:
         refit([("payload", groups[0][1])])
         given.append(([[e.effects for e in g] for g in groups], current.explanation.effects, rest))
         return {("payload", "trapped_water")} if lost else set()

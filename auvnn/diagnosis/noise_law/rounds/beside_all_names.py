@@ -19,6 +19,7 @@ from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
@@ -29,11 +30,14 @@ from auvnn.diagnosis.noise_law.rounds.leaders import RIVALS
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import RIVALS_SHARE
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.diagnosis.selection.rivals import Rivals
+from auvnn.effects import effect_class
 from auvnn.estimation.priors import parameters_of, set_parameters
 
 Array = NDArray[np.float64]
 # Standard errors by which runs left out must be predicted better with the name that leads.
 SURE = 3.0
+# What the further parameters of a rival gain by chance alone is exceeded as seldom as this.
+ALPHA_EXTRA = 0.01
 # Logarithm of the odds by which a fit may fall short, what its next step promises included, before it is given up: where
 # a name is needed so much, the fit without it need not be finished.
 FAR = 1000.0
@@ -137,25 +141,38 @@ def as_good_in_place(
     return max(found, key=lambda pair: pair[1].evidence, default=None)
 
 
-def loses(current: Hypothesis, rival: Hypothesis, rest: float) -> bool:
+def loses(current: Hypothesis, rival: Hypothesis, rest: float, extra: int) -> bool:
     """Whether a rival explains less than the names that were found, by more than the model is known to be wrong.
+
+    A rival that contains what leads predicts as well, whatever the truth. Where it has more parameters and these gain no
+    more than chance, evidence decides: what it counts against the rival is that it could have explained much else.
 
     Args:
         current: with the names that were found.
         rival: with the rival in the place of one of them.
         rest: what the best further effect gains beside the names, in the logarithm of the odds.
+        extra: parameters that the rival has more than the name in whose place it is; zero where it is the plainer cause.
+
+    Reference: MacKay (2003), Information Theory, Inference and Learning Algorithms, chapter 28 (Occam's razor).
     """
-    return current.evidence - rival.evidence > max(ODDS, rest) and predicts_better(
-        current, rival, SURE, ranks=False
-    )
+    if current.evidence - rival.evidence <= max(ODDS, rest):
+        return False
+    if extra > 0 and current.misfit - rival.misfit < chi2.isf(ALPHA_EXTRA, extra):
+        return True
+    return predicts_better(current, rival, SURE, ranks=False)
 
 
 def those_that_lose(
-    groups: Sequence[Sequence[FittedHypothesis]], current: Hypothesis, refit: Refit, rest: float
+    layout: Layout,
+    groups: Sequence[Sequence[FittedHypothesis]],
+    current: Hypothesis,
+    refit: Refit,
+    rest: float,
 ) -> set[tuple[str, str]]:
     """Return the rivals that lose, each as the name of the one that leads and its own.
 
     Args:
+        layout: for the number of an effect's parameters.
         groups: explanations that could not be told apart, the one that leads first.
         current: with the names that were found.
         refit: fits all names with a rival in the place of one.
@@ -165,8 +182,15 @@ def those_that_lose(
     return {
         (name, rival.effects[-1])
         for (name, rival), other in zip(pairs, refit(pairs), strict=True)
-        if other is not None and loses(current, other, rest)
+        if other is not None and loses(current, other, rest, _extra(layout, name, rival.effects[-1]))
     }
+
+
+def _extra(layout: Layout, name: str, rival: str) -> int:
+    """Return how many parameters a rival has more than a name; zero where it is the plainer cause or has no more."""
+    if rival in effect_class(name).plainer:
+        return 0
+    return max(len(layout.columns[rival]) - len(layout.columns[name]), 0)
 
 
 def without_lost(
