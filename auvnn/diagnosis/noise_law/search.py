@@ -45,6 +45,7 @@ from auvnn.diagnosis.noise_law.under_law import NULL_STEPS
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.diagnosis.selection.rivals import Rivals, rivals_tried
 from auvnn.diagnosis.stages.state import State
+from auvnn.effects import effect_class
 
 Array = NDArray[np.float64]
 
@@ -176,7 +177,8 @@ class ForceSearch(NameAfterName):
     def _exchanged(self, path: Path, names: Sequence[str], rivals: Rivals) -> bool:
         """Go on with a rival that does better in the place of a name; return whether there was one.
 
-        Those that do as well are told together with the name, which stays.
+        Those that do as well are told together with the name, which stays, and so are those that do better by less than
+        the model is known to be wrong, unless they are the plainer cause.
         """
         while True:
             known = self._passed(path)
@@ -187,7 +189,8 @@ class ForceSearch(NameAfterName):
                 return False
             name, other = found
             better = other.evidence - path.current.evidence
-            if better > 0.0:
+            plainer = other.name in effect_class(name).plainer
+            if better > 0.0 and (plainer or better > self.rest(path)):
                 path.exchange(name, other, tied=better < ODDS)
                 return True
             path.tie(name, other)

@@ -398,14 +398,20 @@ def test_a_tie_is_decided_beside_all_names(monkeypatch, lost):
 
 
 @pytest.mark.parametrize(
-    ("evidence", "expected"),
+    ("evidence", "rest", "plainer", "expected"),
     [
-        (560.0, [["net_buoyancy"], ["thrust_asymmetry"], ["waves"]]),
-        (502.0, [["net_buoyancy", "payload"], ["thrust_asymmetry"], ["waves"]]),
-        (499.0, [["payload", "net_buoyancy"], ["thrust_asymmetry"]]),
+        (560.0, 0.0, (), [["net_buoyancy"], ["thrust_asymmetry"], ["waves"]]),
+        (502.0, 0.0, (), [["net_buoyancy", "payload"], ["thrust_asymmetry"], ["waves"]]),
+        (499.0, 0.0, (), [["payload", "net_buoyancy"], ["thrust_asymmetry"]]),
+        # It is better by 60: by more, or by less, than what another effect would still gain.
+        (560.0, 59.0, (), [["net_buoyancy"], ["thrust_asymmetry"], ["waves"]]),
+        (560.0, 61.0, (), [["payload", "net_buoyancy"], ["thrust_asymmetry"]]),
+        (560.0, 61.0, ("net_buoyancy",), [["net_buoyancy"], ["thrust_asymmetry"], ["waves"]]),
     ],
 )
-def test_a_rival_that_does_better_beside_all_names_takes_the_place(monkeypatch, evidence, expected):
+def test_a_rival_that_does_better_beside_all_names_takes_the_place(
+    monkeypatch, evidence, rest, plainer, expected
+):
     further = {
         (): [found(10.0, "payload"), found(-400.0, "net_buoyancy"), found(-900.0, "waves")],
         ("payload",): [found(500.0, "payload", "thrust_asymmetry")],
@@ -415,7 +421,10 @@ def test_a_rival_that_does_better_beside_all_names_takes_the_place(monkeypatch, 
     }
     asked, _ = scripted(monkeypatch, further)
     asked.usable.append("net_buoyancy")
-    asked._tested = lambda *_: SimpleNamespace(p_value=0.0, scores={})
+    asked._tested = lambda *_: SimpleNamespace(
+        p_value=0.0, scores={"waves": SimpleNamespace(evidence=rest, degrees=1)}
+    )
+    monkeypatch.setattr(module, "effect_class", lambda _: SimpleNamespace(plainer=plainer))
     monkeypatch.setattr(module, "those_that_lose", lambda *_: set())
     monkeypatch.setattr(
         module, "rivals_among", lambda known, null: {"payload": [h.explanation for h in known]}
@@ -435,7 +444,7 @@ def test_a_rival_that_does_better_beside_all_names_takes_the_place(monkeypatch, 
     first = (["payload"], ("payload", "thrust_asymmetry"), ["payload", "net_buoyancy", "waves"])
     assert given[0] == first and len(given) == 2
     # What has given its place, and what is tied, is not asked for again.
-    if evidence > 500.0:
+    if expected[0][0] == "net_buoyancy":
         assert given[1][0] == ["net_buoyancy", "thrust_asymmetry"] and "payload" not in given[1][2]
 
 
