@@ -21,7 +21,7 @@ WINDOWS, CELLS, KNOWN, ROWS, CELL = 3, 3, 2, 40, 0.5
 class Linear:
     """Three windows of one run, whose errors are linear in parameters, initial states and a force in cells."""
 
-    def __init__(self, follows, seed=0):
+    def __init__(self, follows, seed=0, gap=(0.0, 0.0)):
         rng = np.random.default_rng(seed)
         self.state = rng.normal(size=(WINDOWS, ROWS, 12))
         self.force = rng.normal(size=(WINDOWS, ROWS, 6 * CELLS))
@@ -30,7 +30,7 @@ class Linear:
         size = np.array([0.5] * 12 + [0.3] * (KNOWN + 6 * CELLS) + [1.0])
         self.ends = size * rng.normal(size=(WINDOWS, 12, 12 + KNOWN + 6 * CELLS + 1))
         self.offset, self.follows = rng.normal(size=(WINDOWS, 12)), np.array([False, *follows])
-        self.before = np.array([-1, 0, 1])
+        self.before, self.gap = np.array([-1, 0, 1]), np.array([0.0, *gap])
 
     def sums(self):
         """Return them as the diagnosis has them: the best initial states taken out, and what they were beside."""
@@ -47,8 +47,17 @@ class Linear:
         reach = np.array([[-np.inf], [np.inf]]) * np.ones(KNOWN)
         return ForceSums(
             statistics, KNOWN, CELLS, np.zeros(KNOWN), np.zeros(KNOWN), np.full(KNOWN, 1e-9), reach, np.ones(6),
-            (0.1, 10.0), CELLS * CELL, CELL, None, self.before, np.zeros(WINDOWS), states,
+            (0.1, 10.0), CELLS * CELL, CELL, None, self.before, self.gap, states,
         )  # fmt: skip
+
+    def correlation(self, time):
+        """Return the covariance of the process's means over all cells, those of different windows apart by the gaps."""
+        own = correlation(WINDOWS * CELLS, CELL, time)
+        begins = CELL * np.arange(WINDOWS * CELLS) + np.repeat(np.cumsum(self.gap), CELLS)
+        between = np.abs(begins[:, None] - begins) - CELL
+        # The integral of exp(-|t - s| / time) over two cells that do not overlap, by both lengths.
+        apart = np.exp(-between / time) * (1.0 - np.exp(-CELL / time)) ** 2 * (time / CELL) ** 2
+        return np.where(between > -0.5 * CELL, apart, own)
 
     def joint(self, law, theta):
         """Return minus twice the log likelihood by one large Gaussian: all cells of the chain, all initial states."""
@@ -58,7 +67,7 @@ class Linear:
         covariance[:12, :12] = np.diag(LOOSE**2)
         for i in law.axes:
             own = slice(12 + i * cells, 12 + (i + 1) * cells)
-            covariance[own, own] = law.rms[i] ** 2 * correlation(cells, CELL, law.time[i])
+            covariance[own, own] = law.rms[i] ** 2 * self.correlation(law.time[i])
         state, mean, rows, means = np.eye(12, size), np.zeros(12), [], []
         for b in range(WINDOWS):
             force = np.zeros((6 * CELLS, size))
@@ -93,6 +102,14 @@ def law_of(time):
 @pytest.mark.parametrize("time", [0.02, 0.7, 50.0])
 def test_windows_one_after_the_other_are_as_likely_as_all_together(follows, time):
     linear, theta, law = Linear(follows), np.array([0.3, -0.2]), law_of(time)
+    sums = Likelihood(linear.sums()).by_window(law)
+    value = float((sums.cost - 2 * sums.slope @ theta + ((sums.hessian @ theta) @ theta)).sum())
+    assert value == pytest.approx(linear.joint(law, theta), abs=1e-3)
+
+
+@pytest.mark.parametrize("time", [0.3, 2.0])
+def test_a_force_is_known_the_less_the_longer_ago_the_window_before_ended(time):
+    linear, theta, law = Linear((False, False), gap=(0.4, 1.1)), np.array([0.3, -0.2]), law_of(time)
     sums = Likelihood(linear.sums()).by_window(law)
     value = float((sums.cost - 2 * sums.slope @ theta + ((sums.hessian @ theta) @ theta)).sum())
     assert value == pytest.approx(linear.joint(law, theta), abs=1e-3)
