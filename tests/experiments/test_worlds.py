@@ -34,6 +34,7 @@ SAMPLES = {
     "rows-14.jsonl": 13,
     "rows-15.jsonl": 14,
     "rows-16.jsonl": 15,
+    "rows-17.jsonl": 16,
 }
 
 
