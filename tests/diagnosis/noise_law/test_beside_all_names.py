@@ -96,7 +96,10 @@ def test_a_rival_loses_by_more_than_the_model_is_known_to_be_wrong(
     [
         # A payload of twelve parameters that fits as well as a buoyancy of one, and better by chance.
         (21.0, 6.4, 11, True),
-        (21.0, -300.0, 11, True),
+        (21.0, -9.1, 11, True),
+        # It fits worse, by odds of a hundred: it does not contain the buoyancy, or its fit has not come so far.
+        (21.0, -9.3, 11, False),
+        (400.0, -300.0, 11, False),
         # Better than by chance: the 0.01 quantile of chi-squared with eleven degrees of freedom is 24.7.
         (21.0, 24.6, 11, True),
         (21.0, 24.8, 11, False),

@@ -144,8 +144,10 @@ def as_good_in_place(
 def loses(current: Hypothesis, rival: Hypothesis, rest: float, extra: int) -> bool:
     """Whether a rival explains less than the names that were found, by more than the model is known to be wrong.
 
-    A rival that contains what leads predicts as well, whatever the truth. Where it has more parameters and these gain no
-    more than chance, evidence decides: what it counts against the rival is that it could have explained much else.
+    A rival that contains what leads predicts as well, whatever the truth. Where it has more parameters, fits as well, and
+    gains no more than chance by them, evidence decides: what that counts against the rival is that it could have
+    explained much else. One that fits worse does not contain what leads, or its fit has not come so far: runs left out
+    decide.
 
     Args:
         current: with the names that were found.
@@ -157,7 +159,7 @@ def loses(current: Hypothesis, rival: Hypothesis, rest: float, extra: int) -> bo
     """
     if current.evidence - rival.evidence <= max(ODDS, rest):
         return False
-    if extra > 0 and current.misfit - rival.misfit < chi2.isf(ALPHA_EXTRA, extra):
+    if extra > 0 and -2.0 * ODDS < current.misfit - rival.misfit < chi2.isf(ALPHA_EXTRA, extra):
         return True
     return predicts_better(current, rival, SURE, ranks=False)
 
