@@ -25,7 +25,7 @@ from auvnn.estimation.priors import Priors, parameters_of, set_parameters
 from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.logs import Log
 from auvnn.metrics.derivative import Derivative
-from auvnn.metrics.one_step import RunComparison
+from auvnn.metrics.one_step import LogComparison
 from auvnn.metrics.windows import ACCELERATION, CHANNELS
 from auvnn.models import GreyBox
 
@@ -72,12 +72,11 @@ def fit_one_step(
     """
     model = model.rebuilt(model.copied_effects())
     names, fixed = tuple(names), sigma is not None
-    parts = [RunComparison(model, run, how) for run in log.runs]
+    runs = LogComparison.of(model, log.runs, how)
 
     def errors(hooks: Collection[str] = ALL_HOOKS) -> Array:
-        for part in parts:
-            part.update(hooks)
-        gap = np.concatenate([part.gap() for part in parts])
+        runs.update(hooks)
+        gap = runs.gap()
         return np.where(np.isfinite(gap), gap, 0.0)
 
     theta = parameters_of(model, names)
@@ -104,8 +103,7 @@ def fit_one_step(
             out[..., k] = (here - errors(effect.hooks())) / moved
             set_parameters(model, names, theta)
             if k + 1 == len(free) or free[k + 1][0] is not effect:
-                for part in parts:
-                    part.update(effect.hooks())
+                runs.update(effect.hooks())
         return out
 
     def penalty(at: Array) -> float:

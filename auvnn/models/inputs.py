@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import torch
 from torch import Tensor
 
 
@@ -33,6 +35,11 @@ class Inputs:
             None if self.altitude is None else self.altitude[..., part],
         )
 
+    @property
+    def given(self) -> tuple[bool, ...]:
+        """Which of fins, voltage and altitude there are."""
+        return tuple(x is not None for x in (self.fins, self.voltage, self.altitude))
+
     def each(self) -> list[Inputs]:
         """Return the rows one by one, without their time axis; views, so that a loop need not index."""
         count = self.command.shape[-2]
@@ -41,3 +48,22 @@ class Inputs:
         voltage = nothing if self.voltage is None else self.voltage.unbind(-1)
         altitude = nothing if self.altitude is None else self.altitude.unbind(-1)
         return [Inputs(*row) for row in zip(self.command.unbind(-2), fins, voltage, altitude, strict=True)]
+
+
+def joined(parts: Sequence[Inputs]) -> Inputs:
+    """Return the rows of stretches one after the other.
+
+    Args:
+        parts: stretches (T, size) of which the same is given.
+    """
+
+    def rows(tensors: Iterable[Tensor | None]) -> Tensor | None:
+        there = [t for t in tensors if t is not None]
+        return torch.cat(there) if there else None
+
+    return Inputs(
+        torch.cat([p.command for p in parts]),
+        rows(p.fins for p in parts),
+        rows(p.voltage for p in parts),
+        rows(p.altitude for p in parts),
+    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
@@ -10,13 +12,8 @@ from scipy.signal import freqz, savgol_coeffs, savgol_filter
 import tests.metrics.surge_and_roll as simple
 from auvnn.errors import ConfigError, InputError
 from auvnn.logs import Log, Run
-from auvnn.metrics.derivative import choose_derivative
-from auvnn.metrics.one_step import (
-    OneStepReplay,
-    integrated,
-    one_step,
-    scores,
-)
+from auvnn.metrics.derivative import choose_derivative, integrated
+from auvnn.metrics.one_step import LogComparison, OneStepReplay, RunComparison, one_step, replay, scores
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
 
@@ -247,3 +244,24 @@ def test_commands_that_do_not_drive_the_model_are_refused(moving, stepped):
     fewer = Run(0, run.t, run.quaternion, run.nu, thrusters=run.thrusters[:, :5])
     with pytest.raises(InputError, match="5 thruster columns, but small has 8 thrusters"):
         OneStepReplay(model, fewer).acceleration()
+
+
+@pytest.mark.parametrize("rows", [20_000, 70])
+def test_runs_asked_together_say_what_each_says_alone(rows, monkeypatch):
+    """Also where one of them has an altitude and the others do not, and where they do not fit in one batch."""
+    monkeypatch.setattr(replay, "ROWS", rows)
+    model = GreyBox(small_vehicle()).with_effects({"thruster_lag": {"time_constant": 0.3}})
+    log = make_log(model, runs=3, duration=3.0, rate=20.0)
+    runs, how = [r.cleaned for r in log.runs], choose_derivative(log)
+    runs[1] = dataclasses.replace(runs[1], altitude=np.linspace(3.0, 5.0, len(runs[1].t)))
+    together = LogComparison.of(model, runs, how)
+    alone = [RunComparison(model, run, how) for run in runs]
+    np.testing.assert_allclose(
+        together.predicted(), np.concatenate([a.predicted() for a in alone]), atol=1e-12
+    )
+    np.testing.assert_allclose(
+        together.gap(), np.concatenate([a.measured - a.predicted() for a in alone]), atol=1e-12
+    )
+    asked = [r.acceleration() for r in map(OneStepReplay, [model] * 3, runs)]
+    for a, b in zip(replay.accelerations([OneStepReplay(model, r) for r in runs]), asked, strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-12)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.stated_priors import FREE, Layout, lay_out, priors, scales
 from auvnn.diagnosis.one_step.slopes import AccelerationSlopes, extent_of_log
-from auvnn.diagnosis.one_step.weighted_fit import left_out, parts, solve, weights
+from auvnn.diagnosis.one_step.weighted_fit import Linear, left_out, parts, solve, weights
 from auvnn.effects import effect_class
 from auvnn.errors import InputError
 from auvnn.estimation.nuisance_elimination import carry_of
@@ -35,7 +35,8 @@ class RefittedEffect:
 
     Attributes:
         theta: parameters of everything else, then of the effect, (P,).
-        after: (N,) weighted squared error of each sample when its fifth is left out; NaN where there is none.
+        after: (N,) weighted squared error of each sample when its fifth is left out; NaN where there is none, or nobody
+            asked for it.
         values: the effect's parameters by name.
         fell: by how much the weighted squared error of what is fitted, and the departure from what was stated, fall.
     """
@@ -103,10 +104,14 @@ class OneStepRefit:
         self.square = self.heavy.T @ flat + np.diag(self.held.precision)
         self.right = self.heavy.T @ self.fit.gap[self.good].ravel() + self.held.precision * away
 
-    def alone(self, name: str) -> RefittedEffect | None:
+    def alone(self, name: str, *, judged: bool = True) -> RefittedEffect | None:
         """Fit an effect with the slopes of everything else as they were; None where the log says nothing of it.
 
         Of the values that the effect offers for its shape, the one is taken that promises most.
+
+        Args:
+            name: the effect.
+            judged: whether errors on fifths left out are worked out.
         """
         layout, names, held = self._with(name)
         world = AccelerationSlopes(layout.model, self.log, self.how)
@@ -137,11 +142,9 @@ class OneStepRefit:
             if rows.sum() < SAID * self.good.sum() or not np.abs(slopes[rows][..., own]).max() > 0.0:
                 break
             x, mean, precision = slopes[rows][..., free], (held.mean - theta)[free], held.precision[free]
-            weight = self.weight[rows]
+            linear = Linear(rows, left[rows], x, precision, mean)
             step = np.zeros(len(theta))
-            step[free] = solve(left[rows], x, precision, weight, mean)
-            after = np.full(len(gap), np.nan)
-            after[rows] = left_out(left[rows], x, precision, mean, weight, self.fifth[rows])
+            step[free] = solve(left[rows], x, precision, self.weight[rows], mean)
             now = self._cost(left, rows, theta, held)
             for half in range(HALVED):
                 trial = np.clip(theta + 0.5**half * step, low, high)
@@ -152,13 +155,17 @@ class OneStepRefit:
                     break
             else:
                 world.at([name], theta[own])
-                point = point or RefittedEffect(theta, after, _values(world.model, name, theta[own]))
+                point = point or (theta, 0.0, linear)
                 break
             theta, left, fell = trial, reached, fell + now - then
-            point = RefittedEffect(theta, after, _values(world.model, name, theta[own]), fell)
+            point = theta, fell, linear
             if now - then < SETTLED * then:
                 break
-        return point
+        if point is None:
+            return None
+        theta, fell, linear = point
+        after = linear.after(self.weight, self.fifth) if judged else np.full(len(gap), np.nan)
+        return RefittedEffect(theta, after, _values(world.model, name, theta[own]), fell)
 
     def _cost(self, left: Array, rows: NDArray[np.bool_], theta: Array, held: Priors) -> float:
         """Return the weighted squared error of some samples and the departure from what was stated."""

@@ -12,7 +12,7 @@ from auvnn.effects.hooks import Extent
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.logs import Log
 from auvnn.metrics.derivative import Derivative
-from auvnn.metrics.one_step import RunComparison
+from auvnn.metrics.one_step import LogComparison
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
@@ -34,7 +34,7 @@ class AccelerationSlopes:
     def __init__(self, model: GreyBox, log: Log, how: Derivative) -> None:
         """Read the log once."""
         self.model = model.rebuilt(model.copied_effects())
-        self.parts = [RunComparison(self.model, run.cleaned, how) for run in log.runs]
+        self.runs = LogComparison.of(self.model, (run.cleaned for run in log.runs), how)
 
     def gap(self, hooks: Collection[str] = ALL_HOOKS) -> Array:
         """Return measured minus predicted acceleration, (N, 6); NaN where there is none.
@@ -42,12 +42,8 @@ class AccelerationSlopes:
         Args:
             hooks: of the effects whose parameters have changed since the last call.
         """
-        self._update(hooks)
-        return np.concatenate([part.gap() for part in self.parts])
-
-    def _update(self, hooks: Collection[str]) -> None:
-        for part in self.parts:
-            part.update(hooks)
+        self.runs.update(hooks)
+        return self.runs.gap()
 
     def at(self, names: Sequence[str], theta: Array) -> Array:
         """Set parameters of effects, clipped to their bounds, and return the gap, (N, 6)."""
@@ -76,7 +72,7 @@ class AccelerationSlopes:
                     column = (here - self.gap(effect.hooks())) / step
                     set_parameters(self.model, [name], theta)
                 columns.append(column)
-            self._update(effect.hooks())
+            self.runs.update(effect.hooks())
         return np.stack(columns, axis=-1) if columns else np.zeros((*here.shape, 0))
 
 

@@ -6,6 +6,8 @@ Reference: Huber (1964), Annals of Mathematical Statistics 35(1), for the weight
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -90,6 +92,36 @@ def left_out(
             theta = _solved(square - own_square, right - own_right, precision, mean)
             out[h] = (weight[h] * (gap[h] - x[h] @ theta) ** 2).sum(1)
     return out
+
+
+@dataclass(frozen=True)
+class Linear:
+    """What a fit is linear about.
+
+    Attributes:
+        rows: samples that count, (N,).
+        gap: of these, measured minus predicted acceleration, (n, 6).
+        slopes: (n, 6, P).
+        precision: of the priors, (P,).
+        mean: of the priors, (P,).
+    """
+
+    rows: NDArray[np.bool_]
+    gap: Array
+    slopes: Array
+    precision: Array
+    mean: Array
+
+    def after(self, weight: Array, fifth: NDArray[np.int64]) -> Array:
+        """Return each sample's weighted squared error by the fit on the other fifths, (N,); NaN where it does not count.
+
+        Args:
+            weight: of each sample and degree of freedom, (N, 6).
+            fifth: number of the fifth to which a sample belongs, (N,).
+        """
+        out, rows = np.full(len(self.rows), np.nan), self.rows
+        out[rows] = left_out(self.gap, self.slopes, self.precision, self.mean, weight[rows], fifth[rows])
+        return out
 
 
 def parts(log: Log) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

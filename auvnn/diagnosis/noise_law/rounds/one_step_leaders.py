@@ -43,7 +43,7 @@ def fitted_one_step(asked: Setting) -> dict[str, Array]:
         log = thinned(asked.log)
         beside = OneStepRefit(asked.model, log, choose_derivative(log, None))
         for name in asked.usable:
-            found = beside.alone(name)
+            found = beside.alone(name, judged=False)
             if found is not None and found.fell > 0.0:
                 fell[name] = found.fell, np.array(list(found.values.values()))
     return {name: fell[name][1] for name in sorted(fell, key=lambda n: -fell[n][0])}
