@@ -33,6 +33,8 @@ SECOND = 1.0
 # Share of the force of a degree of freedom of which a further name must leave less, where it does not bring much of the
 # gain of all names: after a large effect every other one brings little of it.
 LEAVES = 0.1
+# Share of the force of a degree of freedom of which such a name takes away more where those before it do little.
+MOST = 0.5
 # A name stands out that gains so much in evidence, and so many times what every effect does that is not confused with it.
 AHEAD, TIMES = 100.0, 4.0
 # Share of the gain by which an effect that is known to be confused with the best may fall short of it.
@@ -189,6 +191,24 @@ def explains_an_axis(after: Hypothesis, before: Hypothesis) -> bool:
     return law is not None and bool((shares_left(after.estimate.law, law) < LEAVES).any())
 
 
+def brings_most(after: Hypothesis, before: Hypothesis, null: Hypothesis) -> bool:
+    """Whether an effect takes away most of the force of a degree of freedom, and more of it than all names before it.
+
+    What names get wrong leaves a force where they act, which a further name may take up. It is less than they explain.
+
+    Args:
+        after: hypothesis with the effect.
+        before: hypothesis with the names before it.
+        null: hypothesis without any name.
+    """
+    law, known = before.estimate.law, null.estimate.law
+    if law is None or known is None or not {*law.axes} <= {*known.axes}:
+        return False
+    left = shares_left(after.estimate.law, law)
+    earlier = shares_left(law, known)[[known.axes.index(i) for i in law.axes]]
+    return bool(((left < 1.0 - MOST) & (earlier * (1.0 - left) > 1.0 - earlier)).any())
+
+
 def stands_out(first: Hypothesis, found: Sequence[Hypothesis], before: Hypothesis) -> bool:
     """Whether a name gains far more than every other that the catalogue does not know to be confused with it.
 
@@ -223,7 +243,8 @@ def tied(layout: Layout, good: list[Hypothesis], before: Hypothesis) -> list[Hyp
 
     The law of the force is no more than near the truth, and what it gets wrong grows with what is explained: of two
     effects that the catalogue knows to be confused, one that explains nearly as much as the best is not refuted, nor is
-    one that is as likely: more parameters also take up what no effect explains.
+    one that is as likely: more parameters also take up what no effect explains. Where more are alike than a group may
+    hold, it is the one that explains the trace more plainly than all others, if there is one, and the best of these.
 
     Args:
         layout: for the number of an effect's parameters.
@@ -247,9 +268,12 @@ def tied(layout: Layout, good: list[Hypothesis], before: Hypothesis) -> list[Hyp
         elif confused(best.name, h.name) and (likely or worse < CLOSE * (before.misfit - best.misfit)):
             near.append(h)
     # Those that are only nearly as good never make a group too large to be given.
-    rest = [*alike, *near[: max(GROUP - 1 - len(alike), 0)]]
+    group = [best, *alike, *near[: max(GROUP - 1 - len(alike), 0)]]
+    plainest = [h for h in group if all(h is o or h.name in effect_class(o.name).plainer for o in group)]
+    if len(group) > GROUP and plainest:
+        return [*plainest, *[h for h in group if h not in plainest][: GROUP - 1]]
     plainer = effect_class(best.name).plainer
-    return sorted([best, *rest], key=lambda h: h.name not in plainer)
+    return sorted(group, key=lambda h: h.name not in plainer)
 
 
 def predicts_better(after: Hypothesis, before: Hypothesis, least: float, *, ranks: bool = True) -> bool:

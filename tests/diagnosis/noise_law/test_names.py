@@ -14,7 +14,7 @@ from auvnn.diagnosis.noise_law import under_law
 from auvnn.diagnosis.noise_law.hypothesis import explains_an_axis, predicts_better, shares_left, tied
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.rounds import names_given
-from auvnn.diagnosis.noise_law.rounds.free_running_cost import free_running_cost
+from auvnn.diagnosis.noise_law.rounds.free_running_cost import Cost, free_running_cost
 from auvnn.diagnosis.noise_law.rounds.leader_fits import Round
 from auvnn.diagnosis.noise_law.rounds.names_given import NamesGiven
 from auvnn.diagnosis.noise_law.search import ForceSearch
@@ -153,6 +153,29 @@ def test_the_nearly_as_good_do_not_make_a_group_too_large():
     ]
 
 
+THRUST: Any = SimpleNamespace(
+    columns={
+        n: range(1) for n in ("thruster_gain", "thrust_asymmetry", "thrust_inflow_loss", "voltage_droop")
+    }
+)
+
+
+def test_of_more_that_are_alike_than_a_group_holds_the_plainest_of_all_and_the_best_are_told():
+    good = [hypothesis(n, 5000.0 + 0.1 * k) for k, n in enumerate(THRUST.columns)]
+
+    def said(order):
+        return [h.name for h in tied(THRUST, [good[k] for k in order], hypothesis("", 10000.0))]
+
+    # A gain of the thrust is plainer than each of the others.
+    assert said([0, 1, 2, 3]) == ["thruster_gain", "thrust_asymmetry", "thrust_inflow_loss"]
+    good[0], good[3] = hypothesis("thruster_gain", 5000.3), hypothesis("voltage_droop", 5000.0)
+    assert said([3, 1, 2, 0]) == ["thruster_gain", "voltage_droop", "thrust_asymmetry"]
+    # Of the others none is: a group that is too large is returned whole, and none of it is given.
+    columns: Any = SimpleNamespace(columns={**THRUST.columns, "munk_moment": range(1)})
+    others = [*good[1:], hypothesis("munk_moment", 5000.2)]
+    assert len(tied(columns, others, hypothesis("", 10000.0))) == 4
+
+
 def given(**changes: Any) -> NamesGiven:
     """Return what decides which of the likely explanations cost enough."""
     at: dict[str, Any] = {"layout": None, "log": None, "scale": None, "tolerance": Tolerance(), **changes}
@@ -165,7 +188,13 @@ def paying(costs, monkeypatch, without=1e3, **changes):
     The first is ahead of the explanation without any by 450.
     """
     likely = [hypothesis(name, 100.0 + 20.0 * k) for k, name in enumerate(costs)]
-    monkeypatch.setattr(names_given, "cost_of_name", lambda _, h, *__: costs[h.name])
+
+    def cost_of(_, h, *__, **___):
+        """Return what is given: error and moves, then whether it is surely worse (yes), and in the median window."""
+        error, moves, *more = costs[h.name]
+        return Cost(error, *(more[1:] or [error]), moves, bool(more[0]) if more else True)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(names_given, "cost_of_name", cost_of)
     return [h.name for h in given(**changes).paying(likely, hypothesis("", without), 0.5)]
 
 
@@ -212,6 +241,12 @@ def test_a_further_name_brings_much_of_the_gain_or_takes_the_force_of_an_axis(rm
     at = Round(None, with_law((2.0, 2.0)), [], ["tether"])  # type: ignore[arg-type]
     found = with_law(rms, 50.0, "waves")
     assert [h.name for h in asked.good(at, 10, [found], 100.0)] == expected  # type: ignore[list-item]
+    # Or most of it where the names before it took less: here they took nothing of X, or all but a little.
+    for before, more in (((2.0, 2.0), ["waves"]), ((20.0, 2.0), expected)):
+        after = Round(None, at.current, [], ["tether"], null=with_law(before))  # type: ignore[arg-type]
+        assert [h.name for h in asked.good(after, 10, [found], 100.0)] == more  # type: ignore[list-item]
+        first = Round(None, at.current, [], [], null=with_law(before))  # type: ignore[arg-type]
+        assert [h.name for h in asked.good(first, 10, [found], 100.0)] == expected  # type: ignore[list-item]
     # As much evidence as was asked for is enough by itself.
     assert asked.good(at, 10, [found], 40.0) == [found]  # type: ignore[list-item]
 
@@ -223,6 +258,20 @@ def test_in_open_loop_free_running_must_not_get_worse(monkeypatch):
     assert paying({"waves": (-0.2, 0.01), "tether": (0.2, 0.2)}, monkeypatch) == []
     # Where predictions hardly move, half of a tenth being enough, neither stands against the other.
     assert paying({"waves": (-0.01, 0.03), "tether": (0.2, 0.2)}, monkeypatch) == ["tether"]
+
+
+def test_where_sensors_are_not_white_a_few_windows_do_not_decide_what_a_name_costs(monkeypatch):
+    """They may put windows on a wrong start: the median window says that a name costs enough, and chance is no word."""
+    costly, by_chance = (-0.2, 0.3, True, 0.06), (-0.2, 0.3, False)
+    for white, costs, expected in (
+        (False, {"waves": costly}, ["waves"]),
+        (True, {"waves": costly}, []),
+        (False, {"waves": (-0.2, 0.3, True, 0.04)}, []),
+        (False, {"waves": by_chance, "tether": (0.2, 0.2)}, ["tether"]),
+        (False, {"waves": (-0.2, 0.3, True), "tether": (0.2, 0.2)}, []),
+        (True, {"waves": by_chance, "tether": (0.2, 0.2)}, []),
+    ):
+        assert paying(costs, monkeypatch, white_noise=white) == expected
 
 
 def test_in_closed_loop_it_is_enough_that_predictions_move(monkeypatch):
@@ -245,7 +294,8 @@ def test_the_cost_is_that_of_errors_and_of_predictions_that_move():
     scale = scale_of(log)
 
     before, after = (model.with_effects({"net_buoyancy": {"force": force}}) for force in (0.0, 8.0))
-    cost, size = free_running_cost(after, before, log, scale)
+    found = free_running_cost(after, before, log, scale)
+    cost, size = found.error, found.moves
     predicted = []
     for force in (0.0, 8.0):
         rolled = roll(model.with_effects({"net_buoyancy": {"force": force}}), log, "5", scale)
@@ -263,7 +313,16 @@ def test_the_cost_is_that_of_errors_and_of_predictions_that_move():
     assert size == pytest.approx(np.sqrt(1.0 + away**2) - 1.0, rel=1e-6)
     # The force does not know of the commands here: both figures say much the same.
     assert size == pytest.approx(cost, rel=0.5)
-    assert free_running_cost(after, after, log, scale) == (0.0, 0.0)
+    assert free_running_cost(after, after, log, scale) == Cost(0.0, 0.0, 0.0, worse=False)
+    # In the median window: of each window's mean square in units of the velocities' variance.
+    squares = [
+        (((p - measured) ** 2 * mask).sum(1) / mask.sum(1) / scale.std**2)[:, scale.excited]
+        for p in predicted
+    ]
+    middle = [np.sqrt(np.median(s, axis=0)).mean() for s in squares]
+    assert found.typical == pytest.approx(middle[0] / middle[1] - 1.0, rel=1e-6) and found.least >= cost
+    # The other way round errors are larger in nearly all windows.
+    assert not found.worse and free_running_cost(before, after, log, scale).worse
 
 
 @pytest.mark.parametrize(

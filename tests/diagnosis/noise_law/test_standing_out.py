@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis.noise_law import withheld as module
-from auvnn.diagnosis.noise_law.hypothesis import explains_an_axis, stands_out
+from auvnn.diagnosis.noise_law.hypothesis import brings_most, explains_an_axis, stands_out
 from auvnn.diagnosis.noise_law.withheld import withheld
 from auvnn.metrics.force_law import ForceLaw
 
@@ -49,6 +49,27 @@ def test_next_to_nothing_is_left_where_a_tenth_of_the_square_is():
     # A degree of freedom that had none is not explained; all of it is where nothing is left.
     assert not explains_an_axis(before, before) and explains_an_axis(beside(), before)
     assert not explains_an_axis(before, beside())
+
+
+@pytest.mark.parametrize(
+    ("rms", "expected"),
+    [
+        # Of X, which the names before it took from 4 to 3 (16 to 9), it takes 9 to 1: more than they, and most of it.
+        ((1.0, 0.0, 1.0, 0.0, 1.0, 0.0), True),
+        # More than they, but less than half of what they left; or all that they left, and less than they took of Z.
+        ((2.2, 0.0, 1.0, 0.0, 1.0, 0.0), False),
+        ((3.0, 0.0, 0.0, 0.0, 1.0, 0.0), False),
+        # What they did nothing about: half of it is asked for.
+        ((3.0, 0.0, 1.0, 0.0, 0.7, 0.0), True),
+        ((3.0, 0.0, 1.0, 0.0, 0.72, 0.0), False),
+    ],
+)
+def test_a_further_name_may_take_most_of_the_force_of_an_axis_where_those_before_it_took_less(rms, expected):
+    null, before = beside(4.0, 0.0, 4.0, 0.0, 1.0, 0.0), beside(3.0, 0.0, 1.0, 0.0, 1.0, 0.0)
+    assert brings_most(beside(*rms), before, null) is expected
+    # Without a force nothing can be taken of one; nor can be said how much of one that was not there before.
+    assert not brings_most(beside(), beside(), null)
+    assert not brings_most(beside(), beside(1.0, 1.0, 0.0, 0.0, 0.0, 0.0), null)
 
 
 @pytest.mark.parametrize(

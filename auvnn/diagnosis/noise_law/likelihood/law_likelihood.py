@@ -30,7 +30,7 @@ from auvnn.metrics.force_law import ForceLaw
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 # Shares of the plausible force that are tried to begin with, and the correlation time, s.
-STARTS, FIRST_TIME = np.logspace(-3.0, 1.0, 9), 1.0
+STARTS, FIRST_TIME = np.logspace(-3.0, 1.0, 5), 1.0
 # Standard deviations of the law's parameters as they are likely to be, in logarithms: a proper, weak prior.
 VAGUE = 3.0
 # Steps of the search for the likeliest law, and what one must promise of minus twice the log likelihood.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +21,44 @@ from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
 HORIZON = "5"
+# Standard errors by which free running must be worse before that counts against a name.
+SURE = 2.0
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a name costs in free running over 5 s.
+
+    Attributes:
+        error: by what share the root-mean-square error is larger without the name than with it.
+        typical: by what share that of the median window is. Where outliers of the sensors put windows on a wrong start,
+            or the vehicle nearly loses its way, a few windows decide the error of all.
+        moves: what the error would be if what is missing were independent of the commands: sqrt(1 + d^2) - 1, with d the
+            change of the predictions over the error that is left. Under a controller the commands answer the force, so
+            that the error of free running is least at wrong values, and a right name may make it larger.
+        worse: whether errors are surely larger with the name, by the paired differences of the windows.
+    """
+
+    error: float
+    typical: float
+    moves: float
+    worse: bool
+
+    @property
+    def least(self) -> float:
+        """What the name costs at least in all windows, or in the median one."""
+        return max(self.error, self.typical)
 
 
 def cost_of_name(
-    layout: Layout, after: Hypothesis, before: Hypothesis, log: Log, scale: Scale
-) -> tuple[float, float]:
+    layout: Layout,
+    after: Hypothesis,
+    before: Hypothesis,
+    log: Log,
+    scale: Scale,
+    *,
+    others_stay: bool = False,
+) -> Cost:
     """Return what a name costs in free running, see `free_running_cost`, everything else refitted.
 
     Where the effect is a coefficient group that is uncertain anyway, the hypothesis without the name has taken up a part
@@ -37,12 +71,26 @@ def cost_of_name(
         before: hypothesis without it.
         log: on which both run freely.
         scale: of the errors, as `rollouts.scale_of` has it.
+        others_stay: whether what the name does with everything else as it is with it counts, where that is more: what is
+            uncertain anyway may take up most of it.
     """
     with_name = _whole(after)
-    if after.name not in before.explanation.names:
-        return free_running_cost(with_name, _whole(before), log, scale)
-    costs = [free_running_cost(with_name, model, log, scale) for model in _as_stated(layout, after)]
-    return min(costs, key=lambda cost: cost[0])
+    if after.name in before.explanation.names:
+        costs = [free_running_cost(with_name, model, log, scale) for model in _as_stated(layout, after)]
+        return min(costs, key=lambda cost: cost.error)
+    cost = free_running_cost(with_name, _whole(before), log, scale)
+    if not others_stay:
+        return cost
+    alone = free_running_cost(with_name, _without(after), log, scale)
+    return max(cost, alone, key=lambda cost: cost.error)
+
+
+def _without(found: Hypothesis) -> GreyBox:
+    """Return the model that a hypothesis says, its last effect aside."""
+    fitted = found.explanation.fitted
+    model = fitted.model.rebuilt(fitted.model.copied_effects())
+    set_parameters(model, [found.name], np.array([p.null for p in model.effect(found.name).parameters_of]))
+    return model.without_absent(found.explanation.effects[:-1])
 
 
 def _whole(found: Hypothesis) -> GreyBox:
@@ -70,13 +118,8 @@ def _as_stated(layout: Layout, after: Hypothesis) -> tuple[GreyBox, GreyBox]:
     return models[0], models[1]
 
 
-def free_running_cost(after: GreyBox, before: GreyBox, log: Log, scale: Scale) -> tuple[float, float]:
-    """Return what an effect costs in free running over 5 s: by the errors, and by how far predictions move.
-
-    The first is by what share the error is larger before than after. Under a controller the commands answer the force, so
-    that the error of free running is least at wrong values, and a right name may make it larger. The second is what the
-    first would be if the force were independent of the commands: sqrt(1 + d^2) - 1, with d the change of the predictions
-    over the error that is left.
+def free_running_cost(after: GreyBox, before: GreyBox, log: Log, scale: Scale) -> Cost:
+    """Return what an effect costs in free running over 5 s.
 
     Args:
         after: the model with the effect.
@@ -84,14 +127,41 @@ def free_running_cost(after: GreyBox, before: GreyBox, log: Log, scale: Scale) -
         log: on which both run freely.
         scale: of the errors, as `rollouts.scale_of` has it.
     """
-    first, last = (roll(model, log, HORIZON, scale) for model in (before, after))
+    # Machine code that repeats to the bit: the same explanation must cost the same each time.
+    first, last = (roll(model, log, HORIZON, scale, engine="firm") for model in (before, after))
     if first is None or last is None:
-        return float("inf"), float("inf")
-    errors = [r.total(scale) for r in (first, last)]
-    cost = errors[0] / errors[1] - 1.0 if np.isfinite(errors[1]) and errors[1] > 0.0 else -1.0
+        return Cost(float("inf"), float("inf"), float("inf"), False)
+    errors, typical = (
+        [of(r) for r in (first, last)] for of in (lambda r: r.total(scale), partial(_median, scale))
+    )
     change = replace(last, squared=_moved(first.predicted, last)).total(scale)
     away = change / errors[1] if errors[1] > 0.0 else float("inf")
-    return cost, float(np.sqrt(1.0 + away**2) - 1.0) if np.isfinite(away) else 0.0
+    moves = float(np.sqrt(1.0 + away**2) - 1.0) if np.isfinite(away) else 0.0
+    return Cost(
+        _share(*errors), _share(*typical), moves, _surely_less(*(_by_window(scale, r) for r in (first, last)))
+    )
+
+
+def _share(without: float, whole: float) -> float:
+    """Return by what share an error is larger than another one."""
+    return without / whole - 1.0 if np.isfinite(whole) and whole > 0.0 else -1.0
+
+
+def _by_window(scale: Scale, rolled: Rolled) -> Array:
+    """Return the mean square of each window's errors in the excited velocities, over their variance, (B, k)."""
+    square = rolled.squared / np.maximum(rolled.count, 1.0) / scale.std**2
+    return square[:, scale.excited & (rolled.count.sum(0) > 0)]
+
+
+def _median(scale: Scale, rolled: Rolled) -> float:
+    """Return the mean over velocities of the root of the median window's square."""
+    return float(np.sqrt(np.median(_by_window(scale, rolled), axis=0)).mean())
+
+
+def _surely_less(first: Array, last: Array) -> bool:
+    """Whether squares (B, k) are less than others by so many standard errors of the mean of their differences."""
+    gain = (first - last).sum(1)
+    return len(gain) > 1 and bool(gain.sum() < -SURE * np.sqrt(len(gain)) * gain.std(ddof=1))
 
 
 def _moved(before: Array, last: Rolled) -> Array:

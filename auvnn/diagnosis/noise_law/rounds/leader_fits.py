@@ -42,6 +42,7 @@ class Round:
         chosen: effects found before.
         begins: values from which effects are fitted, too: while nothing is chosen those fitted one step ahead, the one
             that explains most first (`one_step_leaders`); then those fitted when nothing was chosen.
+        null: the explanation without any name.
     """
 
     tested: Tested
@@ -49,6 +50,7 @@ class Round:
     base: list[str]
     chosen: list[str]
     begins: Mapping[str, Array] = field(default_factory=dict)
+    null: Hypothesis | None = None
 
 
 @dataclass(frozen=True)

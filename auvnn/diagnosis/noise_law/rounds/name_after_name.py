@@ -160,7 +160,7 @@ class NameAfterName(UnderLaw):
             return None
         share = 0.0 if self.looks_further else FURTHER_SHARE
         odds = max(ODDS, share * (current.evidence - null.evidence))
-        at = Round(tests, current, base, list(chosen), self._earlier if chosen else self._one_step)
+        at = Round(tests, current, base, list(chosen), self._earlier if chosen else self._one_step, null)
         good_of = partial(self.names.good, at, len(remaining))
         self._leaders = self._leaders or LeaderFits(self.layout, self.fits(), self.say, self.pool)
         found, good = self._leaders.fitted(at, fitted, odds, ALPHA_NAME, good_of)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.hypothesis import (
     Hypothesis,
+    brings_most,
     explains_an_axis,
     p_value_of,
     predicts_better,
@@ -64,7 +65,8 @@ class NamesGiven:
             odds: logarithm of the odds that a name needs.
         """
         likely = self.likely(at, among, found, odds)
-        return self.paying(likely, at.current, FURTHER_COST if at.chosen else FIRST_COST)
+        clear = [h.name for h in likely if _shows(h, at)]
+        return self.paying(likely, at.current, FURTHER_COST if at.chosen else FIRST_COST, clear)
 
     def likely(self, at: Round, among: int, found: Sequence[Hypothesis], odds: float) -> list[Hypothesis]:
         """Return those explanations that the data prefer by so much, whatever they cost, the most evident first.
@@ -82,7 +84,8 @@ class NamesGiven:
         likely = [
             h
             for h in found
-            if h.evidence > at.current.evidence + (ODDS if explains_an_axis(h, at.current) else odds)
+            if h.evidence
+            > at.current.evidence + (ODDS if _shows(h, at) or explains_an_axis(h, at.current) else odds)
             and self.sure(h, at, among) < level
         ]
         ranks = not (at.chosen and self.white_noise)
@@ -106,13 +109,16 @@ class NamesGiven:
         """
         return min(1.0, among * p_value_of(self.layout, found, at.current))
 
-    def paying(self, likely: Sequence[Hypothesis], current: Hypothesis, share: float) -> list[Hypothesis]:
+    def paying(
+        self, likely: Sequence[Hypothesis], current: Hypothesis, share: float, clear: Collection[str] = ()
+    ) -> list[Hypothesis]:
         """Return what costs so large a share of the tolerance in free running, and what goes with it.
 
         Args:
             likely: explanations, the most evident first.
             current: the explanation without any of the names.
             share: of the tolerance.
+            clear: names that take away most of a force: what they do with everything else as it is counts, too.
         """
         if self.tolerance.strict:
             return list(likely)
@@ -123,8 +129,16 @@ class NamesGiven:
                 costs.append(float("inf"))
                 worse.append(False)
                 continue
-            error, moves = cost_of_name(self.layout, h, current, self.log, self.scale)
-            costs.append(max(error, moves) if self.in_closed_loop else error)
+            cost = cost_of_name(self.layout, h, current, self.log, self.scale, others_stay=h.name in clear)
+            # Where the sensors are not what they should be, a few wrong starts may decide the error of all windows.
+            paid = cost.error if self.white_noise else cost.least
+            costs.append(max(paid, cost.moves) if self.in_closed_loop else paid)
             # What hardly moves predictions contradicts nothing, be its error a thousandth larger or smaller.
-            worse.append(costs[-1] <= 0.0 and max(-error, moves) > share * self.tolerance.cost)
+            matters = max(-cost.error, cost.moves) > share * self.tolerance.cost
+            worse.append(costs[-1] <= 0.0 and (self.white_noise or cost.worse) and matters)
         return paying(likely, costs, enough, worse)
+
+
+def _shows(found: Hypothesis, at: Round) -> bool:
+    """Whether a further name takes away most of the force of a degree of freedom, see `brings_most`."""
+    return at.null is not None and bool(at.chosen) and brings_most(found, at.current, at.null)
