@@ -246,14 +246,16 @@ def test_commands_that_do_not_drive_the_model_are_refused(moving, stepped):
         OneStepReplay(model, fewer).acceleration()
 
 
-@pytest.mark.parametrize("rows", [20_000, 70])
-def test_runs_asked_together_say_what_each_says_alone(rows, monkeypatch):
+@pytest.mark.parametrize(("rows", "batches"), [(20_000, [2, 1, 1]), (70, [1, 1, 1, 1])])
+def test_runs_asked_together_say_what_each_says_alone(rows, batches, monkeypatch):
     """Also where one of them has an altitude and the others do not, and where they do not fit in one batch."""
     monkeypatch.setattr(replay, "ROWS", rows)
     model = GreyBox(small_vehicle()).with_effects({"thruster_lag": {"time_constant": 0.3}})
-    log = make_log(model, runs=3, duration=3.0, rate=20.0)
+    log = make_log(model, runs=4, duration=3.0, rate=20.0)
     runs, how = [r.cleaned for r in log.runs], choose_derivative(log)
-    runs[1] = dataclasses.replace(runs[1], altitude=np.linspace(3.0, 5.0, len(runs[1].t)))
+    runs[2] = dataclasses.replace(runs[2], altitude=np.linspace(3.0, 5.0, len(runs[2].t)))
+    replays = [OneStepReplay(model, r) for r in runs]
+    assert [len(b) for b in replay._batches(replays)] == batches
     together = LogComparison.of(model, runs, how)
     alone = [RunComparison(model, run, how) for run in runs]
     np.testing.assert_allclose(
@@ -262,6 +264,5 @@ def test_runs_asked_together_say_what_each_says_alone(rows, monkeypatch):
     np.testing.assert_allclose(
         together.gap(), np.concatenate([a.measured - a.predicted() for a in alone]), atol=1e-12
     )
-    asked = [r.acceleration() for r in map(OneStepReplay, [model] * 3, runs)]
-    for a, b in zip(replay.accelerations([OneStepReplay(model, r) for r in runs]), asked, strict=True):
+    for a, b in zip(replay.accelerations(replays), [r.acceleration() for r in replays], strict=True):
         np.testing.assert_allclose(a, b, atol=1e-12)
