@@ -35,6 +35,7 @@ SAMPLES = {
     "rows-15.jsonl": 14,
     "rows-16.jsonl": 15,
     "rows-17.jsonl": 16,
+    "rows-18.jsonl": 17,
 }
 
 

@@ -40,7 +40,7 @@ def steps_of(row: Row) -> list[dict[str, Any]]:
     return [{"verdict": row["verdict"], "effects": list(row["missing"])}]
 
 
-def _standing(row: Row) -> list[dict[str, Any]]:
+def standing(row: Row) -> list[dict[str, Any]]:
     """Return the steps without the effects that a later step withdrew."""
     steps = steps_of(row)
     out = []
@@ -93,7 +93,7 @@ def effect_named(row: Row, effect: str) -> bool:
 
     What was withdrawn later does not count.
     """
-    for step in _standing(row):
+    for step in standing(row):
         if effect in step["effects"]:
             others = [n for n in step["effects"] if n != effect]
             return step["verdict"] == "named" or tied(row, effect, others)
@@ -133,7 +133,7 @@ def all_shown_named(row: Row) -> bool:
 
 def given_names(row: Row) -> list[str]:
     """Return the names that the answer gives; members of a declared group, and what it withdrew, are none."""
-    return [n for step in _standing(row) if step["verdict"] == "named" for n in step["effects"]]
+    return [n for step in standing(row) if step["verdict"] == "named" for n in step["effects"]]
 
 
 def false_names(row: Row) -> list[str]:

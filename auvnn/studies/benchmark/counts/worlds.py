@@ -49,6 +49,10 @@ def stripped(row: Row) -> dict[str, Any]:
     if row["verdict"] in ("named", "ambiguous"):
         first = next((s for s in steps if s["effects"] and s["verdict"] in ("named", "ambiguous")), None)
         out["verdict"] = "adequate" if first is None else first["verdict"]
+        if row["verdict"] == "ambiguous" and not out["missing"]:
+            # What is missing are the members of the first group. Where all of them are true, the next step comes first.
+            stays = [s["effects"] for s in counting.standing(out) if s["effects"]]
+            out["missing"] = list(stays[0]) if stays else []
     return out
 
 

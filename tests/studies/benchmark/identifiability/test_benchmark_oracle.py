@@ -143,6 +143,19 @@ def test_what_is_true_in_a_world_is_neither_a_hit_nor_an_error():
     assert not silent(row("nothing", ("partial", []), nearest=["c"], kind="nothing"))
 
 
+def test_after_a_group_that_is_true_in_a_world_the_next_step_is_the_first():
+    """An ambiguous answer says the members of its first group alone to be missing."""
+    group, true = ("ambiguous", ["t", "s"]), {"true": ["t", "s"], "missing": ["t", "s"]}
+    hit, miss = row("a", group, ("named", ["a"]), **true), row("a", group, ("named", ["c"]), **true)
+    assert right(hit) and alone(hit) and not wrong_first(hit)
+    assert wrong_first(miss) and not right(miss)
+    assert wrong_first(row("a", group, ("ambiguous", ["b", "c"]), **true))
+    # What a later step has withdrawn was not said; nor is there anything right or wrong where nothing comes after.
+    gone = row("a", group, ("named", ["c"]), ("named", ["a"]), ("withdrawn", ["c"]), **true)
+    assert right(gone) and not wrong_first(gone)
+    assert not wrong_first(row("a", group, END, **true)) and not right(row("a", group, END, **true))
+
+
 def test_visible_is_seen_and_costly():
     assert visible(row("a", END))
     assert not visible(row("a", END, cost=0.09)) and not visible(
