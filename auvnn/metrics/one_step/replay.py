@@ -126,7 +126,11 @@ def velocities(replays: Sequence[OneStepReplay]) -> list[Array]:
     """
     out = list[Array]()
     for few in _batches(replays):
-        rates = _under([r for r in few for _ in range(2)], [t for r in few for t in (r.mean, r.before)])
+        if len(few) == 1:
+            # One run may be long, and who listens to the model hears of each of its samples once in a call.
+            rates = [*_under(few, [few[0].mean]), *_under(few, [few[0].before])]
+        else:
+            rates = _under([r for r in few for _ in range(2)], [t for r in few for t in (r.mean, r.before)])
         out += [integrated(r.t, a, b) for r, a, b in zip(few, rates[::2], rates[1::2], strict=True)]
     return out
 
