@@ -13,6 +13,7 @@ from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.noise_law import under_law
 from auvnn.diagnosis.noise_law.hypothesis import explains_an_axis, predicts_better, shares_left, tied
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
+from auvnn.diagnosis.noise_law.rounds import free_running_cost as free_running_cost_module
 from auvnn.diagnosis.noise_law.rounds import names_given
 from auvnn.diagnosis.noise_law.rounds.free_running_cost import Cost, free_running_cost
 from auvnn.diagnosis.noise_law.rounds.leader_fits import Round
@@ -323,6 +324,19 @@ def test_the_cost_is_that_of_errors_and_of_predictions_that_move():
     assert found.typical == pytest.approx(middle[0] / middle[1] - 1.0, rel=1e-6) and found.least >= cost
     # The other way round errors are larger in nearly all windows.
     assert not found.worse and free_running_cost(before, after, log, scale).worse
+
+
+def test_a_window_without_a_sample_of_a_velocity_is_none_of_the_median():
+    """Two of three windows have no sample of v: the third is the median one."""
+    squared, count = (
+        np.array([[4.0, 0.0], [9.0, 0.0], [16.0, 50.0]]),
+        np.array([[1.0, 0.0], [1.0, 0.0], [1.0, 2.0]]),
+    )
+    rolled: Any = SimpleNamespace(squared=squared, count=count)
+    scale: Any = SimpleNamespace(std=np.ones(2), excited=np.ones(2, dtype=bool))
+    assert free_running_cost_module._median(scale, rolled) == pytest.approx((3.0 + 5.0) / 2.0)
+    by_window = free_running_cost_module._by_window(scale, rolled)
+    assert free_running_cost_module._surely_less(by_window, by_window + 5.0)
 
 
 @pytest.mark.parametrize(

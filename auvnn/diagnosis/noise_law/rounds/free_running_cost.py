@@ -148,19 +148,22 @@ def _share(without: float, whole: float) -> float:
 
 
 def _by_window(scale: Scale, rolled: Rolled) -> Array:
-    """Return the mean square of each window's errors in the excited velocities, over their variance, (B, k)."""
-    square = rolled.squared / np.maximum(rolled.count, 1.0) / scale.std**2
+    """Return the mean square of each window's errors in the excited velocities, over their variance, (B, k).
+
+    NaN where a window has no sample of a velocity.
+    """
+    square = rolled.squared / np.where(rolled.count > 0.0, rolled.count, np.nan) / scale.std**2
     return square[:, scale.excited & (rolled.count.sum(0) > 0)]
 
 
 def _median(scale: Scale, rolled: Rolled) -> float:
     """Return the mean over velocities of the root of the median window's square."""
-    return float(np.sqrt(np.median(_by_window(scale, rolled), axis=0)).mean())
+    return float(np.sqrt(np.nanmedian(_by_window(scale, rolled), axis=0)).mean())
 
 
 def _surely_less(first: Array, last: Array) -> bool:
     """Whether squares (B, k) are less than others by so many standard errors of the mean of their differences."""
-    gain = (first - last).sum(1)
+    gain = np.nansum(first - last, axis=1)
     return len(gain) > 1 and bool(gain.sum() < -SURE * np.sqrt(len(gain)) * gain.std(ddof=1))
 
 
