@@ -124,12 +124,13 @@ def ends_well(seed):
     return told
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2, 36, 52])
+# Some of each kind that take a few seconds each; those of a minute are among the three hundred.
+@pytest.mark.parametrize("seed", [1, 6, 9, 11, 12, 16, 36, 52])
 def test_a_diagnosis_of_anything_ends_well(seed):
     ends_well(seed)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", range(3, 303))
+@pytest.mark.parametrize("seed", range(303))
 def test_three_hundred_diagnoses_of_anything_end_well(seed):
     ends_well(seed)
