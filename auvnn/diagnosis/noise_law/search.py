@@ -36,6 +36,7 @@ from auvnn.diagnosis.noise_law.rounds.beside_all_names import (
     no_longer_needed,
     refitted,
     rivals_among,
+    that_leads_instead,
     those_that_lose,
     without_lost,
 )
@@ -128,8 +129,10 @@ class ForceSearch(NameAfterName):
             earlier = path.chosen[:-1]
         if path.groups:
             self.say("comparing effects that could not be told apart, beside all names")
-            rest = self.rest(path)
-            refit = self._refit(path.current, whole=True)
+            rest, refit = self.rest(path), self._refit(path.current, whole=True)
+            while found := that_leads_instead(self.layout, path.groups, path.current, refit, rest):
+                path.exchange(*found, tied=False)
+                rest, refit = self.rest(path), self._refit(path.current, whole=True)
             lost = those_that_lose(self.layout, path.groups, path.current, refit, rest)
             path.steps, path.groups = without_lost(path.steps, path.groups, lost)
 

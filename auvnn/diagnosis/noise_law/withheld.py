@@ -23,7 +23,7 @@ def withheld(asked: Setting, state: State, result: WithForce, *, chance: bool) -
 
     They are in spite of it where the first one explains far more than everything it is not confused with, and, where
     nothing that is measured predicts the force that is left, where the first one leaves next to nothing of it in a degree
-    of freedom: then what is left has another cause.
+    of freedom, or all of them leave little: then what is left has another cause.
 
     Args:
         asked: layout.
@@ -33,7 +33,20 @@ def withheld(asked: Setting, state: State, result: WithForce, *, chance: bool) -
     """
     if not refuted(asked, state, result.estimate.law, share_left(result), chance=chance):
         return False
-    return not (result.stands_out or (chance and result.explains))
+    return not (result.stands_out or (chance and (result.explains or explain_an_axis(result))))
+
+
+def explain_an_axis(result: WithForce) -> bool:
+    """Whether several names together have explained the force in a degree of freedom.
+
+    Each of two causes leaves what the other one explains, and next to nothing is left where both are named.
+
+    Args:
+        result: what was found.
+    """
+    if result.first_law is None or len(result.steps) < 2:
+        return False
+    return bool((shares_left(result.estimate.law, result.first_law) < EXPLAINED).any())
 
 
 def refuted(asked: Setting, state: State, law: ForceLaw | None, share: float, *, chance: bool) -> bool:

@@ -21,6 +21,7 @@ from auvnn.diagnosis.noise_law.rounds.beside_all_names import (
     no_longer_needed,
     refitted,
     rivals_among,
+    that_leads_instead,
     those_that_lose,
     without_lost,
 )
@@ -192,6 +193,41 @@ def test_each_rival_is_fitted_in_the_place_of_the_one_that_leads(monkeypatch):
     )
 
 
+def test_the_best_of_those_against_which_a_leader_loses_leads_instead(monkeypatch):
+    asked: list[Any] = []
+
+    def lose(better, worse, rest, extra):
+        asked.append((better.evidence, worse.evidence, rest, extra))
+        return better.evidence - worse.evidence > rest
+
+    monkeypatch.setattr(module, "loses", lose)
+    layout: Any = SimpleNamespace(
+        columns={"trapped_water": range(1), "added_mass": range(6), "payload": range(12), "waves": range(2)}
+    )
+    groups: Any = [
+        [explanation("added_mass"), explanation("trapped_water"), explanation("payload")],
+        [explanation("added_mass", "tether"), explanation("added_mass", "waves")],
+    ]
+    fits = {"trapped_water": 80.0, "payload": 62.0, "waves": -3.0}
+
+    def of(fits):
+        return one_by_one(
+            lambda name, rival: (
+                fit(fits[rival.effects[-1]], name, rival.effects[-1]) if rival.effects[-1] in fits else None
+            )
+        )
+
+    current: Any = worth(0.0)
+    name, other = that_leads_instead(layout, groups[:1], current, of(fits), 50.0)  # type: ignore[misc]
+    assert name == "added_mass" and other.evidence == 80.0
+    # The plainer cause, though of more parameters, loses by the fit; a payload of twelve contains no leader of six.
+    assert asked == [(80.0, 0.0, 50.0, 0), (62.0, 0.0, 50.0, 0)]
+    layout.columns["tether"] = range(5)
+    assert that_leads_instead(layout, groups, current, of({"waves": -3.0}), 50.0) is None
+    assert asked[2:] == [(-3.0, 0.0, 50.0, 3)]
+    assert that_leads_instead(layout, groups, current, of(fits), 81.0) is None
+
+
 @pytest.mark.parametrize("explained", [(8.0, NULL), None])
 def test_a_path_goes_on_without_a_name(monkeypatch, explained):
     first, second = explanation("payload"), explanation("payload", "waves")
@@ -332,6 +368,11 @@ def test_a_rival_takes_the_place_of_a_name_on_the_path(tied):
     assert path.groups[0][0].effects == ("tilted_vertical", "net_buoyancy") and path.groups[0][-1] is waves
     if tied:
         assert path.groups[0][1].effects == ("tilted_vertical", "tether")
+    # One of its group does not come twice.
+    step: Any = {"verdict": "ambiguous", "effects": ["tether", "waves"], "p_value": 1e-9}
+    grouped = Path(current, ["tether"], [step], [[explanation("tether"), waves]])
+    grouped.exchange("tether", fit(3.0, "waves"), tied=tied)
+    assert grouped.steps[0]["effects"] == (["waves", "tether"] if tied else ["waves"])
     # A name without a group is exchanged for one without.
     path.current = current
     path.exchange("tilted_vertical", fit(4.0, "net_buoyancy", "cg_offset"), tied=False)

@@ -245,6 +245,7 @@ def scripted(
     monkeypatch.setattr(module, "averaged", averaged)
     monkeypatch.setattr(module, "no_longer_needed", lambda *_: None)
     monkeypatch.setattr(module, "as_good_in_place", lambda *_: None)
+    monkeypatch.setattr(module, "that_leads_instead", lambda *_: None)
     monkeypatch.setattr(name_after_name, "tied", lambda _, good, before: good[:1])
     monkeypatch.setattr(module, "in_newtons", lambda law, _: law)
     monkeypatch.setattr(name_after_name, "parameters_of", lambda model, chosen: chosen)
@@ -395,6 +396,39 @@ def test_a_tie_is_decided_beside_all_names(monkeypatch, lost):
         ("named", ["payload"]) if lost else ("ambiguous", ["payload", "trapped_water"])
     )
     assert len(ended.groups) == (0 if lost else 1)
+
+
+def test_a_member_of_a_group_that_does_clearly_better_beside_all_names_leads_it(monkeypatch):
+    further = {
+        (): [found(10.0, "payload"), found(9.0, "trapped_water"), found(8.0, "net_buoyancy")],
+        ("payload",): [found(500.0, "payload", "waves")],
+        ("trapped_water",): [],
+        ("payload", "waves"): [],
+    }
+    asked, _ = scripted(monkeypatch, further)
+    monkeypatch.setattr(name_after_name, "tied", lambda _, good, before: good)
+    monkeypatch.setattr(name_after_name, "decided", lambda good, *_: good)
+    rests, given = iter([30.0, 20.0]), []
+    asked.rest = lambda path: next(rests)
+    better = found(560.0, "waves", "trapped_water")
+
+    def instead(layout: Any, groups: Any, current: Any, refit: Any, rest: float) -> Any:
+        given.append((current.explanation.effects, rest))
+        return ("payload", better) if len(given) == 1 else None
+
+    def lost(layout: Any, groups: Any, current: Any, refit: Any, rest: float) -> set[tuple[str, str]]:
+        given.append((current.explanation.effects, rest))
+        assert [[e.effects[-1] for e in g] for g in groups] == [["trapped_water", "net_buoyancy"]]
+        return set()
+
+    monkeypatch.setattr(module, "that_leads_instead", instead)
+    monkeypatch.setattr(module, "those_that_lose", lost)
+    ended = asked.run(found(-1000.0), [], 2)
+    # The name that led has lost; what could not be told from it is compared with the one that leads now.
+    assert [s["effects"] for s in ended.steps] == [["trapped_water", "net_buoyancy"], ["waves"]]
+    assert ended.last.effects == ("waves", "trapped_water")
+    before, after = ("payload", "waves"), ("waves", "trapped_water")
+    assert given == [(before, 30.0), (after, 20.0), (after, 20.0)]
 
 
 @pytest.mark.parametrize(

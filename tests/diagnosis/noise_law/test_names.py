@@ -128,6 +128,24 @@ def test_what_is_likelier_and_known_to_be_confused_comes_first_though_it_predict
     assert said("payload", "body_lift") == []
 
 
+def test_what_is_likelier_and_known_to_be_confused_comes_first_though_more_is_asked_of_it(monkeypatch):
+    """Odds of a hundred are enough where a name takes most of a force; what gains more than that needs no more either."""
+    monkeypatch.setattr(names_given, "predicts_better", lambda *_, **__: True)
+    monkeypatch.setattr(names_given, "p_value_of", lambda *_: 1e-12)
+    at = Round(None, with_law((2.0, 2.0)), [], ["cg_offset"])  # type: ignore[arg-type]
+
+    def said(*names):
+        # Of these the body lift alone takes most of a force.
+        found: Any = [
+            with_law((0.1, 0.1) if name == "body_lift" else (1.9, 1.9), 90.0 - k, name)
+            for k, name in enumerate(names)
+        ]
+        return [h.name for h in given().likely(at, 10, found, 200.0)]
+
+    assert said("tether", "munk_moment", "body_lift", "turning_forces") == ["munk_moment", "body_lift"]
+    assert said("munk_moment", "tether") == []
+
+
 def test_what_is_known_to_be_confused_and_explains_nearly_as_much_is_tied():
     best, other = hypothesis("added_mass", 5000.0), hypothesis("trapped_water", 5200.0)
     assert names_of([best, other]) == ["added_mass", "trapped_water"]
@@ -340,29 +358,40 @@ def test_a_window_without_a_sample_of_a_velocity_is_none_of_the_median():
 
 
 @pytest.mark.parametrize(
-    ("further", "predicted", "expected"),
+    ("further", "gained", "predicted", "expected"),
     [
-        ("constant_force", 0.3, True),
-        ("constant_force", 0.05, False),
-        ("constant_force", None, False),
+        ("constant_force", 40.0, 0.3, True),
+        ("constant_force", 40.0, 0.05, False),
+        ("constant_force", 40.0, None, False),
+        # Half as much as the two names before it, each, is more than what they get wrong.
+        ("constant_force", 49.0, 0.3, True),
+        ("constant_force", 51.0, 0.3, False),
         # Not known to be confused with what was named before it.
-        ("gyro_bias", 0.3, False),
+        ("gyro_bias", 40.0, 0.3, False),
     ],
 )
-def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_ends_the_search(
-    further, predicted, expected, monkeypatch
+def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_is_no_name(
+    further, gained, predicted, expected, monkeypatch
 ):
     told = None if predicted is None else InputPrediction("X", "u", 0.5, predicted)
-    asked = ForceSearch.__new__(ForceSearch)
+    asked: Any = ForceSearch.__new__(ForceSearch)
     asked.in_closed_loop = True
     monkeypatch.setattr(under_law, "predicted_by_inputs", lambda *_, **__: told)
     monkeypatch.setattr(asked, "say", lambda _: None, raising=False)
     monkeypatch.setattr(asked, "about", lambda _: None)
     monkeypatch.setattr(asked, "_sums", lambda _: None)
     found = SimpleNamespace(
-        estimate=SimpleNamespace(law=object()), weighed=None, name=further, explanation=None
+        estimate=SimpleNamespace(law=object()),
+        weighed=None,
+        name=further,
+        explanation=None,
+        evidence=700.0 + gained,
     )
-    assert asked._takes_up(found, ["thrust_asymmetry"]) is expected  # type: ignore[arg-type]
+    path: Any = SimpleNamespace(
+        chosen=["payload", "thrust_asymmetry"], current=SimpleNamespace(evidence=700.0)
+    )
+    null: Any = SimpleNamespace(evidence=500.0)
+    assert asked._takes_up(found, path, null) is expected
 
 
 def test_runs_left_out_are_predicted_better_in_the_mean_or_in_most_windows(monkeypatch):

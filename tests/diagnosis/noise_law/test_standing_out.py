@@ -10,7 +10,7 @@ import pytest
 
 from auvnn.diagnosis.noise_law import withheld as module
 from auvnn.diagnosis.noise_law.hypothesis import brings_most, explains_an_axis, stands_out
-from auvnn.diagnosis.noise_law.withheld import withheld
+from auvnn.diagnosis.noise_law.withheld import explain_an_axis, withheld
 from auvnn.metrics.force_law import ForceLaw
 
 
@@ -73,22 +73,48 @@ def test_a_further_name_may_take_most_of_the_force_of_an_axis_where_those_before
 
 
 @pytest.mark.parametrize(
-    ("refutes", "ahead", "explains", "chance", "expected"),
+    ("refutes", "ahead", "explains", "together", "chance", "expected"),
     [
-        (True, False, False, True, True),
-        (True, True, False, True, False),
-        (True, True, False, False, False),
-        (True, False, True, True, False),
+        (True, False, False, False, True, True),
+        (True, True, False, False, True, False),
+        (True, True, False, False, False, False),
+        (True, False, True, False, True, False),
         # What is measured predicts what is left: a degree of freedom that was explained is no answer to that.
-        (True, False, True, False, True),
-        (False, False, False, False, False),
+        (True, False, True, False, False, True),
+        # Nor is one that all names together explain.
+        (True, False, False, True, False, True),
+        (True, False, False, True, True, False),
+        (False, False, False, False, False, False),
     ],
 )
 def test_what_is_left_withholds_names_that_do_not_stand_out(
-    monkeypatch, refutes, ahead, explains, chance, expected
+    monkeypatch, refutes, ahead, explains, together, chance, expected
 ):
     monkeypatch.setattr(module, "refuted", lambda *_, **__: refutes)
     monkeypatch.setattr(module, "share_left", lambda _: 1.0)
+    monkeypatch.setattr(module, "explain_an_axis", lambda _: together)
     result: Any = SimpleNamespace(estimate=SimpleNamespace(law=None), stands_out=ahead, explains=explains)
     nothing: Any = None
     assert withheld(nothing, nothing, result, chance=chance) is expected
+
+
+@pytest.mark.parametrize(
+    ("names", "left", "expected"),
+    [
+        # 0.49 of 1.0 N m is 0.24 of its mean square; of the large force nothing was explained.
+        (2, (4.0, 0.0, 0.0, 0.0, 0.49, 0.0), True),
+        (2, (4.0, 0.0, 0.0, 0.0, 0.51, 0.0), False),
+        # One name has to leave next to nothing, see `explains_an_axis`.
+        (1, (4.0, 0.0, 0.0, 0.0, 0.49, 0.0), False),
+        (2, None, True),
+    ],
+)
+def test_several_names_may_explain_a_degree_of_freedom_together(names, left, expected):
+    first = beside(4.0, 0.0, 0.0, 0.0, 1.0, 0.0).estimate.law
+    law = None if left is None else beside(*left).estimate.law
+    result: Any = SimpleNamespace(
+        estimate=SimpleNamespace(law=law), first_law=first, steps=[{"effects": ["payload"]}] * names
+    )
+    assert explain_an_axis(result) is expected
+    result.first_law = None
+    assert not explain_an_axis(result)

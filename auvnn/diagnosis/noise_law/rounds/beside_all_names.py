@@ -188,6 +188,34 @@ def those_that_lose(
     }
 
 
+def that_leads_instead(
+    layout: Layout,
+    groups: Sequence[Sequence[FittedHypothesis]],
+    current: Hypothesis,
+    refit: Refit,
+    rest: float,
+) -> tuple[str, Hypothesis] | None:
+    """Return a name that leads a group and loses against a member of it, and the best such member in its place.
+
+    None where each name that leads does as well as all that could not be told from it. The plainer cause leads a group
+    whose members explain the trace alike; beside names that were found later it may be clearly worse.
+
+    Args:
+        layout: for the number of an effect's parameters.
+        groups: explanations that could not be told apart, the one that leads first.
+        current: with the names that were found.
+        refit: fits all names with a rival in the place of one.
+        rest: what the best further effect gains beside the names, in the logarithm of the odds.
+    """
+    pairs = [(lead.effects[-1], rival) for lead, *rivals in groups for rival in rivals]
+    found = [
+        (name, other)
+        for (name, rival), other in zip(pairs, refit(pairs), strict=True)
+        if other is not None and loses(other, current, rest, _extra(layout, rival.effects[-1], name))
+    ]
+    return max(found, key=lambda pair: pair[1].evidence, default=None)
+
+
 def _extra(layout: Layout, name: str, rival: str) -> int:
     """Return how many parameters a rival has more than a name; zero where it is the plainer cause or has no more."""
     if rival in effect_class(name).plainer:

@@ -34,6 +34,8 @@ from auvnn.metrics.windows import Windows
 Array = NDArray[np.float64]
 # Share of the gain of all names that a further one must bring.
 FURTHER_SHARE = 0.1
+# What takes up what an earlier name gets wrong explains less than such a share of what the names explain in the mean.
+LITTLE = 0.5
 
 
 class NameAfterName(UnderLaw):
@@ -104,7 +106,9 @@ class NameAfterName(UnderLaw):
                     min([result.at.tested.p_value, *result.sure.values()], default=1.0),
                 )
             good = result.good
-            if not good or (path.chosen and self._takes_up(good[0], path.chosen)):
+            while path.chosen and good and self._takes_up(good[0], path, null):
+                good = good[1:]
+            if not good:
                 path.not_named = result.found if path.chosen else []
                 break
             if not path.chosen and most > 1:
@@ -207,12 +211,20 @@ class NameAfterName(UnderLaw):
             self._tests[id(current)] = frozenset(remaining), known
         return replace(known, scores={n: s for n, s in known.scores.items() if n in remaining})
 
-    def _takes_up(self, further: Hypothesis, chosen: Sequence[str]) -> bool:
+    def _takes_up(self, further: Hypothesis, path: Path, null: Hypothesis) -> bool:
         """Whether a further effect only takes up what the shape of an earlier one gets wrong.
 
         Where thrust ahead and astern follow curves of another shape, a mean force is left beside the asymmetry that is
-        named: an effect that the catalogue knows to be confused with an earlier one, and beside which measured inputs
-        still predict the force, is no further cause.
+        named: an effect that the catalogue knows to be confused with an earlier one, that explains little beside it, and
+        beside which measured inputs still predict the force, is no further cause.
+
+        Args:
+            further: the explanation with it.
+            path: with the names before it.
+            null: the explanation without any.
         """
-        known = any(confused(further.name, name) for name in chosen)
-        return known and self.predicted(further) is not None
+        if not any(confused(further.name, name) for name in path.chosen):
+            return False
+        one_of_them = (path.current.evidence - null.evidence) / len(path.chosen)
+        little = further.evidence - path.current.evidence < LITTLE * one_of_them
+        return little and self.predicted(further) is not None

@@ -72,7 +72,7 @@ class NamesGiven:
         """Return those explanations that the data prefer by so much, whatever they cost, the most evident first.
 
         What is likelier than the first of them, and known to be confused with it, is compared with it, though it predicts
-        runs left out less surely.
+        runs left out less surely, or leaves more of a force for which fewer odds are asked.
 
         Args:
             at: the round.
@@ -81,15 +81,15 @@ class NamesGiven:
             odds: logarithm of the odds that a name needs.
         """
         level, least = (ALPHA_FURTHER, GAIN_FURTHER) if at.chosen else (ALPHA_NAME, GAIN)
-        likely = [
-            h
-            for h in found
-            if h.evidence
-            > at.current.evidence + (ODDS if _shows(h, at) or explains_an_axis(h, at.current) else odds)
-            and self.sure(h, at, among) < level
-        ]
+        now = at.current
+        likely = [h for h in found if h.evidence > now.evidence + ODDS and self.sure(h, at, among) < level]
         ranks = not (at.chosen and self.white_noise)
-        better = [k for k, h in enumerate(likely) if predicts_better(h, at.current, least, ranks=ranks)]
+        better = [
+            k
+            for k, h in enumerate(likely)
+            if (h.evidence > now.evidence + odds or _shows(h, at) or explains_an_axis(h, now))
+            and predicts_better(h, now, least, ranks=ranks)
+        ]
         if not better:
             return []
         first = better[0]

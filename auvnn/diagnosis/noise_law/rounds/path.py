@@ -77,7 +77,8 @@ class Path:
             tied: whether the log cannot tell the two apart.
         """
         before = replace(self.current.explanation, effects=_last(self.current, name))
-        members = next((g[1:] for g in self.groups if g[0].effects[-1] == name), [])
+        known = next((g[1:] for g in self.groups if g[0].effects[-1] == name), [])
+        members = [e for e in known if e.effects[-1] != other.name]
         self.groups = [g for g in self.groups if g[0].effects[-1] != name]
         # What could not be told from the name has not lost against the rival.
         group = [other.explanation, *([before] if tied else []), *members][:GROUP]
