@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.answers import answering
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.residuals.input_forces import InputForces
 from auvnn.effects import EFFECTS
@@ -233,6 +234,20 @@ def test_thrusters_at_neutral_say_nothing_about_thrusters_and_no_number_pretends
         assert all(p["std"] is None for p in candidates[name]["parameters"].values())
     assert candidates["net_buoyancy"]["parameters"]["force"]["std"] > 0
     assert any("says nothing about thruster_gain, thruster_lag" in w for w in found.warnings)
+
+
+def test_where_no_effect_shows_beside_a_gross_error_the_log_is_not_blamed(model, monkeypatch):
+    log = make_log(model, runs=2, duration=10.0, noise=1.0, command=np.zeros((101, 8)))
+    names = ["thruster_gain", "thruster_lag"]
+    said = diagnose(model, log, names).warnings
+    assert any("the log says nothing about" in w for w in said) and not any("free running" in w for w in said)
+    monkeypatch.setattr(answering, "noise_share", lambda _: 0.4)
+    said = diagnose(model, log, names).warnings
+    assert any("free running over 1.6 s is so far from the measurements" in w for w in said)
+    assert not any("the log says nothing about" in w for w in said)
+    # Where one of them shows, the others are of no use in this log.
+    said = diagnose(model, log, [*names, "net_buoyancy"]).warnings
+    assert any("the log says nothing about thruster_gain, thruster_lag" in w for w in said)
 
 
 def test_one_thruster_at_neutral_has_no_gain_while_the_others_have(model):

@@ -18,6 +18,7 @@ from auvnn.diagnosis.answers.moved_coefficients import moved
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.candidates import HORIZON, WARMUP
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.measured_start import GROSS, noise_share
 from auvnn.diagnosis.hypotheses.stated_priors import has_stated_uncertainty
 from auvnn.diagnosis.residuals.additive_force_test import additive_force_test
 from auvnn.diagnosis.residuals.attribution import Attribution, attribute_residual
@@ -183,7 +184,13 @@ def _warnings(asked: Setting, state: State) -> list[str]:
     log, found = asked.log, [*asked.model.vehicle.warnings, *asked.log.quality().reservations]
     if len(log.runs) < 2:
         found.append("the log holds one run: what is left out in turn are stretches of it")
-    if state.silent:
+    far = {*state.silent} >= {*asked.usable} and noise_share(state.first.fitted) < GROSS
+    if state.silent and far:
+        found.append(
+            f"free running over {_length(state):g} s is so far from the measurements that no effect of a plausible size "
+            "shows beside the error: look for gross errors with auvnn check and auvnn compare, or state a shorter window"
+        )
+    elif state.silent:
         them = "it" if len(state.silent) == 1 else "them"
         found.append(f"the log says nothing about {', '.join(state.silent)}: nothing in it depends on {them}")
     if not has_stated_uncertainty(asked.model):
