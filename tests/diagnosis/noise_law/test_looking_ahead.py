@@ -281,6 +281,31 @@ def test_the_search_begins_with_what_the_likeliest_pairs_have_in_common(monkeypa
     assert [s["effects"] for s in asked.run(found(-1000.0), [], 1).steps] == [["payload"]]
 
 
+def test_what_takes_up_what_an_earlier_name_gets_wrong_leaves_its_place_to_the_next(monkeypatch):
+    further = {
+        (): [found(10.0, "payload")],
+        ("payload",): [
+            found(500.0, "payload", "thrust_asymmetry"),
+            found(480.0, "payload", "constant_force"),
+            found(470.0, "payload", "trapped_water"),
+        ],
+        ("payload", "trapped_water"): [],
+    }
+    asked, _ = scripted(monkeypatch, further)
+    asked.usable.append("constant_force")
+    asked._takes_up = lambda h, *_: h.name == "thrust_asymmetry"
+    # A constant force is known to be confused with what was passed over, and takes up the same.
+    assert [s["effects"] for s in asked.run(found(-1000.0), [], 4).steps] == [["payload"], ["trapped_water"]]
+    # Where all of them do, the search ends, and they are averaged with what was named.
+    asked, _ = scripted(monkeypatch, further)
+    asked.usable.append("constant_force")
+    asked._takes_up = lambda *_: True
+    assert [s["effects"] for s in asked.run(found(-1000.0), [], 4).steps] == [["payload"]]
+    assert [effects[-1] for effects in asked.averaged_with[0]] == [
+        "thrust_asymmetry", "constant_force", "trapped_water",
+    ]  # fmt: skip
+
+
 def test_what_is_fitted_beside_the_names_and_not_named_is_averaged_with_them(monkeypatch):
     further = {
         (): [found(10.0, "payload")],

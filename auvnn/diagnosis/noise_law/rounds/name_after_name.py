@@ -107,7 +107,8 @@ class NameAfterName(UnderLaw):
                 )
             good = result.good
             while path.chosen and good and self._takes_up(good[0], path, null):
-                good = good[1:]
+                # What cannot be told from it takes up the same.
+                good = [h for h in good[1:] if not confused(h.name, good[0].name)]
             if not good:
                 path.not_named = result.found if path.chosen else []
                 break
