@@ -36,6 +36,7 @@ SAMPLES = {
     "rows-16.jsonl": 15,
     "rows-17.jsonl": 16,
     "rows-18.jsonl": 17,
+    "rows-19.jsonl": 18,
 }
 
 
