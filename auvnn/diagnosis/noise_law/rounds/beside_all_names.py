@@ -180,11 +180,10 @@ def those_that_lose(
         refit: fits all names with a rival in the place of one.
         rest: what the best further effect gains beside the names, in the logarithm of the odds.
     """
-    pairs = [(lead.effects[-1], rival) for lead, *rivals in groups for rival in rivals]
     return {
-        (name, rival.effects[-1])
-        for (name, rival), other in zip(pairs, refit(pairs), strict=True)
-        if other is not None and loses(current, other, rest, _extra(layout, name, rival.effects[-1]))
+        (name, rival)
+        for name, rival, other in _in_the_lead(groups, refit)
+        if loses(current, other, rest, _extra(layout, name, rival))
     }
 
 
@@ -207,13 +206,21 @@ def that_leads_instead(
         refit: fits all names with a rival in the place of one.
         rest: what the best further effect gains beside the names, in the logarithm of the odds.
     """
-    pairs = [(lead.effects[-1], rival) for lead, *rivals in groups for rival in rivals]
     found = [
         (name, other)
-        for (name, rival), other in zip(pairs, refit(pairs), strict=True)
-        if other is not None and loses(other, current, rest, _extra(layout, rival.effects[-1], name))
+        for name, rival, other in _in_the_lead(groups, refit)
+        if loses(other, current, rest, _extra(layout, rival, name))
     ]
     return max(found, key=lambda pair: pair[1].evidence, default=None)
+
+
+def _in_the_lead(
+    groups: Sequence[Sequence[FittedHypothesis]], refit: Refit
+) -> list[tuple[str, str, Hypothesis]]:
+    """Return each name that leads a group, each of its rivals, and all names with that one in its place, if it fits."""
+    pairs = [(lead.effects[-1], rival) for lead, *rivals in groups for rival in rivals]
+    refits = zip(pairs, refit(pairs), strict=True)
+    return [(name, rival.effects[-1], other) for (name, rival), other in refits if other is not None]
 
 
 def _extra(layout: Layout, name: str, rival: str) -> int:
