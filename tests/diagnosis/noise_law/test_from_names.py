@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from auvnn.diagnosis.noise_law import search as module
-from tests.diagnosis.noise_law.test_looking_ahead import Found, found, scripted
+from tests.diagnosis.noise_law.scripted import Found, found, scripted
 
 STEPS = [
     {"verdict": "named", "effects": ["payload"], "p_value": 0.01},
