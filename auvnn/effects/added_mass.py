@@ -18,6 +18,8 @@ class AddedMass(AxisFactors):
     reference = "Fossen (2011), chapter 6"
     confused_with = ("trapped_water", "thruster_lag", "actuation_delay", "thruster_gain", "fin_lag")
     manoeuvre = "chirp"
+    # One mass for all axes explains the same trace with one number where these are six.
+    plainer = ("trapped_water",)
     told_apart_by = (
         "swept sines: inertia grows with the square of the frequency, a lag does not depend on the amplitude"
     )

@@ -154,6 +154,18 @@ class Effect(nn.Module):
         return []
 
     @classmethod
+    def happens(cls, values: Mapping[str, float], extent: Extent) -> bool:
+        """Whether what the values say happens while something is recorded; by default it does.
+
+        For effects that begin at some time: what was there before changes nothing, and has other names.
+
+        Args:
+            values: of all parameters, by name.
+            extent: how far the log reaches in time and space.
+        """
+        return True
+
+    @classmethod
     def told(cls, values: dict[str, float]) -> dict[str, float]:
         """Return the values by which people would state the same effect; the ones given, by default.
 

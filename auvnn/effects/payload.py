@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import torch
@@ -19,7 +20,7 @@ TIMES = 8
 LATEST = 1e10
 """s: later than the stamps of any log, dates among them."""
 SURE = 1.0
-"""s: an onset that is off by less is found by the fit."""
+"""s: an onset that is off by less is found by the fit, and one that is nearer to an end of the log is not seen."""
 
 
 class Payload(Effect):
@@ -75,6 +76,11 @@ class Payload(Effect):
         return [
             {**shape, "time": t} for t in times if any(low <= t <= high for low, high in extent.recorded())
         ]
+
+    @classmethod
+    def happens(cls, values: Mapping[str, float], extent: Extent) -> bool:
+        """Whether the load is taken within what was recorded: one that is there all along is weight, water and drag."""
+        return any(low + SURE < values["time"] < high - SURE for low, high in extent.recorded())
 
     def settle(self, vehicle: Any, actuation: str) -> None:
         """Keep gravity and the duration of the grasp."""

@@ -29,9 +29,11 @@ class Tether(Effect):
     cause = "a cable pulls on the vehicle"
     symbol = "F_t"
     reference = "Driscoll, Lueck and Nahon (2000), Applied Ocean Research 22"
-    confused_with = ("ocean_current", "constant_force", "net_buoyancy")
+    # Far from its anchor the whole cable is dragged along, and hangs: that is drag and weight of the vehicle.
+    confused_with = ("ocean_current", "constant_force", "net_buoyancy", "quadratic_damping", "fin_drag")
     manoeuvre = "survey"
     told_apart_by = "the same legs at several distances and bearings from the anchor"
+    plainer = ("net_buoyancy", "constant_force", "quadratic_damping")
     channels = ("x", "y", "z")
 
     @classmethod

@@ -22,7 +22,6 @@ class TrappedWater(Effect):
     confused_with = ("added_mass", "thruster_lag")
     manoeuvre = "chirp"
     told_apart_by = "swept sines, and a static weighing"
-    plainer = ("added_mass",)
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from auvnn.effects import Extent, effect_class
 from auvnn.models import GreyBox
 from auvnn.physics.attitude import euler_to_quat
 from auvnn.testing import make_scene, plain_vehicle
@@ -85,3 +86,14 @@ def test_the_first_orientation_does_not_matter():
         eta = torch.cat([torch.zeros(3, dtype=torch.float64), euler_to_quat(euler)])
         rates.append(model(eta, nu, torch.zeros(6, dtype=torch.float64), time=WHEN))
     torch.testing.assert_close(rates[0], rates[1], rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("time", "seen"),
+    [(0.0, False), (0.9, False), (1.1, True), (30.0, True), (59.5, False), (75.0, False), (130.0, True)],
+)
+def test_a_load_is_taken_within_what_was_recorded(time, seen):
+    # Two dives, with a pause between them.
+    extent = Extent(0.0, 160.0, 60.0, (3.0, 8.0), ((0.0, 60.0), (0.0, 40.0), (100.0, 160.0)))
+    assert effect_class("payload").happens({**VALUES, "time": time}, extent) is seen
+    assert effect_class("net_buoyancy").happens({"force": 3.0}, extent)

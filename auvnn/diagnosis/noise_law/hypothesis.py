@@ -18,7 +18,7 @@ from auvnn.diagnosis.noise_law.likelihood.law_likelihood import STEPS, Likelihoo
 from auvnn.diagnosis.noise_law.likelihood.sums import ForceSums
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS, confused
-from auvnn.diagnosis.selection.predictive_density import gain_by_window
+from auvnn.diagnosis.selection.predictive_density import gain_by_window, surely_positive
 from auvnn.effects import effect_class
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.windows import Windows
@@ -291,7 +291,7 @@ def predicts_better(after: Hypothesis, before: Hypothesis, least: float, *, rank
     Reference: Wilcoxon (1945), Biometrics Bulletin 1(6), for the signed-rank test.
     """
     gain = gain_by_window(after.weighed, before.weighed)
-    if float(gain.sum()) > least * float(np.sqrt(len(gain)) * gain.std(ddof=1)):
+    if surely_positive(gain, least):
         return True
     if not ranks:
         return False

@@ -15,6 +15,7 @@ from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, log_evidence
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, scales, shapes
+from auvnn.diagnosis.hypotheses.within_record import within_record
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.model_comparison import ALPHA_NEEDED, ODDS, ModelComparison, confused
 from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
@@ -140,20 +141,20 @@ class Chooser(Pruning):
             group = sorted([best, *rivals], key=lambda e: e.effects[-1] not in plainer)
             # The first stands for all of them while more is asked for.
             final = self._settled(group[0], at, base)
-            if self._vanished(final):
+            if self._nowhere(final):
                 return self._among([e for e in tried if e is not group[0]], clear, at, base, current)
             return Choice("ambiguous", final, tried, [final, *group[1:]])
         final = self._settled(best, at, base)
-        if self._vanished(final):
+        if self._nowhere(final):
             return self._among([e for e in tried if e is not best], clear, at, base, current)
         return Choice("named", final, [final, *tried[1:]] if tried[0] is best else [final, *tried], [])
 
-    def _vanished(self, final: FittedHypothesis) -> bool:
-        """Return whether a fit that has settled has taken the last effect back to its null, where it does nothing."""
+    def _nowhere(self, final: FittedHypothesis) -> bool:
+        """Return whether a fit that has settled has taken the last effect to its null, or out of the log."""
         name = final.effects[-1]
         away = parameters_of(final.fitted.model, [name]) - self.layout.means[name]
-        live = ~shapes(self.layout, name)
-        return bool((np.abs(away[live]) < NOTHING * scales(self.layout, name)[live]).all())
+        small = shapes(self.layout, name) | (np.abs(away) < NOTHING * scales(self.layout, name))
+        return bool(small.all()) or not within_record(final, self.windows)
 
     @staticmethod
     def _promising(significant: list[Score], leading: list[Score]) -> list[Score]:

@@ -10,12 +10,33 @@ from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.priors import limits
 
 Array = NDArray[np.float64]
+# Quantile at which gains are cut.
+UPPER = 0.75
 
 
 def improves_predictive_density(after: FittedHypothesis, before: FittedHypothesis) -> bool:
     """Whether what was left out is predicted better by more than the gain's own uncertainty."""
     gain = gain_by_window(after, before)
     return float(gain.sum()) > float(np.sqrt(len(gain)) * gain.std(ddof=1))
+
+
+def surely_positive(gain: Array, least: float) -> bool:
+    """Whether the mean of gains is above zero by so many of its standard errors, as it is or with large gains cut.
+
+    They are cut at the upper quartile. Where a few windows gain very much their spread hides what all others gain. No
+    gain is smaller than the same gain cut from above, so where the mean of those that are cut is above zero, that of all
+    of them is; losses stay as they are.
+
+    Args:
+        gain: (B,) of windows that were left out.
+        least: standard errors.
+
+    Reference: Lugosi and Mendelson (2019), Foundations of Computational Mathematics 19, 1145-1190 (means of variables
+    with heavy tails).
+    """
+    cut = np.minimum(gain, max(float(np.quantile(gain, UPPER)), 0.0))
+    with np.errstate(invalid="ignore"):
+        return any(float(g.sum()) > least * float(np.sqrt(len(g)) * g.std(ddof=1)) for g in (gain, cut))
 
 
 def gain_by_window(after: FittedHypothesis, before: FittedHypothesis) -> Array:

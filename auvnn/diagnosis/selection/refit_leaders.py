@@ -9,6 +9,7 @@ import numpy as np
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, shapes
+from auvnn.diagnosis.hypotheses.within_record import within_record
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
@@ -59,6 +60,8 @@ def fitted_beside(
         found = next(fitted)
         if isinstance(found, str):
             failed[candidate.effect] = f"its fit failed: {found}"
+        elif not within_record(found, beside.windows):
+            failed[candidate.effect] = "its fit begins before the log does, or after its end"
         else:
             tried.append(found)
     return tried, failed

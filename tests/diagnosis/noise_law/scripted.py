@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
@@ -97,7 +98,7 @@ def scripted(
 
     asked: Any = ForceSearch.__new__(ForceSearch)
     asked.layout, asked.usable, asked.base, asked.looks_further, asked._earlier = (
-        None,
+        SimpleNamespace(columns=defaultdict(lambda: range(1))),
         ["payload", "thrust_asymmetry", "trapped_water", "waves"],
         [],
         False,

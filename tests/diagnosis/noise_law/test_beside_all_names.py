@@ -125,14 +125,14 @@ def test_a_plainer_cause_does_not_lose_by_its_parameters(monkeypatch):
         columns={
             "payload": range(12),
             "net_buoyancy": range(1),
-            "trapped_water": range(3),
-            "added_mass": range(6),
+            "tilted_vertical": range(2),
+            "cg_offset": range(3),
         }
     )
     groups = [
         [explanation("net_buoyancy"), explanation("payload")],
         [explanation("payload"), explanation("net_buoyancy")],
-        [explanation("trapped_water"), explanation("added_mass")],
+        [explanation("tilted_vertical"), explanation("cg_offset")],
     ]
     those_that_lose(layout, groups, worth(0.0), one_by_one(lambda name, rival: worth(0.0)), 1.0)  # type: ignore[arg-type]
     assert asked == [11, 0, 0]
@@ -202,13 +202,13 @@ def test_the_best_of_those_against_which_a_leader_loses_leads_instead(monkeypatc
 
     monkeypatch.setattr(module, "loses", lose)
     layout: Any = SimpleNamespace(
-        columns={"trapped_water": range(1), "added_mass": range(6), "payload": range(12), "waves": range(2)}
+        columns={"tilted_vertical": range(2), "cg_offset": range(3), "payload": range(12), "waves": range(2)}
     )
     groups: Any = [
-        [explanation("added_mass"), explanation("trapped_water"), explanation("payload")],
-        [explanation("added_mass", "tether"), explanation("added_mass", "waves")],
+        [explanation("cg_offset"), explanation("tilted_vertical"), explanation("payload")],
+        [explanation("cg_offset", "tether"), explanation("cg_offset", "waves")],
     ]
-    fits = {"trapped_water": 80.0, "payload": 62.0, "waves": -3.0}
+    fits = {"tilted_vertical": 80.0, "payload": 62.0, "waves": -3.0}
 
     def of(fits):
         return one_by_one(
@@ -219,8 +219,8 @@ def test_the_best_of_those_against_which_a_leader_loses_leads_instead(monkeypatc
 
     current: Any = worth(0.0)
     name, other = that_leads_instead(layout, groups[:1], current, of(fits), 50.0)  # type: ignore[misc]
-    assert name == "added_mass" and other.evidence == 80.0
-    # The plainer cause, though of more parameters, loses by the fit; a payload of twelve contains no leader of six.
+    assert name == "cg_offset" and other.evidence == 80.0
+    # The plainer cause, though of more parameters, loses by the fit; a payload of twelve contains no leader of three.
     assert asked == [(80.0, 0.0, 50.0, 0), (62.0, 0.0, 50.0, 0)]
     layout.columns["tether"] = range(5)
     assert that_leads_instead(layout, groups, current, of({"waves": -3.0}), 50.0) is None

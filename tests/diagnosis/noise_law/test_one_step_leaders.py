@@ -10,7 +10,7 @@ import pytest
 
 import auvnn
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.noise_law.rounds import name_after_name, one_step_leaders
+from auvnn.diagnosis.noise_law.rounds import leader_fits, name_after_name, one_step_leaders
 from auvnn.diagnosis.noise_law.rounds.leader_fits import LEADERS_ONE_STEP, LeaderFits, Round
 from auvnn.diagnosis.noise_law.rounds.name_after_name import NameAfterName
 from auvnn.diagnosis.noise_law.rounds.one_step_leaders import fitted_one_step, thinned
@@ -92,7 +92,8 @@ def test_effects_are_fitted_one_step_ahead_once(monkeypatch):
     assert not asked and search._one_step is search._one_step and asked == ["log"]
 
 
-def test_a_first_name_begins_where_it_was_fitted_one_step_ahead_too():
+def test_a_first_name_begins_where_it_was_fitted_one_step_ahead_too(monkeypatch):
+    monkeypatch.setattr(leader_fits, "within_record", lambda *_: True)
     name = "net_buoyancy"
     model = GreyBox(small_vehicle())
     layout = lay_out(model, ["waves", name])
@@ -100,9 +101,9 @@ def test_a_first_name_begins_where_it_was_fitted_one_step_ahead_too():
 
     def from_null(_: Any, begun: GreyBox, *__: Any) -> Any:
         seen.append(float(parameters_of(begun, [name])[0]))
-        return SimpleNamespace(evidence=-50.0)
+        return SimpleNamespace(evidence=-50.0, explanation=None)
 
-    fits: Any = SimpleNamespace(from_null=from_null)
+    fits: Any = SimpleNamespace(from_null=from_null, windows=None)
     looks = LeaderFits(layout, fits, lambda _: None)
     tested: Any = SimpleNamespace(scores={name: SimpleNamespace(estimate=np.zeros(1))}, at=layout)
     current: Any = SimpleNamespace(evidence=-100.0)

@@ -27,8 +27,9 @@ from tests.small_logs import small_vehicle
 NAME, ESTIMATE = "net_buoyancy", 6.0
 
 
-def begun_and_found(monkeypatch, ends, earlier=None, known=None):
+def begun_and_found(monkeypatch, ends, earlier=None, known=None, unseen=()):
     """Return where fits under the law began, and which of them stands, by the evidence in which they end."""
+    monkeypatch.setattr(leader_fits, "within_record", lambda explanation, _: explanation not in unseen)
     layout, seen, reached = lay_out(GreyBox(small_vehicle()), [NAME]), [], [-100.0]
 
     def from_null(layout, model, current, base, effects, least):
@@ -39,9 +40,11 @@ def begun_and_found(monkeypatch, ends, earlier=None, known=None):
         assert effects == ["waves", NAME]
         if (end := ends[len(seen) - 1]) is None:
             raise FitError("no")
-        return SimpleNamespace(evidence=end)
+        return SimpleNamespace(evidence=end, explanation=end)
 
-    fits: Any = SimpleNamespace(from_null=from_null, settled=lambda h: h, judge=lambda e, law: e)
+    fits: Any = SimpleNamespace(
+        windows=None, from_null=from_null, settled=lambda h: h, judge=lambda e, law: e
+    )
     looks = LeaderFits(layout, fits, lambda _: None)
     tested: Any = SimpleNamespace(scores={NAME: SimpleNamespace(estimate=np.array([ESTIMATE]))}, at=layout)
     current: Any = SimpleNamespace(estimate=SimpleNamespace(law="law"), evidence=-100.0)
@@ -65,6 +68,13 @@ def test_a_fit_begins_where_the_first_search_has_fitted_the_effect_too(monkeypat
     model = GreyBox(small_vehicle()).with_effects({NAME: {"force": 12.0}})
     known: Any = SimpleNamespace(fitted=SimpleNamespace(model=model))
     assert begun_and_found(monkeypatch, (-80.0, -60.0), known=known) == ([0.0, 12.0], -60.0)
+
+
+def test_what_begins_before_the_log_does_is_not_found(monkeypatch):
+    # The likelier end is a load that was there all along; the other one, if there is one, is picked up within the log.
+    earlier = {NAME: np.array([40.0])}
+    assert begun_and_found(monkeypatch, (-80.0, -60.0), earlier, unseen=[-60.0]) == ([0.0, 40.0], -80.0)
+    assert begun_and_found(monkeypatch, (-80.0,), unseen=[-80.0]) == ([0.0], None)
 
 
 def test_before_nothing_has_a_name_all_that_is_significant_is_fitted(monkeypatch):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, shapes
+from auvnn.diagnosis.hypotheses.within_record import within_record
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
 from auvnn.diagnosis.noise_law.rounds.leaders import rivals_of
@@ -232,7 +233,8 @@ class LeaderFits:
                 least = max([at.current.evidence, *(h.evidence for h in found)])
                 asked = [*at.chosen, name]
                 found.append(self.fits.from_null(self.layout, model, at.current, at.base, asked, least))
-        return max(found, key=lambda h: h.evidence, default=None)
+        seen = [h for h in found if within_record(h.explanation, self.fits.windows)]
+        return max(seen, key=lambda h: h.evidence, default=None)
 
 
 def _fitted(shared: tuple[LeaderFits, Round], task: tuple[str, FittedHypothesis | None]) -> Hypothesis | None:

@@ -18,7 +18,13 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     tied,
 )
 from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round, RoundResult
-from auvnn.diagnosis.noise_law.rounds.looking_ahead import Branch, decided, shared, worth_following
+from auvnn.diagnosis.noise_law.rounds.looking_ahead import (
+    RIVALS_SHARE,
+    Branch,
+    decided,
+    shared,
+    worth_following,
+)
 from auvnn.diagnosis.noise_law.rounds.names_given import ALPHA_NAME, FIRST_COST, NamesGiven
 from auvnn.diagnosis.noise_law.rounds.one_step_leaders import fitted_one_step
 from auvnn.diagnosis.noise_law.rounds.path import Path
@@ -27,6 +33,7 @@ from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.diagnosis.stages.state import Setting
+from auvnn.effects import effect_class
 from auvnn.estimation.priors import parameters_of
 from auvnn.metrics.rollouts import scale_of
 from auvnn.metrics.windows import Windows
@@ -114,7 +121,7 @@ class NameAfterName(UnderLaw):
                 break
             if not path.chosen and most > 1:
                 good = self._looking_ahead(null, good, fitted)
-            group = tied(self.layout, good, path.current)
+            group = self._with_simpler(tied(self.layout, good, path.current), good, path, null)
             if len(group) > GROUP:
                 break
             names = [h.name for h in group]
@@ -129,6 +136,39 @@ class NameAfterName(UnderLaw):
                 path.groups.append([current.explanation, *(h.explanation for h in group[1:])])
             path.chosen.append(group[0].name)
         return tried, whole
+
+    def _with_simpler(
+        self, group: list[Hypothesis], good: Sequence[Hypothesis], path: Path, null: Hypothesis
+    ) -> list[Hypothesis]:
+        """Return a group with what explains the trace by fewer parameters, short by less than is still unexplained.
+
+        What the best further effect gains, or promises, beside the best of the group is how far the model is known to be
+        wrong, and an effect of many parameters takes up some of that wherever it is.
+
+        Args:
+            group: the best and those that the log cannot tell from it.
+            good: all that may be named.
+            path: with the names before them.
+            null: the explanation without any name.
+        """
+        best, sizes = max(group, key=lambda h: h.evidence), self.layout.columns
+        least = RIVALS_SHARE * (best.evidence - path.current.evidence)
+        simpler = [
+            h
+            for h in good
+            if h.evidence - path.current.evidence >= least and confused(h.name, best.name)
+            if h not in group and len(sizes[h.name]) < len(sizes[best.name])
+        ]
+        if not simpler or len(group) >= GROUP:
+            return group
+        chosen, dropped = [*path.chosen, best.name], self._passed(path)
+        beside = Path(self._settled(best), chosen, dropped=dropped)
+        further = self._round(null, beside.current, chosen, dropped, ())
+        gains = [h.evidence - beside.current.evidence for h in further.found] if further else []
+        rest = max([self.rest(beside), *gains])
+        near = [h for h in simpler if best.evidence - h.evidence < rest]
+        group = [*group, *near[: GROUP - len(group)]]
+        return sorted(group, key=lambda h: h.name not in effect_class(best.name).plainer)
 
     def _passed(self, path: Path) -> list[str]:
         """Return the effects that are not asked for again."""
