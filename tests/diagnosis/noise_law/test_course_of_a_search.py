@@ -373,3 +373,18 @@ def test_what_has_fewer_parameters_loses_by_no_less_than_what_is_still_unexplain
     # Where nothing simpler could join nothing is asked.
     asked_at.clear()
     assert len(asked._with_simpler(good[:1] * 3, good, path, found(-1000.0))) == 3 and not asked_at
+
+
+def test_what_has_fewer_parameters_leads_the_step_that_it_is_told_in(monkeypatch):
+    further = {
+        (): [found(-100.0, "payload"), found(-140.0, "trapped_water")],
+        ("payload",): [found(-50.0, "payload", "waves")],
+        ("trapped_water",): [],
+    }
+    asked, _ = scripted(monkeypatch, further, 0)
+    asked.layout.columns["payload"] = range(12)
+    asked.rest = lambda _: 0.0
+    monkeypatch.setattr(module, "those_that_lose", lambda *_: set())
+    ended = asked.run(found(-1000.0), [], 4)
+    assert [s["effects"] for s in ended.steps] == [["trapped_water", "payload"]]
+    assert ended.last.effects == ("trapped_water",)

@@ -86,6 +86,9 @@ COLUMNS: Any = SimpleNamespace(
         "trapped_water": range(1),
         "net_buoyancy": range(1),
         "thruster_lag": range(8),
+        "tether": range(10),
+        "quadratic_damping": range(6),
+        "fin_drag": range(2),
     }
 )
 
@@ -154,6 +157,17 @@ def test_what_is_known_to_be_confused_and_explains_nearly_as_much_is_tied():
     assert names_of([best, hypothesis("trapped_water", 5600.0)]) == ["added_mass"]
     assert names_of([best, hypothesis("net_buoyancy", 5200.0)]) == ["added_mass"]
     assert names_of([best, hypothesis("net_buoyancy", 5000.5)]) == ["added_mass", "net_buoyancy"]
+
+
+def test_drag_is_plainer_than_a_cable_that_is_dragged_along():
+    best = hypothesis("tether", 5000.0)
+    assert names_of([best, hypothesis("fin_drag", 5200.0)]) == ["tether", "fin_drag"]
+    assert names_of([best, hypothesis("fin_drag", 5200.0), hypothesis("quadratic_damping", 5300.0)]) == [
+        "quadratic_damping",
+        "tether",
+        "fin_drag",
+    ]
+    assert names_of([best, hypothesis("net_buoyancy", 5200.0)]) == ["net_buoyancy", "tether"]
 
 
 def test_what_is_as_likely_and_known_to_be_confused_is_tied_however_much_more_parameters_fit():
@@ -409,6 +423,9 @@ def test_runs_left_out_are_predicted_better_in_the_mean_or_in_most_windows(monke
     assert better(few) and better(few, 2.0) and better(most) and better(most, 2.0)
     assert most.sum() < np.sqrt(len(most)) * most.std(ddof=1)
     assert better(few, ranks=False) and not better(most, ranks=False)
+    # A few that gain very much hide no more what the others gain.
+    large = np.concatenate([20.0 + 15.0 * random.normal(size=90), [90000.0, 5000.0, 3000.0]])
+    assert large.sum() < 3.0 * np.sqrt(len(large)) * large.std(ddof=1) and better(large, 3.0, ranks=False)
     # Of what explains nothing one in a thousand does by its ranks.
     worse = [better(random.normal(size=100) - 0.1, 3.0) for _ in range(200)]
     assert sum(worse) <= 2

@@ -190,6 +190,18 @@ def test_an_effect_that_its_fit_takes_back_to_its_null_is_not_named(model, monke
     assert "net_buoyancy" not in diagnose(model, log, NAMES, stochastic=False).missing
 
 
+def test_an_effect_that_its_fit_takes_out_of_the_log_is_not_named(model, monkeypatch):
+    seen: list[str] = []
+
+    def outside(found, windows):
+        seen.append(found.effects[-1])
+        return seen[-1] != "net_buoyancy"
+
+    monkeypatch.setattr("auvnn.diagnosis.selection.choose.within_record", outside)
+    found = diagnose(model, logged(model, LIGHT), NAMES, stochastic=False)
+    assert "net_buoyancy" in seen and "net_buoyancy" not in found.missing
+
+
 @pytest.mark.parametrize(
     ("fell", "fitted"),
     [
