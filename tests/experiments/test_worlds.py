@@ -37,6 +37,7 @@ SAMPLES = {
     "rows-17.jsonl": 16,
     "rows-18.jsonl": 17,
     "rows-19.jsonl": 18,
+    "rows-20.jsonl": 19,
 }
 
 
