@@ -26,10 +26,9 @@ from auvnn.metrics.windows import Windows
 Array = NDArray[np.float64]
 # Members of a group that the log cannot tell apart, at most.
 GROUP = 3
-# Level of the signed-rank test of the gains on what is left out: windows that follow one another gain alike.
-ALPHA_RANKS = 0.001
-# Forces are compared by their mean over so long, s.
-SECOND = 1.0
+# Level of the signed-rank test of gains on what is left out: windows that follow one another gain alike. Forces are
+# compared by their mean over so long, s.
+ALPHA_RANKS, SECOND = 0.001, 1.0
 # Share of the force of a degree of freedom of which a further name must leave less, where it does not bring much of the
 # gain of all names: after a large effect every other one brings little of it.
 LEAVES = 0.1
@@ -90,8 +89,9 @@ class WithForce:
         p_value: of there being nothing with a name.
         first_law: the law without any name.
         predicted: what measured inputs predict of the force that is left; None where that is little.
-        stands_out: whether the first name explains far more than everything that is not confused with it.
-        explains: whether the first name leaves next to nothing of the force in a degree of freedom.
+        stands_out: whether the first name explains far more than all that is not confused with it.
+        explains: whether it leaves next to nothing of the force in a degree of freedom.
+        worsens: whether all names together make free running worse.
     """
 
     steps: list[SearchStep]
@@ -105,6 +105,7 @@ class WithForce:
     predicted: InputPrediction | None = None
     stands_out: bool = False
     explains: bool = False
+    worsens: bool = False
 
 
 def under_its_law(explanation: FittedHypothesis) -> FittedHypothesis:

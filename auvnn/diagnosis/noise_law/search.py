@@ -152,6 +152,7 @@ class ForceSearch(NameAfterName):
             self.predicted(current),
             path.stands_out,
             path.explains,
+            bool(path.chosen) and self.names.worsen(current, null),
         )
 
     def _refit(self, current: Hypothesis, *, whole: bool = False) -> Refit:

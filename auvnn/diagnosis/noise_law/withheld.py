@@ -19,11 +19,12 @@ EXPLAINED = 0.25
 
 
 def withheld(asked: Setting, state: State, result: WithForce, *, chance: bool) -> bool:
-    """Whether names are not given because of what they leave.
+    """Whether names are not given because of what they leave, or because the model predicts worse with them.
 
-    They are in spite of it where the first one explains far more than everything it is not confused with, and, where
-    nothing that is measured predicts the force that is left, where the first one leaves next to nothing of it in a degree
-    of freedom, or all of them leave little: then what is left has another cause.
+    What they leave withholds none where the first one explains far more than everything it is not confused with, and,
+    where nothing that is measured predicts the force that is left, where the first one leaves next to nothing of it in a
+    degree of freedom, or all of them leave little: then what is left has another cause. Names that together make free
+    running worse are given where the first one explains so much more alone.
 
     Args:
         asked: layout.
@@ -31,6 +32,8 @@ def withheld(asked: Setting, state: State, result: WithForce, *, chance: bool) -
         result: what was found.
         chance: whether nothing that is measured predicts the force that is left.
     """
+    if result.worsens and not result.stands_out:
+        return True
     if not refuted(asked, state, result.estimate.law, share_left(result), chance=chance):
         return False
     return not (result.stands_out or (chance and (result.explains or explain_an_axis(result))))
@@ -132,7 +135,14 @@ def state_with(
     # What is left beside the names is stochastic, and reported as such; or it has no name, and is unknown.
     steps = [*named, end] if small or not (chance and named) else named
     before = [e for s in state.steps for e in s["effects"]]
+    notes = state.notes
+    if not named and result.worsens and tried:
+        notes = (
+            *notes,
+            f"{', '.join(dict.fromkeys(tried))}: not given, for with them free running is worse than without",
+        )
     return (over if named else state).but(
+        notes=notes,
         current=result.last if named else state.first,
         chosen=result.last.effects if named else (),
         groups=tuple(tuple(group) for group in result.groups) if named else (),

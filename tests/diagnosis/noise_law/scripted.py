@@ -109,6 +109,7 @@ def scripted(
         sure=lambda *_: 1e-9,
         likely=lambda at, among, given, odds: given,
         paying=lambda likely, *_: likely,
+        worsen=lambda *_: False,
     )
     asked._leaders, asked._one_step = SimpleNamespace(fitted=fitted, take=lambda *_: None), {}
     asked._tested = lambda *_: SimpleNamespace(p_value=0.0)

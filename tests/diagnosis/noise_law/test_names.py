@@ -115,6 +115,39 @@ def test_a_further_name_must_be_sure_in_the_mean_where_the_noise_is_white(monkey
     assert asked_for == [(names_given.GAIN, True), (further, False), (further, True)] and further == 3.0
 
 
+@pytest.mark.parametrize(
+    ("error", "typical", "expected"),
+    [
+        (-0.6, -0.13, True),
+        (-0.06, -0.06, True),
+        (-0.6, -0.04, False),
+        (-0.04, -0.6, False),
+        (0.2, 0.3, False),
+    ],
+)
+def test_names_worsen_free_running_where_they_do_in_all_windows_and_in_the_median_one(
+    monkeypatch, error, typical, expected
+):
+    ran: list[Any] = []
+
+    def cost(after, before, log, scale):
+        ran.append((after, before))
+        return Cost(error, typical, 0.0, False)
+
+    monkeypatch.setattr(names_given, "free_running_cost", cost)
+
+    def of(*effects: str) -> Any:
+        model = SimpleNamespace(without_absent=lambda names: ("lean", *names))
+        return SimpleNamespace(
+            explanation=SimpleNamespace(effects=effects, fitted=SimpleNamespace(model=model))
+        )
+
+    assert given(tolerance=Tolerance.of(None)).worsen(of("waves", "tether"), of()) is expected
+    assert ran == [(("lean", "waves", "tether"), ("lean",))]
+    # Where everything matters that is there, evidence alone counts.
+    assert not given(tolerance=Tolerance.of(0)).worsen(of("waves"), of()) and len(ran) == 1
+
+
 def test_what_is_likelier_and_known_to_be_confused_comes_first_though_it_predicts_less_surely(monkeypatch):
     sure = {"munk_moment", "tether"}
     monkeypatch.setattr(names_given, "predicts_better", lambda after, *_, **__: after.name in sure)

@@ -11,6 +11,7 @@ import pytest
 from auvnn.diagnosis.noise_law import withheld as module
 from auvnn.diagnosis.noise_law.hypothesis import brings_most, explains_an_axis, stands_out
 from auvnn.diagnosis.noise_law.withheld import explain_an_axis, withheld
+from auvnn.diagnosis.stages.state import State
 from auvnn.metrics.force_law import ForceLaw
 
 
@@ -93,9 +94,14 @@ def test_what_is_left_withholds_names_that_do_not_stand_out(
     monkeypatch.setattr(module, "refuted", lambda *_, **__: refutes)
     monkeypatch.setattr(module, "share_left", lambda _: 1.0)
     monkeypatch.setattr(module, "explain_an_axis", lambda _: together)
-    result: Any = SimpleNamespace(estimate=SimpleNamespace(law=None), stands_out=ahead, explains=explains)
+    result: Any = SimpleNamespace(
+        estimate=SimpleNamespace(law=None), stands_out=ahead, explains=explains, worsens=False
+    )
     nothing: Any = None
     assert withheld(nothing, nothing, result, chance=chance) is expected
+    # Names with which the model predicts worse are given where the first explains so much more than all others.
+    result.worsens = True
+    assert withheld(nothing, nothing, result, chance=chance) is not ahead
 
 
 @pytest.mark.parametrize(
@@ -118,3 +124,29 @@ def test_several_names_may_explain_a_degree_of_freedom_together(names, left, exp
     assert explain_an_axis(result) is expected
     result.first_law = None
     assert not explain_an_axis(result)
+
+
+@pytest.mark.parametrize(
+    ("worse", "ahead", "told"), [(True, False, True), (True, True, False), (False, False, False)]
+)
+def test_names_with_which_the_model_predicts_worse_are_nearest_and_a_note_says_why(
+    monkeypatch, worse, ahead, told
+):
+    monkeypatch.setattr(module, "refuted", lambda *_, **__: False)
+    monkeypatch.setattr(module, "negligible", lambda *_: False)
+    monkeypatch.setattr(module, "sized_by_law", lambda *_: {})
+    nothing: Any = None
+    first: Any = "without any name"
+    named: Any = SimpleNamespace(
+        steps=[{"verdict": "ambiguous", "effects": ["tether", "payload"], "p_value": 0.0}], groups=[], tried=[],
+        last=SimpleNamespace(effects=("tether",)), estimate=SimpleNamespace(law=None), first_law=None,
+        stands_out=ahead, explains=False, worsens=worse,
+    )  # fmt: skip
+    state = State(nothing, first, first)
+    ended = module.state_with(SimpleNamespace(layout=None), state, state, named, nothing, chance=True)  # type: ignore[arg-type]
+    if told:
+        assert ended.chosen == () and ended.nearest == ("tether", "payload") and ended.current == first
+        assert [s["verdict"] for s in ended.steps] == ["unknown"]
+        assert len(ended.notes) == 1 and "tether, payload" in ended.notes[0] and "worse" in ended.notes[0]
+    else:
+        assert ended.chosen == ("tether",) and not ended.notes

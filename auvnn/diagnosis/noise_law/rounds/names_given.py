@@ -14,7 +14,7 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     p_value_of,
     predicts_better,
 )
-from auvnn.diagnosis.noise_law.rounds.free_running_cost import cost_of_name, paying
+from auvnn.diagnosis.noise_law.rounds.free_running_cost import cost_of_name, free_running_cost, paying
 from auvnn.diagnosis.noise_law.rounds.leader_fits import Round
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.logs import Log
@@ -98,6 +98,21 @@ class NamesGiven:
             for k, h in enumerate(likely)
             if k in better or (k < first and confused(h.name, likely[first].name))
         ]
+
+    def worsen(self, named: Hypothesis, null: Hypothesis) -> bool:
+        """Return whether all names together make free running worse, in all windows and in the median one.
+
+        One right name may do so, under a controller above all, because others are missing still; all of them may not.
+
+        Args:
+            named: the explanation with all names.
+            null: the one without any.
+        """
+        if self.tolerance.strict:
+            return False
+        models = [h.explanation.fitted.model.without_absent(h.explanation.effects) for h in (named, null)]
+        cost = free_running_cost(models[0], models[1], self.log, self.scale)
+        return cost.least < -FIRST_COST * self.tolerance.cost
 
     def sure(self, found: Hypothesis, at: Round, among: int) -> float:
         """Return the p-value of an effect among so many that were asked for, by the likelihood ratio.
