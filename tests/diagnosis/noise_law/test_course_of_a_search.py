@@ -388,3 +388,10 @@ def test_what_has_fewer_parameters_leads_the_step_that_it_is_told_in(monkeypatch
     ended = asked.run(found(-1000.0), [], 4)
     assert [s["effects"] for s in ended.steps] == [["trapped_water", "payload"]]
     assert ended.last.effects == ("trapped_water",)
+
+
+@pytest.mark.parametrize(("found_first", "expected"), [([], False), ([found(10.0, "payload")], True)])
+def test_all_names_are_asked_whether_the_model_predicts_worse_with_them(monkeypatch, found_first, expected):
+    asked, _ = scripted(monkeypatch, {(): found_first, ("payload",): []})
+    asked.names.worsen = lambda named, null: (named.name, null.name) == ("payload", "")
+    assert asked.run(found(-1000.0), [], 4).worsens is expected
