@@ -87,11 +87,14 @@ def left(diagnosis: Diagnosis) -> list[str]:
     if acting and diagnosis.steps[-1]["verdict"] in ("unknown", "partial"):
         told = _listed([f"{_size(by_axis[a]['rms'], a)} in {MOTIONS[a]}" for a in acting[:NAMED]])
         cost = diagnosis.left.get("cost")
-        more = (
-            f"; the error of free running is {_change(cost)} compared with the noise floor"
-            if _known(cost)
-            else ""
-        )
+        more = ""
+        if _known(cost):
+            above = (
+                "is not above the noise floor"
+                if cost <= 0.0
+                else f"is {_change(cost)} compared with the noise floor"
+            )
+            more = f"; the error of free running {above}"
         return [f"What is left amounts to a force of {told} rms{more}."]
     return []
 
