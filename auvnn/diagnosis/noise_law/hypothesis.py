@@ -278,7 +278,7 @@ def tied(layout: Layout, good: list[Hypothesis], before: Hypothesis) -> list[Hyp
 
 
 def predicts_better(after: Hypothesis, before: Hypothesis, least: float, *, ranks: bool = True) -> bool:
-    """Whether runs left out are predicted better: in the mean by so many standard errors of the gain, or in most windows.
+    """Whether runs left out are predicted better: surely in the mean (`surely_positive`), or in most windows.
 
     An effect that shows in few windows has a mean gain and none in most of them. One that shows in most may have a mean
     that a few windows decide, in which the sensors or the linear motion are wrong whatever is named; its ranks are sure.

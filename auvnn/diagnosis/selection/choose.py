@@ -141,15 +141,15 @@ class Chooser(Pruning):
             group = sorted([best, *rivals], key=lambda e: e.effects[-1] not in plainer)
             # The first stands for all of them while more is asked for.
             final = self._settled(group[0], at, base)
-            if self._nowhere(final):
+            if self._has_no_effect(final):
                 return self._among([e for e in tried if e is not group[0]], clear, at, base, current)
             return Choice("ambiguous", final, tried, [final, *group[1:]])
         final = self._settled(best, at, base)
-        if self._nowhere(final):
+        if self._has_no_effect(final):
             return self._among([e for e in tried if e is not best], clear, at, base, current)
         return Choice("named", final, [final, *tried[1:]] if tried[0] is best else [final, *tried], [])
 
-    def _nowhere(self, final: FittedHypothesis) -> bool:
+    def _has_no_effect(self, final: FittedHypothesis) -> bool:
         """Return whether a fit that has settled has taken the last effect to its null, or out of the log."""
         name = final.effects[-1]
         away = parameters_of(final.fitted.model, [name]) - self.layout.means[name]

@@ -74,11 +74,11 @@ def cost_of_name(
         others_stay: whether what the name does with everything else as it is with it counts, where that is more: what is
             uncertain anyway may take up most of it.
     """
-    with_name = _whole(after)
+    with_name = model_of(after)
     if after.name in before.explanation.names:
         costs = [free_running_cost(with_name, model, log, scale) for model in _as_stated(layout, after)]
         return min(costs, key=lambda cost: cost.error)
-    cost = free_running_cost(with_name, _whole(before), log, scale)
+    cost = free_running_cost(with_name, model_of(before), log, scale)
     if not others_stay:
         return cost
     alone = free_running_cost(with_name, _without(after), log, scale)
@@ -93,8 +93,12 @@ def _without(found: Hypothesis) -> GreyBox:
     return model.without_absent(found.explanation.effects[:-1])
 
 
-def _whole(found: Hypothesis) -> GreyBox:
-    """Return the model that a hypothesis says."""
+def model_of(found: Hypothesis) -> GreyBox:
+    """Return the model that a hypothesis says.
+
+    Args:
+        found: the hypothesis.
+    """
     return found.explanation.fitted.model.without_absent(found.explanation.effects)
 
 

@@ -14,7 +14,12 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     p_value_of,
     predicts_better,
 )
-from auvnn.diagnosis.noise_law.rounds.free_running_cost import cost_of_name, free_running_cost, paying
+from auvnn.diagnosis.noise_law.rounds.free_running_cost import (
+    cost_of_name,
+    free_running_cost,
+    model_of,
+    paying,
+)
 from auvnn.diagnosis.noise_law.rounds.leader_fits import Round
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.logs import Log
@@ -110,8 +115,7 @@ class NamesGiven:
         """
         if self.tolerance.strict:
             return False
-        models = [h.explanation.fitted.model.without_absent(h.explanation.effects) for h in (named, null)]
-        cost = free_running_cost(models[0], models[1], self.log, self.scale)
+        cost = free_running_cost(model_of(named), model_of(null), self.log, self.scale)
         return cost.least < -FIRST_COST * self.tolerance.cost
 
     def sure(self, found: Hypothesis, at: Round, among: int) -> float:
