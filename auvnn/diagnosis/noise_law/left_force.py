@@ -48,13 +48,24 @@ def exceeds_actuators(asked: Setting, state: State, law: ForceLaw | None) -> boo
         state: windows over which the force was sought.
         law: root mean square, N and N m, and correlation time, s, of the force; None where none was found.
     """
+    return bool(beyond_actuators(asked, state, law).any())
+
+
+def beyond_actuators(asked: Setting, state: State, law: ForceLaw | None) -> NDArray[np.bool_]:
+    """Return in which degrees of freedom the stochastic force is so large beside the actuators', (6,).
+
+    Args:
+        asked: layout.
+        state: windows over which the force was sought.
+        law: root mean square, N and N m, and correlation time, s, of the force; None where none was found.
+    """
     if law is None:
-        return False
+        return np.zeros(6, dtype=bool)
     mean = law.mean_over(SECOND)
     drive = actuators_of(asked.layout.model, state.windows)
     # Fins and a vehicle's own balance hold what thrusters do not: the largest of forces, and of moments, is the measure.
     most = np.repeat([drive[:3].max(), drive[3:].max()], 3)
-    return bool((mean[most > 0.0] > LARGEST * most[most > 0.0]).any())
+    return (most > 0.0) & (mean > LARGEST * most)
 
 
 def negligible(asked: Setting, state: State, law: ForceLaw | None, uncertain: UncertainWrench) -> bool:

@@ -8,7 +8,12 @@ from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench
 from auvnn.diagnosis.noise_law.hypothesis import WithForce, shares_left
-from auvnn.diagnosis.noise_law.left_force import exceeds_actuators, negligible, sized_by_law
+from auvnn.diagnosis.noise_law.left_force import (
+    beyond_actuators,
+    exceeds_actuators,
+    negligible,
+    sized_by_law,
+)
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.metrics.force_law import ForceLaw
 
@@ -23,8 +28,9 @@ def withheld(asked: Setting, state: State, result: WithForce, *, chance: bool) -
 
     What they leave withholds none where the first one explains far more than everything it is not confused with, and,
     where nothing that is measured predicts the force that is left, where the first one leaves next to nothing of it in a
-    degree of freedom, or all of them leave little: then what is left has another cause. Names that together make free
-    running worse are given where the first one explains so much more alone.
+    degree of freedom, or all of them leave little, or no more than a disturbance of what was too large for one: then what
+    is left has another cause. Names that together make free running worse are given where the first one explains so much
+    more alone.
 
     Args:
         asked: layout.
@@ -36,7 +42,8 @@ def withheld(asked: Setting, state: State, result: WithForce, *, chance: bool) -
         return True
     if not refuted(asked, state, result.estimate.law, share_left(result), chance=chance):
         return False
-    return not (result.stands_out or (chance and (result.explains or explain_an_axis(result))))
+    explain = result.explains or explain_an_axis(result) or leave_a_disturbance(asked, state, result)
+    return not (result.stands_out or (chance and explain))
 
 
 def explain_an_axis(result: WithForce) -> bool:
@@ -50,6 +57,25 @@ def explain_an_axis(result: WithForce) -> bool:
     if result.first_law is None or len(result.steps) < 2:
         return False
     return bool((shares_left(result.estimate.law, result.first_law) < EXPLAINED).any())
+
+
+def leave_a_disturbance(asked: Setting, state: State, result: WithForce) -> bool:
+    """Whether names leave little of a force that was too large for a disturbance, and what is left is not, in one axis.
+
+    A centre of gravity that is missing turns a vehicle over, whatever a tank does to its heave.
+
+    Args:
+        asked: layout.
+        state: windows over which the force was sought.
+        result: what was found.
+    """
+    before, after = result.first_law, result.estimate.law
+    if before is None:
+        return False
+    left = np.ones(6)
+    left[before.axes] = shares_left(after, before)
+    eased = beyond_actuators(asked, state, before) & ~beyond_actuators(asked, state, after)
+    return bool((eased & (left < EXPLAINED)).any())
 
 
 def refuted(asked: Setting, state: State, law: ForceLaw | None, share: float, *, chance: bool) -> bool:

@@ -97,13 +97,13 @@ def scripted(
         return more, more[:good] if at.chosen else more
 
     asked: Any = ForceSearch.__new__(ForceSearch)
-    asked.layout, asked.usable, asked.base, asked.looks_further, asked._earlier = (
+    asked.layout, asked.usable, asked.base, asked.looks_further = (
         SimpleNamespace(columns=defaultdict(lambda: range(1))),
         ["payload", "thrust_asymmetry", "trapped_water", "waves"],
         [],
         False,
-        {},
     )
+    asked._earlier, asked._alone = {}, {}
     asked.names = SimpleNamespace(
         good=print,
         sure=lambda *_: 1e-9,

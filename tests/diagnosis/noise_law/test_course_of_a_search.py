@@ -39,6 +39,9 @@ def test_the_search_begins_with_what_the_likeliest_pairs_have_in_common(monkeypa
     first, second = ["payload"], ["thrust_asymmetry"]
     assert [at.chosen for at in rounds] == [[], first, second, second, [*second, "trapped_water"]]
     assert rounds[0].begins == {} and [*rounds[-1].begins] == ["payload", "thrust_asymmetry", "waves"]
+    # So is told what it brought then.
+    gained = {"payload": 1010.0, "thrust_asymmetry": 1008.0, "waves": 100.0}
+    assert rounds[0].alone == {} and rounds[1].alone == rounds[-1].alone == gained
     # Of one name alone no pair is asked for.
     asked, rounds = scripted(monkeypatch, further)
     assert [s["effects"] for s in asked.run(found(-1000.0), [], 1).steps] == [["payload"]]

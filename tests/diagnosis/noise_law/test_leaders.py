@@ -11,6 +11,7 @@ import pytest
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round
 from auvnn.diagnosis.noise_law.rounds.leaders import fitted_alone, rivals_of, sensing_alone
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
@@ -71,3 +72,28 @@ def test_what_is_known_to_be_confused_with_the_leader_is_fitted_too():
     assert rivals_of(found, scores, 1e-5, among_all=False) == ["ocean_current"]
     assert rivals_of(found, scores, 2e-5, among_all=False) == ["ocean_current", "biofouling"]
     assert rivals_of([], scores, 0.01) == []
+
+
+@pytest.mark.parametrize(
+    ("odds", "expected"), [(100.0, ["payload", "thruster_gain"]), (700.0, ["payload"]), (2000.0, [])]
+)
+def test_what_led_alone_is_fitted_beside_a_name_whatever_its_test_promises(monkeypatch, odds, expected):
+    """Beside a sensor's scale the slope at the null of a large overshoot said nothing of what it brings."""
+    names = ["tether", "ocean_current", "payload", "thruster_gain", "thruster_lag", "waves"]
+    scores = {
+        n: SimpleNamespace(degrees=int(n != "waves"), evidence=-9.0, gain=0.0, p_value=1.0) for n in names
+    }
+    alone = {
+        "ocean_current": 1500.0,
+        "waves": 1200.0,
+        "payload": 900.0,
+        "thruster_gain": 500.0,
+        "thruster_lag": 300.0,
+    }
+    asked: list[str] = []
+    monkeypatch.setattr(LeaderFits, "_one", lambda self, name, at, known: asked.append(name))
+    looks = LeaderFits(None, None, lambda _: None)  # type: ignore[arg-type]
+    # The catalogue knows that a tether and a current are confused; of waves the log says nothing.
+    at: Any = Round(SimpleNamespace(scores=scores), None, [], ["tether"], {}, None, alone)  # type: ignore[arg-type]
+    looks.leading(at, [], odds, 0.01)
+    assert asked == expected

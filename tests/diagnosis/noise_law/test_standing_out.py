@@ -8,11 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.noise_law import withheld as module
 from auvnn.diagnosis.noise_law.hypothesis import brings_most, explains_an_axis, stands_out
-from auvnn.diagnosis.noise_law.withheld import explain_an_axis, withheld
+from auvnn.diagnosis.noise_law.withheld import explain_an_axis, leave_a_disturbance, withheld
+from auvnn.diagnosis.residuals.forces import actuators_of
 from auvnn.diagnosis.stages.state import State
 from auvnn.metrics.force_law import ForceLaw
+from auvnn.models import GreyBox
+from tests.small_logs import make_log, small_vehicle
 
 
 def hypothesis(name: str, evidence: float) -> Any:
@@ -94,10 +98,15 @@ def test_what_is_left_withholds_names_that_do_not_stand_out(
     monkeypatch.setattr(module, "refuted", lambda *_, **__: refutes)
     monkeypatch.setattr(module, "share_left", lambda _: 1.0)
     monkeypatch.setattr(module, "explain_an_axis", lambda _: together)
+    monkeypatch.setattr(module, "leave_a_disturbance", lambda *_: False)
     result: Any = SimpleNamespace(
         estimate=SimpleNamespace(law=None), stands_out=ahead, explains=explains, worsens=False
     )
     nothing: Any = None
+    assert withheld(nothing, nothing, result, chance=chance) is expected
+    # What was too large for a disturbance and is one now speaks for names as an explained degree of freedom does.
+    monkeypatch.setattr(module, "explain_an_axis", lambda _: False)
+    monkeypatch.setattr(module, "leave_a_disturbance", lambda *_: together)
     assert withheld(nothing, nothing, result, chance=chance) is expected
     # Names with which the model predicts worse are given where the first explains so much more than all others.
     result.worsens = True
@@ -124,6 +133,41 @@ def test_several_names_may_explain_a_degree_of_freedom_together(names, left, exp
     assert explain_an_axis(result) is expected
     result.first_law = None
     assert not explain_an_axis(result)
+
+
+@pytest.mark.parametrize(
+    ("first", "left", "expected"),
+    [
+        # Shares of the largest moment of the actuators: half of it is too large for a disturbance.
+        (1.2, 0.48, True),
+        # More than a quarter of the mean square is left; still too large; and never too large.
+        (0.9, 0.48, False),
+        (1.2, 0.52, False),
+        (0.48, 0.1, False),
+    ],
+)
+def test_names_may_leave_a_disturbance_of_what_was_too_large_for_one(first, left, expected):
+    model = GreyBox(small_vehicle())
+    windows = windows_for(model, make_log(model))
+    drive = actuators_of(model, windows)
+    asked: Any = SimpleNamespace(layout=SimpleNamespace(model=model))
+    state: Any = SimpleNamespace(windows=windows)
+
+    def law(share: float) -> ForceLaw:
+        # In heave a force is left that no name has to do with, and that is too large.
+        moment, force = share * drive[3:].max(), 3.0 * drive[:3].max()
+        return ForceLaw(np.array([0.0, 0.0, force, 0.0, moment, 0.0]), np.full(6, 2.0), 0.5, 5.0)
+
+    result: Any = SimpleNamespace(
+        estimate=SimpleNamespace(law=law(left)), first_law=law(first), stands_out=False, explains=False,
+        worsens=False, steps=[{"effects": ["cg_offset"]}],
+    )  # fmt: skip
+    assert leave_a_disturbance(asked, state, result) is expected
+    assert withheld(asked, state, result, chance=True) is not expected
+    assert withheld(asked, state, result, chance=False)
+    # Where nothing was left before any name, names have taken nothing away.
+    result.first_law = None
+    assert not leave_a_disturbance(asked, state, result)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
 from auvnn.diagnosis.noise_law.rounds.leaders import rivals_of
 from auvnn.diagnosis.score_tests.null_tests import Tested
+from auvnn.diagnosis.selection.model_comparison import confused
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.executors import Executor
 from auvnn.executors.serial import SERIAL
@@ -25,8 +26,8 @@ Array = NDArray[np.float64]
 # Fitted in full beside those that the first search has fitted: so many of those that lead under the law, and so many more
 # of those whose tests are significant where none of these stands.
 LEADERS, FURTHER_LEADERS = 3, 5
-# So many of those that lead one step ahead are fitted in full, too.
-LEADERS_ONE_STEP = 2
+# So many of those that lead one step ahead are fitted in full, too; as a further name so many of those that led alone.
+LEADERS_ONE_STEP, LEADERS_ALONE = 2, 2
 # Share of the odds that a further name needs, which its test must promise before it is fitted; of no more than these
 # odds, however large the gain of the names before it. A first name that is ahead by less is compared with more effects.
 WORTH_A_FIT, LARGE_ODDS = 0.3, 300.0
@@ -44,6 +45,7 @@ class Round:
         begins: values from which effects are fitted, too: while nothing is chosen those fitted one step ahead, the one
             that explains most first (`one_step_leaders`); then those fitted when nothing was chosen.
         null: the explanation without any name.
+        alone: logarithm of the odds that effects brought when nothing was chosen, the largest first.
     """
 
     tested: Tested
@@ -52,6 +54,7 @@ class Round:
     chosen: list[str]
     begins: Mapping[str, Array] = field(default_factory=dict)
     null: Hypothesis | None = None
+    alone: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -146,10 +149,8 @@ class LeaderFits:
             level: at which chance among all effects is rejected.
         """
         known = self._known(at, fitted)
-        told = [n for n, s in at.tested.scores.items() if s.degrees]
-        ahead = [] if at.chosen else [n for n in at.begins if n in told][:LEADERS_ONE_STEP]
         worth = self._worth(at, known, WORTH_A_FIT * min(odds, LARGE_ODDS))
-        found = self._each([*known, *worth, *ahead], at, known)
+        found = self._each([*known, *worth, *_ahead(at, odds)], at, known)
         # Beside what was found tests are weaker: a rival of a further name need not be clear among all effects.
         rivals = rivals_of(found, at.tested.scores, level, among_all=not at.chosen)
         return _by_evidence([*found, *self._each(rivals, at)])
@@ -235,6 +236,23 @@ class LeaderFits:
                 found.append(self.fits.from_null(self.layout, model, at.current, at.base, asked, least))
         seen = [h for h in found if within_record(h.explanation, self.fits.windows)]
         return max(seen, key=lambda h: h.evidence, default=None)
+
+
+def _ahead(at: Round, odds: float) -> list[str]:
+    """Return effects that are fitted in full whatever their tests promise.
+
+    The slope at the null says little of a large effect, beside a name as before it: what brought as much alone as a
+    further name needs is fitted beside the name, unless the catalogue knows that both explain the same.
+
+    Args:
+        at: the round.
+        odds: logarithm of the odds that a name needs.
+    """
+    told = [n for n, s in at.tested.scores.items() if s.degrees]
+    if not at.chosen:
+        return [n for n in at.begins if n in told][:LEADERS_ONE_STEP]
+    led = [n for n, gain in at.alone.items() if n in told and gain > odds]
+    return [n for n in led if not any(confused(n, c) for c in at.chosen)][:LEADERS_ALONE]
 
 
 def _fitted(shared: tuple[LeaderFits, Round], task: tuple[str, FittedHypothesis | None]) -> Hypothesis | None:

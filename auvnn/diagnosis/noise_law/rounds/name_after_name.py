@@ -71,8 +71,9 @@ class NameAfterName(UnderLaw):
         self._refits: dict[
             tuple[int, str, int, bool], tuple[Hypothesis, FittedHypothesis | None, Hypothesis | None]
         ] = {}
-        # Values of effects that were fitted when nothing was chosen.
+        # Values of effects that were fitted when nothing was chosen, and the odds that they brought then.
         self._earlier: dict[str, Array] = {}
+        self._alone: dict[str, float] = {}
 
     @cached_property
     def _one_step(self) -> dict[str, Array]:
@@ -205,12 +206,14 @@ class NameAfterName(UnderLaw):
             return None
         share = 0.0 if self.looks_further else FURTHER_SHARE
         odds = max(ODDS, share * (current.evidence - null.evidence))
-        at = Round(tests, current, base, list(chosen), self._earlier if chosen else self._one_step, null)
+        begins, alone = (self._earlier, self._alone) if chosen else (self._one_step, {})
+        at = Round(tests, current, base, list(chosen), begins, null, alone)
         good_of = partial(self.names.good, at, len(remaining))
         self._leaders = self._leaders or LeaderFits(self.layout, self.fits(), self.say, self.pool)
         found, good = self._leaders.fitted(at, fitted, odds, ALPHA_NAME, good_of)
         if not chosen:
             self._earlier = {h.name: parameters_of(h.explanation.fitted.model, [h.name]) for h in found}
+            self._alone = {h.name: h.evidence - current.evidence for h in found}
         sure = {h.name: self.names.sure(h, at, len(remaining)) for h in found}
         return RoundResult(at, found, good, sure, len(remaining))
 
