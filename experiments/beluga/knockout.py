@@ -1,11 +1,12 @@
 """Knock-out on a real vehicle: take each effect out of the improved model and ask what is missing.
 
-    python experiments/beluga/knockout.py DATA [OUT] [effect ...] [--one-step]
+    python experiments/beluga/knockout.py DATA [OUT] [effect ...] [--lively | --one-step]
 
 DATA is the folder with Beluga's six CSV files, OUT that of `run.py`, which left the improved model in it. Each effect
-of the model is removed alone, and `diagnose` gets the liveliest minute of each fitted run in windows of 2 s, the whole
-catalogue, and nothing of what was removed. The effect has come back when it is the first one named, or in the group
-that is declared as one that these data cannot tell apart. `random-2` takes no part.
+of the model is removed alone, and `diagnose` gets the fitted runs in windows of 2 s, the whole catalogue, and nothing
+of what was removed; with `--lively` it gets the liveliest minute of each fitted run. The effect has come back when it
+is the first one that the answer says is missing, or in the group that is declared as one that these data cannot tell
+apart. `random-2` takes no part.
 
 With `--one-step` the catalogue is ranked instead by what each effect gains one step ahead on fifths of the whole fitted
 runs left out (`auvnn.diagnosis.one_step.rank`), which is what the model's effects were chosen and fitted by. Beside it
@@ -68,7 +69,6 @@ def case(model: GreyBox, log: Log, removed: str | None) -> dict:
     lacking = model if removed is None else remove(model, removed)
     found = diagnose(lacking, log, max_effects=MOST, window=WINDOW, advice=False)
     steps = [{k: s[k] for k in ("verdict", "effects", "p_value")} for s in found.steps]
-    head = found.steps[0]["effects"]
     entry = next((c for c in found.candidates if c["effect"] == removed), None)
     by_p = sorted(
         (c for c in found.candidates if c["p_value"] is not None),
@@ -78,8 +78,9 @@ def case(model: GreyBox, log: Log, removed: str | None) -> dict:
         "removed": removed,
         "verdict": found.verdict,
         "steps": steps,
-        "named_first": removed is not None and head[:1] == [removed] and found.verdict == "named",
-        "in_first_group": removed in head,
+        "missing": list(found.missing),
+        "named_first": removed is not None and [*found.missing][:1] == [removed] and found.verdict == "named",
+        "in_first_group": found.verdict == "ambiguous" and removed in found.missing,
         "nearest": list(found.nearest),
         "named_later": any(removed in s["effects"] for s in found.steps[1:]),
         "rank_by_evidence": [c["effect"] for c in found.candidates].index(removed) + 1 if removed else None,
@@ -107,10 +108,11 @@ def main() -> None:
     data, out = Path(arguments[0]), Path(arguments[1] if len(arguments) > 1 else "outputs/beluga")
     model, log = load(out / "model"), fitted_runs(data)
     one_step = "--one-step" in sys.argv
+    asked = lively(log) if "--lively" in sys.argv else log
     cases = []
     for name in arguments[2:] or ["none", *model.effect_names]:
         removed = None if name == "none" else name
-        found = one_step_case(model, log, removed) if one_step else case(model, lively(log), removed)
+        found = one_step_case(model, log, removed) if one_step else case(model, asked, removed)
         cases.append(found)
         if one_step:
             told = ", ".join(f"{r['effect']} {r['gain']:.3f} +- {r['std']:.3f}" for r in found["ranking"][:3])
@@ -118,12 +120,14 @@ def main() -> None:
             told = " then ".join(
                 f"{s['verdict']} {' or '.join(s['effects'])}".strip() for s in found["steps"]
             )
+            told += f"; missing {', '.join(found['missing'])}" if found["missing"] else ""
             told += f"; nearest {', '.join(found['nearest'])}" if found["nearest"] else ""
         print(f"without {name}: {told} ({found['seconds']} s)", flush=True)
         back = sum(bool(c["named_first"] or c.get("in_first_group")) for c in cases)
         of = sum(c["removed"] is not None for c in cases)
         answer = {"cases": cases, "came_back": back, "of": of}
-        file = out / ("knockout-one-step.json" if one_step else "knockout.json")
+        kind = "-one-step" if one_step else "-lively" if asked is not log else ""
+        file = out / f"knockout{kind}.json"
         file.write_text(json.dumps(plain(answer), indent=1), encoding="utf-8")
     print(f"came back: {back} of {of}")
     if one_step and "gains" in cases[0] and cases[0]["removed"] is None:
