@@ -1,6 +1,6 @@
 """Knock-out on a real vehicle: take each effect out of the improved model and ask what is missing.
 
-    python experiments/beluga/knockout.py DATA [OUT] [effect ...] [--lively | --one-step]
+    python experiments/beluga/knockout.py DATA [OUT] [effect ...] [--scaled] [--lively | --one-step]
 
 DATA is the folder with Beluga's six CSV files, OUT that of `run.py`, which left the improved model in it. Each effect
 of the model is removed alone, and `diagnose` gets the fitted runs in windows of 2 s, the whole catalogue, and nothing
@@ -8,6 +8,7 @@ of what was removed; with `--lively` it gets the liveliest minute of each fitted
 is the first one that the answer says is missing, or in the group that is declared as one that these data cannot tell
 apart. `random-2` takes no part.
 
+With `--scaled` the model first gets the scale of the velocity sensor that a diagnosis of the whole model finds.
 With `--one-step` the catalogue is ranked instead by what each effect gains one step ahead on fifths of the whole fitted
 runs left out (`auvnn.diagnosis.one_step.rank`), which is what the model's effects were chosen and fitted by. Beside it
 stands which effect's gain is most above what it gains on the whole model: that is told and does not count.
@@ -31,6 +32,7 @@ from auvnn.models import GreyBox, load, remove
 
 MOST = 2  # names one after the other: the first decides, the second tells whether it comes back at all
 SHOWN = 6  # of the ranking
+SCALE = {"velocity_scale": {"factor": 1.024}}  # by the diagnosis of the whole model beside a force
 
 
 def fitted_runs(data: Path) -> Log:
@@ -107,10 +109,13 @@ def main() -> None:
     arguments = [a for a in sys.argv[1:] if not a.startswith("--")]
     data, out = Path(arguments[0]), Path(arguments[1] if len(arguments) > 1 else "outputs/beluga")
     model, log = load(out / "model"), fitted_runs(data)
+    kept = model.effect_names
+    if "--scaled" in sys.argv:
+        model = model.with_effects(SCALE)
     one_step = "--one-step" in sys.argv
     asked = lively(log) if "--lively" in sys.argv else log
     cases = []
-    for name in arguments[2:] or ["none", *model.effect_names]:
+    for name in arguments[2:] or ["none", *kept]:
         removed = None if name == "none" else name
         found = one_step_case(model, log, removed) if one_step else case(model, asked, removed)
         cases.append(found)
@@ -126,7 +131,8 @@ def main() -> None:
         back = sum(bool(c["named_first"] or c.get("in_first_group")) for c in cases)
         of = sum(c["removed"] is not None for c in cases)
         answer = {"cases": cases, "came_back": back, "of": of}
-        kind = "-one-step" if one_step else "-lively" if asked is not log else ""
+        kind = "-scaled" if "--scaled" in sys.argv else ""
+        kind += "-one-step" if one_step else "-lively" if asked is not log else ""
         file = out / f"knockout{kind}.json"
         file.write_text(json.dumps(plain(answer), indent=1), encoding="utf-8")
     print(f"came back: {back} of {of}")

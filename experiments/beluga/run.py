@@ -1,9 +1,9 @@
 """The loop on a real vehicle: check, compare, diagnose, add, step by step, with `random-2` held out throughout.
 
-    python experiments/beluga/run.py DATA [OUT] [--no-diagnosis] [--also=EFFECT]
+    python experiments/beluga/run.py DATA [OUT] [--no-diagnosis] [--also=EFFECT ...]
 
-DATA is the folder with Beluga's six CSV files, OUT where the answers go; EFFECT is a further step to be tried. What is
-kept is decided on fitted runs that are left out in turn; `random-2` is only judged on.
+DATA is the folder with Beluga's six CSV files, OUT where the answers go; each EFFECT is a further step to be tried.
+What is kept is decided on fitted runs that are left out in turn; `random-2` is only judged on.
 """
 
 from __future__ import annotations

@@ -38,6 +38,7 @@ SAMPLES = {
     "rows-18.jsonl": 17,
     "rows-19.jsonl": 18,
     "rows-20.jsonl": 19,
+    "rows-21.jsonl": 20,
 }
 
 
