@@ -29,11 +29,9 @@ GROUP = 3
 # Level of the signed-rank test of gains on what is left out: windows that follow one another gain alike. Forces are
 # compared by their mean over so long, s.
 ALPHA_RANKS, SECOND = 0.001, 1.0
-# Share of the force of a degree of freedom of which a further name must leave less, where it does not bring much of the
-# gain of all names: after a large effect every other one brings little of it.
-LEAVES = 0.1
-# Share of the force of a degree of freedom of which such a name takes away more where those before it do little.
-MOST = 0.5
+# Shares of the force of a degree of freedom: a further name must leave less, where it does not bring much of the gain of
+# all names (after a large effect every other one brings little of it), or take away more where those before it do little.
+LEAVES, MOST = 0.1, 0.5
 # A name stands out that gains so much in evidence, and so many times what every effect does that is not confused with it.
 AHEAD, TIMES = 100.0, 4.0
 # Share of the gain by which an effect that is known to be confused with the best may fall short of it.
@@ -88,6 +86,7 @@ class WithForce:
         tried: all that were fitted at first, the best first.
         p_value: of there being nothing with a name.
         first_law: the law without any name.
+        compared: what is left, as forces that the inertia without any name needs: a name may scale thrust and inertia.
         predicted: what measured inputs predict of the force that is left; None where that is little.
         stands_out: whether the first name explains far more than all that is not confused with it.
         explains: whether it leaves next to nothing of the force in a degree of freedom.
@@ -102,6 +101,7 @@ class WithForce:
     tried: list[FittedHypothesis]
     p_value: float
     first_law: ForceLaw | None
+    compared: ForceLaw | None
     predicted: InputPrediction | None = None
     stands_out: bool = False
     explains: bool = False

@@ -149,6 +149,7 @@ class ForceSearch(NameAfterName):
             self._told(tried),
             whole,
             in_newtons(null.estimate.law, null.explanation),
+            in_newtons(law, null.explanation),
             self.predicted(current),
             path.stands_out,
             path.explains,

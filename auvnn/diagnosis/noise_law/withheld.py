@@ -40,7 +40,7 @@ def withheld(asked: Setting, state: State, result: WithForce, *, chance: bool) -
     """
     if result.worsens and not result.stands_out:
         return True
-    if not refuted(asked, state, result.estimate.law, share_left(result), chance=chance):
+    if not refuted(asked, state, result.compared, share_left(result), chance=chance):
         return False
     explain = result.explains or explain_an_axis(result) or leave_a_disturbance(asked, state, result)
     return not (result.stands_out or (chance and explain))
@@ -56,7 +56,7 @@ def explain_an_axis(result: WithForce) -> bool:
     """
     if result.first_law is None or len(result.steps) < 2:
         return False
-    return bool((shares_left(result.estimate.law, result.first_law) < EXPLAINED).any())
+    return bool((shares_left(result.compared, result.first_law) < EXPLAINED).any())
 
 
 def leave_a_disturbance(asked: Setting, state: State, result: WithForce) -> bool:
@@ -69,7 +69,7 @@ def leave_a_disturbance(asked: Setting, state: State, result: WithForce) -> bool
         state: windows over which the force was sought.
         result: what was found.
     """
-    before, after = result.first_law, result.estimate.law
+    before, after = result.first_law, result.compared
     if before is None:
         return False
     left = np.ones(6)
@@ -120,9 +120,9 @@ def share_left(result: WithForce) -> float:
     Args:
         result: what was found.
     """
-    if result.estimate.law is None or result.first_law is None:
+    if result.compared is None or result.first_law is None:
         return 0.0
-    left = shares_left(result.estimate.law, result.first_law)
+    left = shares_left(result.compared, result.first_law)
     return float(np.clip(left.mean(), 0.0, 1.0))
 
 

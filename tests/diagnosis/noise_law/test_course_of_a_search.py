@@ -47,6 +47,15 @@ def test_the_search_begins_with_what_the_likeliest_pairs_have_in_common(monkeypa
     assert [s["effects"] for s in asked.run(found(-1000.0), [], 1).steps] == [["payload"]]
 
 
+def test_what_is_left_is_compared_at_the_inertia_without_any_name(monkeypatch):
+    """A gain of the thrust that scales the inertia too explains no acceleration, however small the force is with it."""
+    asked, _ = scripted(monkeypatch, {(): [found(10.0, "payload")], ("payload",): []})
+    monkeypatch.setattr(module, "in_newtons", lambda law, at: (law.axes, at.effects))
+    ended: Any = asked.run(found(-1000.0), [], 4)
+    assert ended.first_law == ended.compared == (None, ())
+    assert ended.estimate.law == (None, ("payload",))
+
+
 def test_what_takes_up_what_an_earlier_name_gets_wrong_leaves_its_place_to_the_next(monkeypatch):
     further = {
         (): [found(10.0, "payload")],

@@ -10,8 +10,14 @@ import pytest
 
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.noise_law import left_force
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench
-from auvnn.diagnosis.noise_law.left_force import exceeds_actuators, negligible, sized_by_law
+from auvnn.diagnosis.noise_law.left_force import (
+    beyond_actuators,
+    exceeds_actuators,
+    negligible,
+    sized_by_law,
+)
 from auvnn.diagnosis.noise_law.withheld import goes_further, refuted
 from auvnn.diagnosis.residuals.forces import actuators_of
 from auvnn.diagnosis.residuals.unnamed_size import Size
@@ -43,6 +49,17 @@ def test_the_mean_over_a_second_is_held_against_the_actuators(share, time, expec
         asked, state, None, 0.4, chance=False
     )
     assert not refuted(asked, state, None, 0.6, chance=True)
+
+
+def test_a_vehicle_without_actuators_has_no_force_beyond_theirs(monkeypatch):
+    monkeypatch.setattr(left_force, "actuators_of", lambda *_: np.zeros(6))
+    asked: Any = SimpleNamespace(layout=SimpleNamespace(model=None))
+    state: Any = SimpleNamespace(windows=None)
+    law = ForceLaw(np.full(6, 2.0), np.full(6, 1.0), 0.5, 5.0)
+    assert not exceeds_actuators(asked, state, law)
+    monkeypatch.setattr(left_force, "actuators_of", lambda *_: np.eye(6)[1])
+    # One drives sway alone: of forces that is the measure, and of moments there is none.
+    assert beyond_actuators(asked, state, law).tolist() == [True, True, True, False, False, False]
 
 
 @pytest.mark.parametrize(
@@ -115,7 +132,7 @@ def test_further_names_after_the_same_ones_stand_where_they_leave_less_than_half
         after = ForceLaw(known * np.sqrt(5.0 * share), np.full(6, 0.1), 0.5, 5.0)
         return SimpleNamespace(
             steps=[{"effects": n.split(" or ")} for n in effects],
-            estimate=SimpleNamespace(law=after),
+            compared=after,
             first_law=ForceLaw(known, np.full(6, 4.0), 0.5, 5.0),
         )
 

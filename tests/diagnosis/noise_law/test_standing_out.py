@@ -99,9 +99,7 @@ def test_what_is_left_withholds_names_that_do_not_stand_out(
     monkeypatch.setattr(module, "share_left", lambda _: 1.0)
     monkeypatch.setattr(module, "explain_an_axis", lambda _: together)
     monkeypatch.setattr(module, "leave_a_disturbance", lambda *_: False)
-    result: Any = SimpleNamespace(
-        estimate=SimpleNamespace(law=None), stands_out=ahead, explains=explains, worsens=False
-    )
+    result: Any = SimpleNamespace(compared=None, stands_out=ahead, explains=explains, worsens=False)
     nothing: Any = None
     assert withheld(nothing, nothing, result, chance=chance) is expected
     # What was too large for a disturbance and is one now speaks for names as an explained degree of freedom does.
@@ -127,9 +125,7 @@ def test_what_is_left_withholds_names_that_do_not_stand_out(
 def test_several_names_may_explain_a_degree_of_freedom_together(names, left, expected):
     first = beside(4.0, 0.0, 0.0, 0.0, 1.0, 0.0).estimate.law
     law = None if left is None else beside(*left).estimate.law
-    result: Any = SimpleNamespace(
-        estimate=SimpleNamespace(law=law), first_law=first, steps=[{"effects": ["payload"]}] * names
-    )
+    result: Any = SimpleNamespace(compared=law, first_law=first, steps=[{"effects": ["payload"]}] * names)
     assert explain_an_axis(result) is expected
     result.first_law = None
     assert not explain_an_axis(result)
@@ -159,8 +155,8 @@ def test_names_may_leave_a_disturbance_of_what_was_too_large_for_one(first, left
         return ForceLaw(np.array([0.0, 0.0, force, 0.0, moment, 0.0]), np.full(6, 2.0), 0.5, 5.0)
 
     result: Any = SimpleNamespace(
-        estimate=SimpleNamespace(law=law(left)), first_law=law(first), stands_out=False, explains=False,
-        worsens=False, steps=[{"effects": ["cg_offset"]}],
+        compared=law(left), first_law=law(first), stands_out=False, explains=False, worsens=False,
+        steps=[{"effects": ["cg_offset"]}],
     )  # fmt: skip
     assert leave_a_disturbance(asked, state, result) is expected
     assert withheld(asked, state, result, chance=True) is not expected
@@ -184,7 +180,7 @@ def test_names_with_which_the_model_predicts_worse_are_nearest_and_a_note_says_w
     named: Any = SimpleNamespace(
         steps=[{"verdict": "ambiguous", "effects": ["tether", "payload"], "p_value": 0.0}], groups=[], tried=[],
         last=SimpleNamespace(effects=("tether",)), estimate=SimpleNamespace(law=None), first_law=None,
-        stands_out=ahead, explains=False, worsens=worse,
+        compared=None, stands_out=ahead, explains=False, worsens=worse,
     )  # fmt: skip
     state = State(nothing, first, first)
     ended = module.state_with(SimpleNamespace(layout=None), state, state, named, nothing, chance=True)  # type: ignore[arg-type]
