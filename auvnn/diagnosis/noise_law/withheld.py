@@ -69,12 +69,13 @@ def leave_a_disturbance(asked: Setting, state: State, result: WithForce) -> bool
         state: windows over which the force was sought.
         result: what was found.
     """
-    before, after = result.first_law, result.compared
+    before = result.first_law
     if before is None:
         return False
     left = np.ones(6)
-    left[before.axes] = shares_left(after, before)
-    eased = beyond_actuators(asked, state, before) & ~beyond_actuators(asked, state, after)
+    left[before.axes] = shares_left(result.compared, before)
+    # Beside the actuators it counts as the force that it is with the names.
+    eased = beyond_actuators(asked, state, before) & ~beyond_actuators(asked, state, result.estimate.law)
     return bool((eased & (left < EXPLAINED)).any())
 
 

@@ -155,12 +155,20 @@ def test_names_may_leave_a_disturbance_of_what_was_too_large_for_one(first, left
         return ForceLaw(np.array([0.0, 0.0, force, 0.0, moment, 0.0]), np.full(6, 2.0), 0.5, 5.0)
 
     result: Any = SimpleNamespace(
-        compared=law(left), first_law=law(first), stands_out=False, explains=False, worsens=False,
-        steps=[{"effects": ["cg_offset"]}],
+        estimate=SimpleNamespace(law=law(left)), compared=law(left), first_law=law(first),
+        stands_out=False, explains=False, worsens=False, steps=[{"effects": ["cg_offset"]}],
     )  # fmt: skip
     assert leave_a_disturbance(asked, state, result) is expected
     assert withheld(asked, state, result, chance=True) is not expected
     assert withheld(asked, state, result, chance=False)
+    # What counts as left is acceleration, and beside the actuators the force with the names.
+    result.compared = law(0.9 * first)
+    assert not leave_a_disturbance(asked, state, result)
+    result.compared, result.estimate.law = law(left), law(0.52)
+    assert not leave_a_disturbance(asked, state, result)
+    result.compared = law(0.52)
+    result.estimate.law = law(left)
+    assert leave_a_disturbance(asked, state, result) is expected
     # Where nothing was left before any name, names have taken nothing away.
     result.first_law = None
     assert not leave_a_disturbance(asked, state, result)
