@@ -11,13 +11,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, log_evidence
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, scales, shapes
 from auvnn.diagnosis.hypotheses.within_record import within_record
 from auvnn.diagnosis.score_tests.score import Score
-from auvnn.diagnosis.selection.model_comparison import ALPHA_NEEDED, ODDS, ModelComparison, confused
+from auvnn.diagnosis.selection.also_fitted import promising, rivals_to_fit
+from auvnn.diagnosis.selection.model_comparison import ODDS, ModelComparison
 from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
 from auvnn.diagnosis.selection.prune import Pruning
 from auvnn.diagnosis.selection.refit_leaders import Beside, fitted_beside
@@ -32,9 +32,6 @@ Array = NDArray[np.float64]
 ALPHA = 0.05
 # Explanations are refitted in full, nonlinearly, as long as their one-step evidence is within reach of the best.
 LEADERS, REACH, REACH_SHARE = 5, 30.0, 0.5
-# Where the errors fall by so many times what the slopes at the null promised, or by so small a share of it, these do not
-# rank the effects; so many of those that are known to be confused with the best one are fitted too.
-BENT, RIVALS = 1.5, 2
 # Within this share of its plausible scale of its null, an effect does nothing.
 NOTHING = 1e-4
 
@@ -97,14 +94,14 @@ class Chooser(Pruning):
         leading = sorted(significant, key=lambda s: -s.evidence)[:LEADERS]
         top = leading[0].evidence if leading else 0.0
         leading = [s for s in leading if s.evidence > min(top - REACH, REACH_SHARE * top)]
-        leading += self._promising(significant, leading)
+        leading += promising(significant, leading)
         # Evidence counts an effect of many parameters low while it is small; a test that is clear even among
         # all the others lets it be judged by what it does on runs left out.
         clear = {s.effect for s in significant if s.p_value < ALPHA / len(scores)}
         beside = Beside(self.layout, self.windows, at, base, chosen, current)
         tried, failed = fitted_beside(beside, leading, self.pool, self.say)
-        bent = self._beyond_slopes(tried, significant, current)
-        tried += fitted_beside(beside, bent, self.pool, self.say)[0]
+        more = rivals_to_fit(tried, significant, current)
+        tried += fitted_beside(beside, more, self.pool, self.say)[0]
         found = self._among(tried, clear, at, base, current)
         return replace(found, failed=failed)
 
@@ -155,38 +152,6 @@ class Chooser(Pruning):
         away = parameters_of(final.fitted.model, [name]) - self.layout.means[name]
         small = shapes(self.layout, name) | (np.abs(away) < NOTHING * scales(self.layout, name))
         return bool(small.all()) or not within_record(final, self.windows)
-
-    @staticmethod
-    def _promising(significant: list[Score], leading: list[Score]) -> list[Score]:
-        """Return the test, if any, of the effect that might refute those in the lead by its better fit."""
-        if not leading:
-            return []
-        most = leading[0].gain
-        more = [
-            s for s in significant if s not in leading and s.gain - most > chi2.isf(ALPHA_NEEDED, s.degrees)
-        ]
-        return sorted(more, key=lambda s: s.degrees - s.gain)[:1]
-
-    @staticmethod
-    def _beyond_slopes(
-        tried: Sequence[FittedHypothesis], significant: Sequence[Score], current: FittedHypothesis
-    ) -> list[Score]:
-        """Return tests of effects confused with the best one, where the slopes at the null say little of either.
-
-        A large effect is not where its slope at the null points. A lag of seconds has a hundredth of the evidence there
-        that an overshoot has, of which it is a special case, and explains as much once both are fitted.
-        """
-        if not tried:
-            return []
-        promised = {s.effect: s.gain for s in significant}
-        best = min(tried, key=lambda e: e.fitted.cost)
-        name = best.effects[-1]
-        fell = current.fitted.cost - best.fitted.cost
-        if promised[name] / BENT <= fell <= promised[name] * BENT:
-            return []
-        known = {e.effects[-1] for e in tried}
-        more = [s for s in significant if s.effect not in known and confused(name, s.effect)]
-        return sorted(more, key=lambda s: -s.evidence)[:RIVALS]
 
     def _instead(
         self, taken: FittedHypothesis, base: Sequence[str], name: str, other: FittedHypothesis

@@ -14,7 +14,6 @@ from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis, log_evidence
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.diagnosis.selection.model_comparison import ModelComparison
 from auvnn.estimation.priors import set_parameters
@@ -153,26 +152,6 @@ def test_a_better_fit_by_more_parameters_refutes_nothing_that_is_needed_beside_i
     assert best.effects == ("net_buoyancy",) and [e.effects for e in others] == [("constant_force",)]
 
 
-def scored(name, gain, degrees):
-    nothing = np.zeros(degrees)
-    return Score(name, 1e-4, gain, degrees, 1.0, nothing, nothing, -20.0, gain)
-
-
-def test_what_might_fit_better_than_the_one_in_the_lead_is_tried_however_many_parameters_it_has():
-    leader = scored("net_buoyancy", 14.0, 1)
-    clear, chance, more = (
-        scored("thruster_gain", 44.0, 8),
-        scored("constant_force", 28.0, 6),
-        scored("payload", 42.0, 8),
-    )
-    promising = Chooser._promising
-    assert promising([leader, clear, chance, more], [leader]) == [clear]
-    assert promising([leader, chance], [leader]) == [], (
-        "14 more by six parameters are chance in three of a hundred"
-    )
-    assert promising([leader, clear], [leader, clear]) == [] == promising([clear], [])
-
-
 def test_an_effect_that_its_fit_takes_back_to_its_null_is_not_named(model, monkeypatch):
     log = logged(model, LIGHT)
     assert diagnose(model, log, NAMES, stochastic=False).missing == ["net_buoyancy"]
@@ -200,32 +179,3 @@ def test_an_effect_that_its_fit_takes_out_of_the_log_is_not_named(model, monkeyp
     monkeypatch.setattr("auvnn.diagnosis.selection.choose.within_record", outside)
     found = diagnose(model, logged(model, LIGHT), NAMES, stochastic=False)
     assert "net_buoyancy" in seen and "net_buoyancy" not in found.missing
-
-
-@pytest.mark.parametrize(
-    ("fell", "fitted"),
-    [
-        # The slopes at the null say what a fit takes away, within a factor of 1.5: they rank the effects.
-        (100.0, []),
-        (140.0, []),
-        (70.0, []),
-        # They say little of it: the lag is a special case of the overshoot, and is fitted too.
-        (160.0, ["thruster_lag", "added_mass"]),
-        (60.0, ["thruster_lag", "added_mass"]),
-    ],
-)
-def test_where_slopes_say_little_what_is_confused_with_the_best_is_fitted_too(fell, fitted):
-    def fit(effect, cost):
-        return SimpleNamespace(effects=(effect,), fitted=SimpleNamespace(cost=cost))
-
-    def score(effect, gain, evidence):
-        return SimpleNamespace(effect=effect, gain=gain, evidence=evidence)
-
-    significant: Any = [
-        score("thrust_overshoot", 100.0, 90.0), score("payload", 80.0, 50.0), score("waves", 30.0, 20.0),
-        score("added_mass", 30.0, 8.0), score("thruster_lag", 20.0, 9.0),
-    ]  # fmt: skip
-    tried: Any = [fit("payload", 950.0), fit("thrust_overshoot", 1000.0 - fell)]
-    current: Any = fit("", 1000.0)
-    assert [s.effect for s in Chooser._beyond_slopes(tried, significant, current)] == fitted
-    assert Chooser._beyond_slopes([], significant, current) == []
