@@ -1,4 +1,4 @@
-"""Which effects are fitted besides those that lead by their tests: what might refute these, what is confused with them."""
+"""Which effects are fitted besides those that lead by their tests: what may refute these, what is confused with them."""
 
 from __future__ import annotations
 

@@ -111,7 +111,13 @@ def scripted(
         paying=lambda likely, *_: likely,
         worsen=lambda *_: False,
     )
-    asked._leaders, asked._one_step = SimpleNamespace(fitted=fitted, take=lambda *_: None), {}
+
+    def gains(current: Any) -> dict[str, float]:
+        fits = further.get(tuple(current.explanation.effects), [])
+        return {h.name: h.evidence - current.evidence for h in fits}
+
+    asked._leaders = SimpleNamespace(fitted=fitted, take=lambda *_: None, gains=gains)
+    asked._one_step = {}
     asked._tested = lambda *_: SimpleNamespace(p_value=0.0)
     asked._settled = lambda h: h
     asked._takes_up = lambda *_: False

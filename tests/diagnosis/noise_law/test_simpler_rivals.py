@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -32,6 +33,9 @@ from tests.diagnosis.noise_law.scripted import found, names, scripted
         # What a further effect gained once it was fitted counts, too, where its test promised less.
         ({"trapped_water": 65.0}, 30.0, (36.0, 2.0), ["trapped_water", "payload"]),
         ({"trapped_water": 65.0}, 30.0, (34.0,), ["payload"]),
+        # What it did not gain does not count, whatever its test promised.
+        ({"trapped_water": 65.0}, 36.0, (), ["trapped_water", "payload"]),
+        ({"trapped_water": 65.0}, 36.0, (2.0, 34.0, 3.0), ["payload"]),
         # Half of the gain is asked for, however much is left.
         ({"trapped_water": 55.0}, 60.0, (), ["trapped_water", "payload"]),
         ({"trapped_water": 45.0}, 60.0, (), ["payload"]),
@@ -44,18 +48,22 @@ def test_what_has_fewer_parameters_loses_by_no_less_than_what_is_still_unexplain
     monkeypatch, worth, promised, gained, expected
 ):
     beside = ("tether", "payload")
-    asked, _ = scripted(monkeypatch, {beside: [found(100.0 + e, *beside, "gyro_bias") for e in gained]})
+    others = ("gyro_bias", "ocean_current", "waves")
+    fits = [found(100.0 + e, *beside, n) for e, n in zip(gained, others, strict=False)]
+    asked, _ = scripted(monkeypatch, {beside: fits})
     asked.layout.columns.update({"payload": range(12), "flooding": range(12)})
     asked_at: list[Any] = []
 
-    def what_is_left(path: Any) -> float:
-        asked_at.append((path.current.name, path.chosen))
-        return promised
+    def tests(current: Any, remaining: Any, base: Any, chosen: Any) -> Any:
+        asked_at.append((current.name, chosen))
+        promises = dict.fromkeys(others, 0.0) | {"waves": promised}
+        scores = {n: SimpleNamespace(evidence=e, degrees=1) for n, e in promises.items()}
+        return SimpleNamespace(p_value=0.0, scores=scores)
 
-    asked.rest = what_is_left
+    asked._tested = tests
     path = Path(found(0.0, "tether"), ["tether"])
     good = sorted(
-        [found(100.0, "payload"), *(found(e, n) for n, e in worth.items())], key=lambda h: -h.evidence
+        [found(100.0, *beside), *(found(e, "tether", n) for n, e in worth.items())], key=lambda h: -h.evidence
     )
     assert names(asked._with_simpler(good[:1], good, path, found(-1000.0))) == expected
     assert all(at == ("payload", ["tether", "payload"]) for at in asked_at)
@@ -72,7 +80,8 @@ def test_what_has_fewer_parameters_leads_the_step_that_it_is_told_in(monkeypatch
     }
     asked, _ = scripted(monkeypatch, further, 0)
     asked.layout.columns["payload"] = range(12)
-    asked.rest = lambda _: 0.0
+    promises = {"waves": SimpleNamespace(evidence=0.0, degrees=1)}
+    asked._tested = lambda *_: SimpleNamespace(p_value=0.0, scores=promises)
     monkeypatch.setattr(module, "those_that_lose", lambda *_: set())
     ended = asked.run(found(-1000.0), [], 4)
     assert [s["effects"] for s in ended.steps] == [["trapped_water", "payload"]]

@@ -126,6 +126,18 @@ class LeaderFits:
             if where == id(at.current) and h is not None and name in at.tested.scores
         )
 
+    def gains(self, current: Hypothesis) -> dict[str, float]:
+        """Return what each effect that was fitted beside an explanation gains there, in the logarithm of the odds.
+
+        Args:
+            current: the explanation.
+        """
+        return {
+            name: h.evidence - current.evidence
+            for (where, name), (_, h) in self.known.items()
+            if where == id(current) and h is not None
+        }
+
     def take(self, current: Hypothesis, found: Hypothesis) -> None:
         """Keep a fit that another search made, where it is likelier than what was fitted here.
 

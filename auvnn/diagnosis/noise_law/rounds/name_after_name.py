@@ -164,9 +164,8 @@ class NameAfterName(UnderLaw):
             return group
         chosen, dropped = [*path.chosen, best.name], self._passed(path)
         beside = Path(self._settled(best), chosen, dropped=dropped)
-        further = self._round(null, beside.current, chosen, dropped, ())
-        gains = [h.evidence - beside.current.evidence for h in further.found] if further else []
-        rest = max([self.rest(beside), *gains])
+        self._round(null, beside.current, chosen, dropped, ())
+        rest = self.rest(beside)
         near = [h for h in simpler if best.evidence - h.evidence < rest]
         group = [*group, *near[: GROUP - len(group)]]
         return sorted(group, key=lambda h: h.name not in effect_class(best.name).plainer)
@@ -176,7 +175,9 @@ class NameAfterName(UnderLaw):
         return [*path.dropped, *[e.effects[-1] for g in path.groups for e in g]]
 
     def rest(self, path: Path) -> float:
-        """Return what the best further effect promises beside all names, in the logarithm of the odds.
+        """Return what the best further effect gains beside all names, in the logarithm of the odds.
+
+        What was fitted beside them gains what its fit does, which may be far less than its slope at the null promises.
 
         Args:
             path: with the names.
@@ -184,8 +185,10 @@ class NameAfterName(UnderLaw):
         passed = self._passed(path)
         remaining = [n for n in self.usable if n not in path.chosen and n not in passed]
         base = [*self.base, *[c for c in path.chosen if c not in self.base]]
-        scores = self._tested(path.current, remaining, base, list(path.chosen)).scores.values()
-        return max((s.evidence for s in scores if s.degrees), default=0.0)
+        scores = self._tested(path.current, remaining, base, list(path.chosen)).scores
+        told = {n: s.evidence for n, s in scores.items() if s.degrees}
+        fitted = {} if self._leaders is None else self._leaders.gains(path.current)
+        return max([fitted.get(n, promised) for n, promised in told.items()], default=0.0)
 
     def _round(
         self,
