@@ -72,6 +72,7 @@ def test_the_name_that_the_log_needs_least_goes():
     ("short", "rest", "predicted", "expected"),
     [
         (12.0, 3.0, True, True),
+        (12.0, 5.0, True, True),
         # As likely as the leader but for a factor of ninety, and less short than another effect would still gain.
         (4.5, 0.0, True, False),
         (12.0, 13.0, True, False),
@@ -89,7 +90,8 @@ def test_a_rival_loses_by_more_than_the_model_is_known_to_be_wrong(
 
     monkeypatch.setattr(module, "predicts_better", better)
     assert loses(worth(short), worth(0.0), rest, 0) is expected
-    assert all(given == (short, 0.0, 3.0, False) for given in asked)
+    # Where no further effect gains odds of a hundred nothing says that the model is wrong: two standard errors do.
+    assert all(given == (short, 0.0, 3.0 if rest > 4.7 else 2.0, False) for given in asked)
 
 
 @pytest.mark.parametrize(

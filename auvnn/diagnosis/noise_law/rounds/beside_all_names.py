@@ -34,8 +34,9 @@ from auvnn.effects import effect_class
 from auvnn.estimation.priors import parameters_of, set_parameters
 
 Array = NDArray[np.float64]
-# Standard errors by which runs left out must be predicted better with the name that leads.
-SURE = 3.0
+# Standard errors by which runs left out must be predicted better with the name that leads: where a further effect still
+# gains something, so that the model is known to be wrong, and where none does.
+SURE, SURE_OF_ALL = 3.0, 2.0
 # What the further parameters of a rival gain by chance alone is exceeded as seldom as this.
 ALPHA_EXTRA = 0.01
 # Logarithm of the odds by which a fit may fall short, what its next step promises included, before it is given up: where
@@ -147,7 +148,8 @@ def loses(current: Hypothesis, rival: Hypothesis, rest: float, extra: int) -> bo
     A rival that contains what leads predicts as well, whatever the truth. Where it has more parameters, fits as well, and
     gains no more than chance by them, evidence decides: what that counts against the rival is that it could have
     explained much else. One that fits worse does not contain what leads, or its fit has not come so far: runs left out
-    decide.
+    decide (the test of Vuong, of models that do not contain each other), on weaker grounds where no further effect gains
+    anything: then nothing says that the model is wrong, and the odds hold as they are.
 
     Args:
         current: with the names that were found.
@@ -155,13 +157,14 @@ def loses(current: Hypothesis, rival: Hypothesis, rest: float, extra: int) -> bo
         rest: what the best further effect gains beside the names, in the logarithm of the odds.
         extra: parameters that the rival has more than the name in whose place it is; zero where it is the plainer cause.
 
-    Reference: MacKay (2003), Information Theory, Inference and Learning Algorithms, chapter 28 (Occam's razor).
+    Reference: MacKay (2003), Information Theory, Inference and Learning Algorithms, chapter 28 (Occam's razor); Vuong
+        (1989), Econometrica 57(2) 307-333.
     """
     if current.evidence - rival.evidence <= max(ODDS, rest):
         return False
     if extra > 0 and -2.0 * ODDS < current.misfit - rival.misfit < chi2.isf(ALPHA_EXTRA, extra):
         return True
-    return predicts_better(current, rival, SURE, ranks=False)
+    return predicts_better(current, rival, SURE if rest > ODDS else SURE_OF_ALL, ranks=False)
 
 
 def those_that_lose(
