@@ -33,6 +33,7 @@ from auvnn.diagnosis.noise_law.rounds.beside_all_names import (
     Change,
     Refit,
     as_good_in_place,
+    costs_little,
     no_longer_needed,
     refitted,
     rivals_among,
@@ -88,7 +89,11 @@ class ForceSearch(NameAfterName):
                 path.tie(name, other)
         known, anything = len(self._passed(path)), False
         rivals = rivals_tried(path.chosen, before.tried, before.first.fitted.sigma)
-        while self._fewer(path, path.chosen) or self._exchanged(path, path.chosen, rivals):
+        while (
+            self._fewer(path, path.chosen)
+            or self._exchanged(path, path.chosen, rivals)
+            or self._cheaper(path, path.chosen[1:])
+        ):
             anything = True
         # Names that stand leave next to nothing of the error: what is beside them withholds none.
         path.stands_out = True
@@ -175,6 +180,13 @@ class ForceSearch(NameAfterName):
         if names:
             self.say(f"asking whether each name is needed beside the others: {', '.join(names)}")
         found = no_longer_needed(names, path.current, self._refit(path.current))
+        if found is not None:
+            path.without(*found)
+        return found is not None
+
+    def _cheaper(self, path: Path, names: Sequence[str]) -> bool:
+        """Go on without a further name that costs little in free running; return whether there was one."""
+        found = costs_little(names, path.current, self._refit(path.current), self.names.pays)
         if found is not None:
             path.without(*found)
         return found is not None

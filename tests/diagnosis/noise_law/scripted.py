@@ -109,6 +109,7 @@ def scripted(
         sure=lambda *_: 1e-9,
         likely=lambda at, among, given, odds: given,
         paying=lambda likely, *_: likely,
+        pays=print,
         worsen=lambda *_: False,
     )
 
@@ -132,6 +133,7 @@ def scripted(
 
     monkeypatch.setattr(module, "averaged", averaged)
     monkeypatch.setattr(module, "no_longer_needed", lambda *_: None)
+    monkeypatch.setattr(module, "costs_little", lambda *_: None)
     monkeypatch.setattr(module, "as_good_in_place", lambda *_: None)
     monkeypatch.setattr(module, "that_leads_instead", lambda *_: None)
     monkeypatch.setattr(name_after_name, "tied", lambda _, good, before: good[:1])

@@ -17,6 +17,7 @@ from auvnn.diagnosis.noise_law.rounds import beside_all_names as module
 from auvnn.diagnosis.noise_law.rounds import path as path_module
 from auvnn.diagnosis.noise_law.rounds.beside_all_names import (
     as_good_in_place,
+    costs_little,
     loses,
     no_longer_needed,
     refitted,
@@ -32,6 +33,7 @@ from auvnn.diagnosis.selection.rivals import rivals_tried
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.executors.serial import SERIAL
 from auvnn.models import GreyBox
+from tests.diagnosis.noise_law.scripted import found
 from tests.diagnosis.noise_law.wandering import wandering_log
 from tests.small_logs import small_vehicle
 
@@ -66,6 +68,29 @@ def test_the_name_that_the_log_needs_least_goes():
         without = {"payload": evidence}
         assert (no_longer_needed(without, worth(0.0), refit) is None) is needed  # type: ignore[arg-type]
     assert no_longer_needed([], worth(0.0), refit) is None  # type: ignore[arg-type]
+
+
+def test_a_name_that_brings_little_and_costs_little_goes_the_one_that_is_needed_least_first():
+    """By what free running says of each, as the last one of the names."""
+    current = found(0.0, "tether", "waves", "fin_lag")
+    without = {"waves": -290.0, "fin_lag": -71.0, "tether": -310.0}
+    asked: list[Any] = []
+
+    def found_with(paying):
+        def pays(after, before):
+            asked.append((after.explanation.effects, before.evidence))
+            return after.name in paying
+
+        refit = one_by_one(lambda name, rival: worth(without[name]))
+        spare = costs_little(["tether", "waves", "fin_lag"], current, refit, pays)  # type: ignore[arg-type]
+        return spare and (spare[0], spare[1].evidence)
+
+    assert found_with(()) == ("fin_lag", -71.0)
+    # What brings 300 in the logarithm of the odds stands, whatever it costs.
+    assert asked == [(("tether", "fin_lag", "waves"), -290.0), (("tether", "waves", "fin_lag"), -71.0)]
+    assert found_with(("fin_lag",)) == ("waves", -290.0)
+    assert found_with(("fin_lag", "waves")) is None
+    assert costs_little([], current, one_by_one(lambda *_: None), print) is None  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

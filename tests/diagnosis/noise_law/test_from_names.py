@@ -52,6 +52,22 @@ def test_names_that_are_all_needed_stay_as_they_are(monkeypatch):
     assert of == [["payload", "waves"]] and done == ["settled waves None"]
 
 
+def test_the_search_goes_on_without_a_further_name_that_costs_little(monkeypatch):
+    asked, before, _ = begun(monkeypatch, {("payload",): []})
+    of: list[Any] = []
+
+    def little(these: Any, current: Any, refit: Any, pays: Any) -> Any:
+        of.append((list(these), current.explanation.effects, pays))
+        return ("waves", found(40.0, "payload")) if these else None
+
+    monkeypatch.setattr(module, "costs_little", little)
+    ended = both(asked, before, 4)
+    assert [(s["verdict"], s["effects"]) for s in ended.steps] == [("named", ["payload"])]
+    assert ended.last.effects == ("payload",)
+    # The first name is not asked for, however little it costs.
+    assert of == [(["waves"], ("payload", "waves"), print), ([], ("payload",), print)]
+
+
 def test_without_a_needless_name_the_search_goes_on(monkeypatch):
     further = {("waves",): [found(900.0, "waves", "tether")], ("waves", "tether"): []}
     asked, before, done = begun(monkeypatch, further)

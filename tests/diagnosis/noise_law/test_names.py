@@ -132,7 +132,7 @@ def test_names_worsen_free_running_where_they_do_in_all_windows_and_in_the_media
 
     def cost(after, before, log, scale):
         ran.append((after, before))
-        return Cost(error, typical, 0.0, False)
+        return Cost(error, typical, 0.0, 0.0, False)
 
     monkeypatch.setattr(names_given, "free_running_cost", cost)
 
@@ -259,7 +259,7 @@ def paying(costs, monkeypatch, without=1e3, **changes):
     def cost_of(_, h, *__, **___):
         """Return what is given: error and moves, then whether it is surely worse (yes), and in the median window."""
         error, moves, *more = costs[h.name]
-        return Cost(error, *(more[1:] or [error]), moves, bool(more[0]) if more else True)  # type: ignore[arg-type]
+        return Cost(error, *(more[1:] or [error]), moves, 0.0, bool(more[0]) if more else True)  # type: ignore[arg-type]
 
     monkeypatch.setattr(names_given, "cost_of_name", cost_of)
     return [h.name for h in given(**changes).paying(likely, hypothesis("", without), 0.5)]
@@ -380,7 +380,7 @@ def test_the_cost_is_that_of_errors_and_of_predictions_that_move():
     assert size == pytest.approx(np.sqrt(1.0 + away**2) - 1.0, rel=1e-6)
     # The force does not know of the commands here: both figures say much the same.
     assert size == pytest.approx(cost, rel=0.5)
-    assert free_running_cost(after, after, log, scale) == Cost(0.0, 0.0, 0.0, worse=False)
+    assert free_running_cost(after, after, log, scale) == Cost(0.0, 0.0, 0.0, 0.0, worse=False)
     # In the median window: of each window's mean square in units of the velocities' variance.
     squares = [
         (((p - measured) ** 2 * mask).sum(1) / mask.sum(1) / scale.std**2)[:, scale.excited]

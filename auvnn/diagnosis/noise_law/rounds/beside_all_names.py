@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence, Set
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,8 @@ ALPHA_EXTRA = 0.01
 # Logarithm of the odds by which a fit may fall short, what its next step promises included, before it is given up: where
 # a name is needed so much, the fit without it need not be finished.
 FAR = 1000.0
+# Logarithm of the odds from which a name that costs little stands.
+MUCH = 300.0
 # A name, and a rival that is to take its place, or None.
 Change = tuple[str, FittedHypothesis | None]
 # Returns of each change the fit of all names with it, None where that fails; no fit has to wait for another.
@@ -96,6 +99,39 @@ def no_longer_needed(
     without = zip(names, refit([(name, None) for name in names]), strict=True)
     spare = [(n, h) for n, h in without if h is not None and current.evidence - h.evidence < ODDS]
     return max(spare, key=lambda found: found[1].evidence, default=None)
+
+
+def costs_little(
+    names: Iterable[str], current: Hypothesis, refit: Refit, pays: Callable[[Hypothesis, Hypothesis], bool]
+) -> tuple[str, Hypothesis] | None:
+    """Return the name that the log needs least of those that cost little, and the explanation without it, or None.
+
+    What is surely there may matter to nobody: clocks that are not exact look like a lag of a hundredth of a second. What
+    brings much is left where it is: without it there would be a force that is left.
+
+    Args:
+        names: that are asked for.
+        current: with all names.
+        refit: fits all names but one.
+        pays: whether a name costs enough in free running; called with the explanation in which it is the last one, and
+            that without it.
+    """
+    names = list(names)
+    without = zip(names, refit([(name, None) for name in names]), strict=True)
+    little = [(n, h) for n, h in without if h is not None and current.evidence - h.evidence < MUCH]
+    spare = [(n, h) for n, h in little if not pays(with_last(current, n), h)]
+    return max(spare, key=lambda found: found[1].evidence, default=None)
+
+
+def with_last(current: Hypothesis, name: str) -> Hypothesis:
+    """Return the same explanation, one of its effects last.
+
+    Args:
+        current: the explanation.
+        name: of the effect.
+    """
+    effects = (*[e for e in current.explanation.effects if e != name], name)
+    return replace(current, explanation=replace(current.explanation, effects=effects))
 
 
 def rivals_among(known: Sequence[Hypothesis], null: Hypothesis) -> Rivals:

@@ -36,12 +36,14 @@ class Cost:
         moves: what the error would be if what is missing were independent of the commands: sqrt(1 + d^2) - 1, with d the
             change of the predictions over the error that is left. Under a controller the commands answer the force, so
             that the error of free running is least at wrong values, and a right name may make it larger.
+        moves_typically: the same of the median window.
         worse: whether errors are surely larger with the name, by the paired differences of the windows.
     """
 
     error: float
     typical: float
     moves: float
+    moves_typically: float
     worse: bool
 
     @property
@@ -134,16 +136,21 @@ def free_running_cost(after: GreyBox, before: GreyBox, log: Log, scale: Scale) -
     # Machine code that repeats to the bit: the same explanation must cost the same each time.
     first, last = (roll(model, log, HORIZON, scale, engine="firm") for model in (before, after))
     if first is None or last is None:
-        return Cost(float("inf"), float("inf"), float("inf"), False)
+        return Cost(float("inf"), float("inf"), float("inf"), float("inf"), False)
     errors, typical = (
         [of(r) for r in (first, last)] for of in (lambda r: r.total(scale), partial(_median, scale))
     )
-    change = replace(last, squared=_moved(first.predicted, last)).total(scale)
-    away = change / errors[1] if errors[1] > 0.0 else float("inf")
-    moves = float(np.sqrt(1.0 + away**2) - 1.0) if np.isfinite(away) else 0.0
-    return Cost(
-        _share(*errors), _share(*typical), moves, _surely_less(*(_by_window(scale, r) for r in (first, last)))
-    )
+    change = replace(last, squared=_moved(first.predicted, last))
+    moves = _moves(change.total(scale), errors[1])
+    moves_typically = _moves(_median(scale, change), typical[1])
+    worse = _surely_less(*(_by_window(scale, r) for r in (first, last)))
+    return Cost(_share(*errors), _share(*typical), moves, moves_typically, worse)
+
+
+def _moves(change: float, error: float) -> float:
+    """Return what the error would be, above what it is, if what predictions change by were independent of it."""
+    away = change / error if error > 0.0 else float("inf")
+    return float(np.sqrt(1.0 + away**2) - 1.0) if np.isfinite(away) else 0.0
 
 
 def _share(without: float, whole: float) -> float:

@@ -71,7 +71,9 @@ class NamesGiven:
         """
         likely = self.likely(at, among, found, odds)
         clear = [h.name for h in likely if _shows(h, at)]
-        return self.paying(likely, at.current, FURTHER_COST if at.chosen else FIRST_COST, clear)
+        sure = GAIN_FURTHER if at.chosen else GAIN
+        most = [h.name for h in likely if not predicts_better(h, at.current, sure, ranks=False)]
+        return self.paying(likely, at.current, FURTHER_COST if at.chosen else FIRST_COST, clear, most)
 
     def likely(self, at: Round, among: int, found: Sequence[Hypothesis], odds: float) -> list[Hypothesis]:
         """Return those explanations that the data prefer by so much, whatever they cost, the most evident first.
@@ -128,8 +130,22 @@ class NamesGiven:
         """
         return min(1.0, among * p_value_of(self.layout, found, at.current))
 
+    def pays(self, after: Hypothesis, before: Hypothesis) -> bool:
+        """Whether a further name costs enough.
+
+        Args:
+            after: the explanation in which it is the last one.
+            before: the one without it.
+        """
+        return bool(self.paying([after], before, FURTHER_COST))
+
     def paying(
-        self, likely: Sequence[Hypothesis], current: Hypothesis, share: float, clear: Collection[str] = ()
+        self,
+        likely: Sequence[Hypothesis],
+        current: Hypothesis,
+        share: float,
+        clear: Collection[str] = (),
+        most: Collection[str] = (),
     ) -> list[Hypothesis]:
         """Return what costs so large a share of the tolerance in free running, and what goes with it.
 
@@ -138,6 +154,7 @@ class NamesGiven:
             current: the explanation without any of the names.
             share: of the tolerance.
             clear: names that take away most of a force: what they do with everything else as it is counts, too.
+            most: names with which most windows are predicted better, and not surely the mean: the median window counts.
         """
         if self.tolerance.strict:
             return list(likely)
@@ -150,8 +167,11 @@ class NamesGiven:
                 continue
             cost = cost_of_name(self.layout, h, current, self.log, self.scale, others_stay=h.name in clear)
             # Where the sensors are not what they should be, a few wrong starts may decide the error of all windows.
-            paid = cost.error if self.white_noise else cost.least
-            costs.append(max(paid, cost.moves) if self.in_closed_loop else paid)
+            paid, moves = cost.error if self.white_noise else cost.least, cost.moves
+            if h.name in most:
+                # A few windows in which a vehicle nearly loses its way make the error of all, and any name may catch it.
+                paid, moves = cost.typical, cost.moves_typically
+            costs.append(max(paid, moves) if self.in_closed_loop else paid)
             # What hardly moves predictions contradicts nothing, be its error a thousandth larger or smaller.
             matters = max(-cost.error, cost.moves) > share * self.tolerance.cost
             worse.append(costs[-1] <= 0.0 and (self.white_noise or cost.worse) and matters)
