@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,7 @@ class Judge:
         sigma: (18,) the sensors' white noise.
         cell: the time over which the force is constant, s.
         response: (6, 6) accelerations by the forces of the law.
+        last: sums that were worked out last, with what they are about: a law is often estimated where steps have led.
     """
 
     layout: Layout
@@ -44,6 +46,11 @@ class Judge:
     sigma: Array
     cell: float
     response: Array | None
+    last: list[tuple[FittedHypothesis, ForceSums]] = field(default_factory=list, compare=False, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Go to another process without sums."""
+        return {**self.__dict__, "last": []}
 
     def __call__(self, explanation: FittedHypothesis, law: ForceLaw, held: bool = False) -> Hypothesis:
         """Return an explanation with the law that is most likely with it, or with the one given, and what they are worth.
@@ -61,8 +68,13 @@ class Judge:
         Args:
             explanation: the explanation.
         """
+        for known, sums in self.last:
+            if known.fitted is explanation.fitted and known.around is explanation.around:
+                return sums
         about = replace(self.windows, law=None, around=explanation.around)
-        return force_sums(explanation, about, self.sigma, self.cell, self.response)
+        self.last.clear()
+        self.last.append((explanation, force_sums(explanation, about, self.sigma, self.cell, self.response)))
+        return self.last[0][1]
 
 
 class UnderLaw:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ import torch
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.noise_law import under_law
 from auvnn.diagnosis.noise_law.likelihood.sums import force_sums, whole_cells
 from auvnn.metrics.coloured_noise import NoiseColour
 from auvnn.models import GreyBox
@@ -45,6 +47,26 @@ def test_where_the_noise_is_not_white_each_window_begins_with_a_state_of_its_own
     sums = force_sums(first, about, first.fitted.sigma)
     assert sums.states is not None and not sums.states.follows.any()
     assert (sums.statistics.count == force_sums(first, windows, first.fitted.sigma).statistics.count).all()
+
+
+def test_sums_about_the_same_fit_are_worked_out_once_and_stay_at_home(fitted, monkeypatch):
+    first, windows = fitted
+    made = []
+
+    def counted(*given):
+        made.append(given[0])
+        return force_sums(*given)
+
+    monkeypatch.setattr(under_law, "force_sums", counted)
+    judge = under_law.Judge(lay_out(first.fitted.model, []), windows, first.fitted.sigma, 0.5, None)
+    sums = judge.sums(first)
+    # Another law is no other fit; other trajectories are, and another fit.
+    assert judge.sums(replace(first, under_law=first.fitted)) is sums and len(made) == 1
+    about = torch.cat([windows.eta, windows.nu], dim=-1)
+    for other in (replace(first, around=about), replace(first, fitted=replace(first.fitted))):
+        assert judge.sums(other) is not sums
+    assert len(made) == 3 and len(judge.last) == 1
+    assert pickle.loads(pickle.dumps(judge)).last == [] and len(judge.last) == 1
 
 
 def test_a_window_holds_a_whole_number_of_cells(fitted):
