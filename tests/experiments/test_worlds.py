@@ -39,6 +39,7 @@ SAMPLES = {
     "rows-19.jsonl": 18,
     "rows-20.jsonl": 19,
     "rows-21.jsonl": 20,
+    "rows-22.jsonl": 21,
 }
 
 

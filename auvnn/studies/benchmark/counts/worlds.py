@@ -47,8 +47,9 @@ def stripped(row: Row) -> dict[str, Any]:
     out["missing"] = [n for n in row["missing"] if n not in spare]
     out["nearest"] = [n for n in row.get("nearest") or [] if n not in spare]
     if row["verdict"] in ("named", "ambiguous"):
-        first = next((s for s in steps if s["effects"] and s["verdict"] in ("named", "ambiguous")), None)
-        out["verdict"] = "adequate" if first is None else first["verdict"]
+        # What a later step withdrew was not given.
+        stay = [s for s in counting.standing(out) if s["effects"] and s["verdict"] in ("named", "ambiguous")]
+        out["verdict"] = stay[0]["verdict"] if stay else "adequate"
         if row["verdict"] == "ambiguous" and not out["missing"]:
             # What is missing are the members of the first group. Where all of them are true, the next step comes first.
             stays = [s["effects"] for s in counting.standing(out) if s["effects"]]

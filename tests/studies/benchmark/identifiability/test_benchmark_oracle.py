@@ -137,6 +137,10 @@ def test_what_is_true_in_a_world_is_neither_a_hit_nor_an_error():
     )
     nothing = row("nothing", ("named", ["t"]), END, true=["t"], kind="nothing")
     assert adequate(nothing) and silent(nothing)
+    # A name that was withdrawn was not given, though it came first.
+    gone = [("named", ["c"]), ("named", ["t"]), ("withdrawn", ["c"]), END]
+    assert adequate(row("nothing", *gone, true=["t"], kind="nothing", missing=["t"]))
+    assert not adequate(row("nothing", *gone, kind="nothing", missing=["t"]))
     wrong = row("nothing", ("named", ["t"]), ("named", ["c"]), END, true=["t"], kind="nothing")
     assert not adequate(wrong) and not silent(wrong) and wrong_first(wrong)
     assert silent(row("nothing", ("unknown", []), kind="nothing"))
