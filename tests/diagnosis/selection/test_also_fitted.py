@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis.score_tests.score import Score
+from auvnn.diagnosis.selection import choose
 from auvnn.diagnosis.selection.also_fitted import promising, rivals_to_fit
+from auvnn.diagnosis.selection.choose import Choice, Chooser
 
 
 def scored(name, gain, degrees):
@@ -81,3 +83,27 @@ def test_one_mass_is_fitted_beside_six_factors_of_the_added_mass(fell, fitted):
     # The plainer cause in the lead has no rival that has to be fitted but by its slopes.
     found = rivals_to_fit([fit("trapped_water", 950.0)], significant, fit("", 1000.0))
     assert found == []
+
+
+def test_what_is_fitted_besides_is_weighed_with_those_that_lead(monkeypatch):
+    leads, more = scored("added_mass", 44.0, 6), scored("trapped_water", 14.0, 1)
+    asked: list[Any] = []
+
+    def fitted(beside: Any, scores: Any, *_: Any) -> Any:
+        return [f"fit of {s.effect}" for s in scores], {}
+
+    def besides(tried: Any, significant: Any, current: Any) -> Any:
+        asked.append((list(tried), [s.effect for s in significant], current))
+        return [more]
+
+    monkeypatch.setattr(choose, "fitted_beside", fitted)
+    monkeypatch.setattr(choose, "rivals_to_fit", besides)
+    monkeypatch.setattr(Chooser, "_among", lambda self, tried, *_: Choice("unknown", None, tried, []))
+    # Only the first one leads.
+    monkeypatch.setattr(choose, "LEADERS", 1)
+    nothing: Any = None
+    chooser = Chooser(nothing, nothing, print)
+    scores = {s.effect: s for s in (leads, more)}
+    found = chooser.choose(scores, nothing, [], [], nothing)
+    assert found.tried == ["fit of added_mass", "fit of trapped_water"]
+    assert asked == [(["fit of added_mass"], ["added_mass", "trapped_water"], None)]
