@@ -53,6 +53,15 @@ def test_where_most_windows_say_so_the_median_one_must_pay(
     assert {*asked_for} == {names_given.GAIN_FURTHER}
 
 
+@pytest.mark.parametrize(("error", "expected"), [(0.07, False), (0.11, True)])
+def test_a_further_name_among_those_that_stand_must_cost_all_that_is_tolerated(monkeypatch, error, expected):
+    """A first name would have to cost half of the tenth that is tolerated."""
+    monkeypatch.setattr(names_given, "cost_of_name", lambda *_, **__: Cost(error, 0.0, 0.0, 0.0, False))
+    asked = NamesGiven(None, None, None, Tolerance.of(None))  # type: ignore[arg-type]
+    after, before = (SimpleNamespace(name="fin_lag", evidence=e) for e in (71.0, 0.0))
+    assert asked.pays(after, before) is expected  # type: ignore[arg-type]
+
+
 def test_what_moves_few_windows_moves_the_median_one_not_at_all():
     """A load that is picked up shortly before the end of each run."""
     model = GreyBox(small_vehicle())

@@ -60,10 +60,11 @@ def test_sums_about_the_same_fit_are_worked_out_once_and_stay_at_home(fitted, mo
     monkeypatch.setattr(under_law, "force_sums", counted)
     judge = under_law.Judge(lay_out(first.fitted.model, []), windows, first.fitted.sigma, 0.5, None)
     sums = judge.sums(first)
-    # Another law is no other fit; other trajectories are, and another fit.
+    # Another law is no other fit; another fit is, and then other trajectories of it are.
     assert judge.sums(replace(first, under_law=first.fitted)) is sums and len(made) == 1
     about = torch.cat([windows.eta, windows.nu], dim=-1)
-    for other in (replace(first, around=about), replace(first, fitted=replace(first.fitted))):
+    again = replace(first, fitted=replace(first.fitted))
+    for other in (again, replace(again, around=about)):
         assert judge.sums(other) is not sums
     assert len(made) == 3 and len(judge.last) == 1
     assert pickle.loads(pickle.dumps(judge)).last == [] and len(judge.last) == 1
