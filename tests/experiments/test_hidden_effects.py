@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from auvnn.studies.benchmark import summarise
+from auvnn.studies.benchmark.counts import counting
 
 HERE = Path(__file__).resolve().parents[2] / "experiments" / "hidden_effects"
 
@@ -78,6 +79,19 @@ def test_fresh_logs_of_nothing_are_as_the_text_says():
     assert len({r["seed"] for r in rows}) == len(rows) == 200
     assert sum(bool(r["missing"]) for r in rows) == 200 - adequate
     assert f"{adequate} of 200 adequate" in (HERE / "README.md").read_text()
+
+
+def test_fresh_pairs_and_strangers_are_as_the_text_says():
+    rows, text = rows_of("rows-fresh.jsonl"), (HERE / "README.md").read_text()
+    pairs = [r for r in rows if r["part"] == "pairs"]
+    strangers = [r for r in rows if r["part"] == "strangers"]
+    assert len({(r["seed"], r["hidden"], r["size"]) for r in rows}) == len(rows) == 88
+    shown, both = (sum(count(r) for r in pairs) for count in (counting.all_shown_named, counting.all_named))
+    assert f"is named in {shown} of {len(pairs)} " in text and f"both names in {both}, no false name" in text
+    assert not any(counting.false_names(r) for r in pairs)
+    unknown = [r for r in strangers if r["verdict"] == "unknown"]
+    assert f"the strangers {len(unknown)} of {len(strangers)} are `unknown`" in text
+    assert all(r["missing"] == ["cg_offset"] for r in strangers if r["verdict"] != "unknown")
 
 
 def test_logs_run_again_have_the_answers_that_the_text_says():
