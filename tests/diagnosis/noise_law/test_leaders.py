@@ -102,8 +102,8 @@ def test_what_led_alone_is_fitted_beside_a_name_whatever_its_test_promises(monke
 def test_what_was_fitted_beside_an_explanation_gains_what_its_fit_does():
     here, elsewhere = SimpleNamespace(evidence=100.0), SimpleNamespace(evidence=100.0)
     fits: Any = LeaderFits(None, None, print)  # type: ignore[arg-type]
-    fits.known[id(here), "waves"] = here, SimpleNamespace(evidence=97.0)
-    fits.known[id(here), "tether"] = here, SimpleNamespace(evidence=112.0)
+    fits.known[id(here), "waves"] = here, SimpleNamespace(name="waves", evidence=97.0)
+    fits.known[id(here), "tether"] = here, SimpleNamespace(name="tether", evidence=112.0)
     fits.known[id(here), "payload"] = here, None
-    fits.known[id(elsewhere), "flooding"] = elsewhere, SimpleNamespace(evidence=500.0)
+    fits.known[id(elsewhere), "flooding"] = elsewhere, SimpleNamespace(name="flooding", evidence=500.0)
     assert fits.gains(here) == {"waves": -3.0, "tether": 12.0}

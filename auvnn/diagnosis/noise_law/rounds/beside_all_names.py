@@ -29,6 +29,7 @@ from auvnn.diagnosis.noise_law.hypothesis import Hypothesis, predicts_better
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
 from auvnn.diagnosis.noise_law.rounds.leaders import RIVALS
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import RIVALS_SHARE
+from auvnn.diagnosis.noise_law.rounds.path import with_last
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.diagnosis.selection.rivals import Rivals
 from auvnn.effects import effect_class
@@ -119,19 +120,8 @@ def costs_little(
     names = list(names)
     without = zip(names, refit([(name, None) for name in names]), strict=True)
     little = [(n, h) for n, h in without if h is not None and current.evidence - h.evidence < MUCH]
-    spare = [(n, h) for n, h in little if not pays(with_last(current, n), h)]
+    spare = [(n, h) for n, h in little if not pays(replace(current, explanation=with_last(current, n)), h)]
     return max(spare, key=lambda found: found[1].evidence, default=None)
-
-
-def with_last(current: Hypothesis, name: str) -> Hypothesis:
-    """Return the same explanation, one of its effects last.
-
-    Args:
-        current: the explanation.
-        name: of the effect.
-    """
-    effects = (*[e for e in current.explanation.effects if e != name], name)
-    return replace(current, explanation=replace(current.explanation, effects=effects))
 
 
 def rivals_among(known: Sequence[Hypothesis], null: Hypothesis) -> Rivals:

@@ -120,11 +120,10 @@ class LeaderFits:
 
     def _beside(self, at: Round) -> list[Hypothesis]:
         """Return what was fitted beside an explanation, now and by an earlier search, the most evident first."""
-        return _by_evidence(
-            h
-            for (where, name), (_, h) in self.known.items()
-            if where == id(at.current) and h is not None and name in at.tested.scores
-        )
+        return _by_evidence(h for h in self._fitted_beside(at.current) if h.name in at.tested.scores)
+
+    def _fitted_beside(self, current: Hypothesis) -> list[Hypothesis]:
+        return [h for (where, _), (_, h) in self.known.items() if where == id(current) and h is not None]
 
     def gains(self, current: Hypothesis) -> dict[str, float]:
         """Return what each effect that was fitted beside an explanation gains there, in the logarithm of the odds.
@@ -132,11 +131,7 @@ class LeaderFits:
         Args:
             current: the explanation.
         """
-        return {
-            name: h.evidence - current.evidence
-            for (where, name), (_, h) in self.known.items()
-            if where == id(current) and h is not None
-        }
+        return {h.name: h.evidence - current.evidence for h in self._fitted_beside(current)}
 
     def take(self, current: Hypothesis, found: Hypothesis) -> None:
         """Keep a fit that another search made, where it is likelier than what was fitted here.

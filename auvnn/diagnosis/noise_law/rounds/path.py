@@ -76,7 +76,7 @@ class Path:
             other: the explanation with the rival, which came last, in its place.
             tied: whether the log cannot tell the two apart.
         """
-        before = replace(self.current.explanation, effects=_last(self.current, name))
+        before = with_last(self.current, name)
         known = next((g[1:] for g in self.groups if g[0].effects[-1] == name), [])
         members = [e for e in known if e.effects[-1] != other.name]
         self.groups = [g for g in self.groups if g[0].effects[-1] != name]
@@ -97,7 +97,7 @@ class Path:
         """
         group = next((g for g in self.groups if g[0].effects[-1] == name), None)
         if group is None:
-            group = [replace(self.current.explanation, effects=_last(self.current, name))]
+            group = [with_last(self.current, name)]
             self.groups.append(group)
         group.append(other.explanation)
         self._step(name, [e.effects[-1] for e in group])
@@ -123,6 +123,12 @@ class Path:
         self.steps[at] = {**self.steps[at], "verdict": verdict, "effects": names}
 
 
-def _last(current: Hypothesis, name: str) -> tuple[str, ...]:
-    """Return the effects of an explanation, one of them last."""
-    return (*[e for e in current.explanation.effects if e != name], name)
+def with_last(current: Hypothesis, name: str) -> FittedHypothesis:
+    """Return the same explanation, one of its effects last.
+
+    Args:
+        current: the explanation.
+        name: of the effect.
+    """
+    effects = (*[e for e in current.explanation.effects if e != name], name)
+    return replace(current.explanation, effects=effects)

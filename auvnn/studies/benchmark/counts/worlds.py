@@ -52,8 +52,7 @@ def stripped(row: Row) -> dict[str, Any]:
         out["verdict"] = stay[0]["verdict"] if stay else "adequate"
         if row["verdict"] == "ambiguous" and not out["missing"]:
             # What is missing are the members of the first group. Where all of them are true, the next step comes first.
-            stays = [s["effects"] for s in counting.standing(out) if s["effects"]]
-            out["missing"] = list(stays[0]) if stays else []
+            out["missing"] = list(stay[0]["effects"]) if stay else []
     return out
 
 
