@@ -43,6 +43,10 @@ SAMPLES = {
 }
 
 
+# Logs of the plan on which rules are made, with seeds that no rule has seen.
+MADE = "rows-made.jsonl"
+
+
 def rows_of(name):
     return [json.loads(line) for line in (HERE / name).read_text().splitlines()]
 
@@ -56,7 +60,30 @@ def test_the_rows_are_logs_of_the_plan(name):
     assert {*done} <= {*sample} and len({*done}) == len(rows)
 
 
-@pytest.mark.parametrize("name", SAMPLES)
+def test_the_fresh_rows_are_logs_of_the_plan_on_which_rules_are_made():
+    options, _ = of_plan("worlds_made")
+    parts = ["disturbed", "disturbed_nothing", "shaped"]
+    fresh = cases({**options, "shift": 14000000, "only": parts})
+    done = [Case.of_row(r) for r in rows_of(MADE)]
+    assert {*done} <= {*fresh} and len({*done}) == len(done)
+    assert {c for c in fresh if c.part.startswith("disturbed")} <= {*done}, "of disturbed all are kept"
+    of_shaped = [c for c in fresh if c.part == "shaped"]
+    assert {c for c in done if c.part == "shaped"} == {*of_shaped[:20]}, (
+        "of shaped the first ones, none picked"
+    )
+
+
+def test_the_fresh_logs_of_each_world_give_what_is_told():
+    text = (HERE / "README.md").read_text()
+    for world, said in (("disturbed", ("20 of 21", "1 of 39")), ("shaped", ("9 of 17", "3 of 20"))):
+        rows = [r for r in rows_of(MADE) if r["part"] in (world, f"{world}_nothing")]
+        seen = [r for r in rows if r["kind"] == "effect" and worlds.visible(r)]
+        named = f"{sum(map(worlds.right, seen))} of {len(seen)}"
+        wrong = f"{sum(map(worlds.wrong_first, rows))} of {len(rows)}"
+        assert (named, wrong) == said and f"{named} (" in text and f"{wrong} logs" in text
+
+
+@pytest.mark.parametrize("name", [*SAMPLES, MADE])
 def test_the_rows_give_what_is_told(name):
     rows = rows_of(name)
     expected = json.loads((HERE / "expected.json").read_text())[name]
