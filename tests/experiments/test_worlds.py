@@ -40,6 +40,7 @@ SAMPLES = {
     "rows-20.jsonl": 19,
     "rows-21.jsonl": 20,
     "rows-22.jsonl": 21,
+    "rows-23.jsonl": 22,
 }
 
 
