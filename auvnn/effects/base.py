@@ -39,8 +39,7 @@ class Effect(nn.Module):
     tell them apart: a current that is the same at all depths, where the depth hardly changes. The effect is then
     given as one of a group, never alone.
 
-    `remembers` says that `command` depends on earlier commands through one state per command; `follow` and `advance`
-    then state the same in continuous time and for one held command.
+    `remembers`: `command` depends on earlier commands through one state each, as `follow` and `advance` say again.
     """
 
     name: ClassVar[str]
@@ -288,6 +287,10 @@ class Effect(nn.Module):
     def wrench(self, moment: Moment, body: Body) -> Tensor:
         """Return a further wrench on the body, N and N m, about the body origin, (..., 6)."""
         return torch.zeros_like(moment.nu)
+
+    def onward(self, moment: Moment) -> Moment:
+        """Return the moment for the `wrench` of effects after this one; those on fins change it."""
+        return moment
 
     def sense(self, sensed: Sensed) -> Sensed:
         """Turn what is into what the sensors report."""

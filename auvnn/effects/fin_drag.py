@@ -9,7 +9,7 @@ from torch import Tensor
 
 from auvnn.effects.base import Body, Moment, Parameter
 from auvnn.effects.fin_parts import FinEffect
-from auvnn.physics.fins import lift_coefficient
+from auvnn.physics.fins import SHARPNESS, lift_coefficient
 from auvnn.physics.products import matvec
 
 
@@ -17,7 +17,8 @@ class FinDrag(FinEffect):
     """Drag of every fin against its own flow: D = 1/2 rho A (C_D0 + k C_L(alpha)^2) |V| V.
 
     The first part acts at every angle, the second, induced by the lift, when the fins are turned: a vehicle that steers
-    hard is slower. V is the velocity of the fin's centre through the water, across its axis.
+    hard is slower. V is the velocity of the fin's centre through the water, across its axis; C_L has the stall and the
+    angles of the effects before this one in the model, and not their factors: a wake takes from the lift alone.
     Reference: Hoerner (1965), Fluid-Dynamic Drag, chapters 6 and 7; k = 1 / (pi e AR).
     """
 
@@ -49,8 +50,9 @@ class FinDrag(FinEffect):
         along, across = flow[..., 0], flow[..., 1]
         speed = torch.sqrt(along * along + across * across + 1e-30)
         inflow = torch.atan2(across, torch.where(speed > 1e-12, along, 1.0))
-        attack = torch.remainder(self.angles(moment) - inflow + 0.5 * torch.pi, torch.pi) - 0.5 * torch.pi
-        lift = lift_coefficient(attack, slope, stall)
+        now = self.now(moment)
+        attack = torch.remainder(now.angles - inflow + 0.5 * torch.pi, torch.pi) - 0.5 * torch.pi
+        lift = lift_coefficient(attack, slope, stall * now.stall, SHARPNESS * now.sharpness, now.separated)
         zero_lift, induced = self.theta.to(moment.nu).unbind(-1)
         size = 0.5 * density * area * (zero_lift + induced * lift * lift) * speed
         return matvec(rows.mT, (-size.unsqueeze(-1) * flow).flatten(-2))

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import torch
 from torch import Tensor
 
 from auvnn.effects.base import Body, Moment, Parameter
-from auvnn.effects.fin_parts import FinEffect, fin_names
+from auvnn.effects.fin_parts import LiftEffect, fin_names
+from auvnn.effects.hooks import FinLift
 
 
-class FinGain(FinEffect):
+class FinGain(LiftEffect):
     """One factor per fin on its lift: F <- k F, at every angle and in every flow.
 
     A fin that is smaller or larger than stated, in the hull's wake, or broken off (k = 0).
@@ -33,8 +35,13 @@ class FinGain(FinEffect):
         """Return one factor per fin."""
         return tuple(Parameter(n, "1", 1.0, 0.2, -2.0, 5.0) for n in fin_names(vehicle))
 
+    def changed(self, lift: FinLift) -> FinLift:
+        """Return the lift with each fin's factor."""
+        return replace(lift, share=lift.share * self.theta.to(lift.angles))
+
     def wrench(self, moment: Moment, body: Body) -> Tensor:
-        """Return what the lift with the factors has more than the stated one."""
+        """Return what the lift with the factors has more than without them."""
         if not self.present:
             return torch.zeros_like(moment.nu)
-        return self.lift(moment, self.angles(moment), self.theta.to(moment.nu) - 1.0)
+        now = self.now(moment)
+        return self.lift(moment, replace(now, share=now.share * (self.theta.to(moment.nu) - 1.0)))

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
-import torch
-from torch import Tensor
-
-from auvnn.effects.base import Body, Moment, Parameter
-from auvnn.effects.fin_parts import FinEffect, fin_names
+from auvnn.effects.base import Parameter
+from auvnn.effects.fin_parts import LiftEffect, fin_names
+from auvnn.effects.hooks import FinLift
 
 
-class FinOffset(FinEffect):
+class FinOffset(LiftEffect):
     """One angle per fin that is added to the commanded one: a linkage that was set wrong, or a bent fin.
 
     In proportion to the dynamic pressure, which tells it from a constant moment.
@@ -31,9 +30,6 @@ class FinOffset(FinEffect):
         """Return one angle per fin; two or three degrees are plausible."""
         return tuple(Parameter(n, "rad", 0.0, 0.05, -0.5, 0.5) for n in fin_names(vehicle))
 
-    def wrench(self, moment: Moment, body: Body) -> Tensor:
-        """Return the lift at the true angles less that at the stated ones."""
-        if not self.present:
-            return torch.zeros_like(moment.nu)
-        angles = self.angles(moment)
-        return self.lift(moment, angles + self.theta.to(moment.nu)) - self.lift(moment, angles)
+    def changed(self, lift: FinLift) -> FinLift:
+        """Return the lift at the true angles."""
+        return replace(lift, angles=lift.angles + self.theta.to(lift.angles))

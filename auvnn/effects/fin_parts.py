@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect, Moment
-from auvnn.physics.fins import fin_frame, fin_wrench
+from auvnn.effects.base import Body, Effect, Moment
+from auvnn.effects.hooks import FinLift
+from auvnn.physics.fins import SHARPNESS, fin_frame, fin_wrench
 
 
 def fin_names(vehicle: Any) -> tuple[str, ...]:
@@ -18,7 +20,7 @@ def fin_names(vehicle: Any) -> tuple[str, ...]:
 
 
 class FinEffect(Effect):
-    """An effect on fins: the difference that it makes to their wrench."""
+    """An effect on fins."""
 
     channels = ("fin_1",)
 
@@ -40,26 +42,55 @@ class FinEffect(Effect):
             self.keep(name, [float(getattr(f, name)) for f in vehicle.fins])
         self.keep("density", vehicle.water_density)
 
-    def angles(self, moment: Moment) -> Tensor:
-        """Return the fin angles of the log, rad, (..., m); zero where it has none."""
+    def now(self, moment: Moment) -> FinLift:
+        """Return how the fins lift with the effects before this one; their angles are zero where the log has none."""
+        if moment.fin_lift is not None:
+            return moment.fin_lift
         if moment.fins is None:
-            return torch.zeros_like(self.kept("stall").to(moment.nu))
-        return moment.fins.to(moment.nu)
+            return FinLift(torch.zeros_like(self.kept("stall").to(moment.nu)))
+        return FinLift(moment.fins.to(moment.nu))
 
-    def lift(
-        self, moment: Moment, angles: Tensor, share: Tensor | float = 1.0, stall: Tensor | None = None
-    ) -> Tensor:
-        """Return the lift's wrench at fin angles, each fin's by its share, (..., 6).
+
+class LiftEffect(FinEffect):
+    """An effect on the fins' lift: the difference that it makes to their wrench, after the effects on fins before it.
+
+    Factors, angles and stall act together in one lift: a fin in the hull's wake that stalls late has the share of the
+    lift with the late stall.
+    """
+
+    def changed(self, lift: FinLift) -> FinLift:
+        """Return how the fins lift with this effect."""
+        return lift
+
+    def onward(self, moment: Moment) -> Moment:
+        """Return the moment in which the fins lift as they do with this effect."""
+        return replace(moment, fin_lift=self.changed(self.now(moment))) if self.present else moment
+
+    def lift(self, moment: Moment, lift: FinLift) -> Tensor:
+        """Return the wrench of the fins' lift, (..., 6).
 
         Args:
             moment: state and water at the fins.
-            angles: of the fins, rad, (..., m).
-            share: of each fin's area that lifts, broadcast to (..., m).
-            stall: angle at which each fin stalls, rad, (m,); as stated by default.
+            lift: how they lift.
         """
-        frame, area, slope, stated, density = (
+        frame, area, slope, stall, density = (
             self.kept(n).to(moment.nu) for n in ("frame", "area", "lift_slope", "stall", "density")
         )
         return fin_wrench(
-            moment.nu_r, angles, frame, share * area, slope, stated if stall is None else stall, density
+            moment.nu_r,
+            lift.angles,
+            frame,
+            lift.share * area,
+            slope,
+            stall * lift.stall,
+            density,
+            SHARPNESS * lift.sharpness,
+            lift.separated,
         )
+
+    def wrench(self, moment: Moment, body: Body) -> Tensor:
+        """Return the lift with the effect less the lift without it."""
+        if not self.present:
+            return torch.zeros_like(moment.nu)
+        now = self.now(moment)
+        return self.lift(moment, self.changed(now)) - self.lift(moment, now)

@@ -1,39 +1,51 @@
-"""Fins that stall earlier or later than the model says."""
+"""Fins that stall at another angle, or in another way, than the model says."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
-import torch
-from torch import Tensor
-
-from auvnn.effects.base import Body, Moment, Parameter
-from auvnn.effects.fin_parts import FinEffect
+from auvnn.effects.base import Parameter
+from auvnn.effects.fin_parts import LiftEffect
+from auvnn.effects.hooks import FinLift
 
 
-class FinStall(FinEffect):
-    """Factor on the angle at which all fins stall; the wrench is the difference that it makes.
+class FinStall(LiftEffect):
+    """Another stall of all fins: its angle, how abruptly it comes, and the lift that is left beyond it.
 
-    Reference: Beard and McLain (2012), section 4.2, for the lift beyond the stall.
+    C_L = (1 - s) c_La alpha + s c_s 2 sin(alpha) |sin(alpha)| cos(alpha)
+    1 - s = (1 + exp(-f_k k)) / (1 + exp(f_k k (|alpha| / (f alpha_0) - 1)))
+
+    The factors f, f_k and c_s are 1 in the model. The lift beyond the stall is that of a long flat plate, whose
+    normal force is 2 sin(alpha)^2; a square one has 1.17 broadside instead of 2 (Hoerner 1965, chapter 3), which
+    is c_s = 0.59. Thick profiles and fins of small aspect ratio stall gently, thin ones abruptly. The wrench is the
+    difference that all this makes.
+    Reference: Beard and McLain (2012), section 4.2, for the lift beyond the stall and the transition.
     """
 
     name = "fin_stall"
-    cause = "the fins stall at another angle"
+    cause = "the fins stall at another angle or in another way"
     symbol = "alpha_0"
     reference = "Beard and McLain (2012), Small Unmanned Aircraft, section 4.2"
-    confused_with = ("body_lift",)
+    confused_with = ("fin_gain",)
     manoeuvre = "survey"
     told_apart_by = "large fin angles at constant speed"
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
-        """Return the factor."""
-        return (Parameter("factor", "1", 1.0, 0.3, 0.2, 4.0),)
+        """Return the factors on the stall angle, on the lift of the separated flow and on the sharpness."""
+        return (
+            Parameter("factor", "1", 1.0, 0.3, 0.2, 4.0),
+            Parameter("separated", "1", 1.0, 0.4, 0.0, 3.0),
+            Parameter("sharpness", "1", 1.0, 0.4, 0.1, 4.0),
+        )
 
-    def wrench(self, moment: Moment, body: Body) -> Tensor:
-        """Return the lift with the other stall less the lift with the stated one."""
-        if not self.present:
-            return torch.zeros_like(moment.nu)
-        angles = self.angles(moment)
-        later = self.kept("stall").to(moment.nu) * self.theta[0].to(moment.nu)
-        return self.lift(moment, angles, stall=later) - self.lift(moment, angles)
+    def changed(self, lift: FinLift) -> FinLift:
+        """Return the lift with the other stall."""
+        factor, separated, sharpness = self.theta.to(lift.angles).unbind(-1)
+        return replace(
+            lift,
+            stall=lift.stall * factor,
+            sharpness=lift.sharpness * sharpness,
+            separated=lift.separated * separated,
+        )

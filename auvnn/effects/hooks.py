@@ -131,6 +131,25 @@ class Body:
 
 
 @dataclass(frozen=True)
+class FinLift:
+    """How the fins lift: what effects on fins change, each after the other.
+
+    Attributes:
+        angles: of the fins, rad, (..., m).
+        share: of each fin's area that lifts, broadcast to (..., m).
+        stall: factor on the angles at which the fins stall.
+        sharpness: factor on how abruptly they do.
+        separated: factor on the lift of the separated flow.
+    """
+
+    angles: Tensor
+    share: Tensor | float = 1.0
+    stall: Tensor | float = 1.0
+    sharpness: Tensor | float = 1.0
+    separated: Tensor | float = 1.0
+
+
+@dataclass(frozen=True)
 class Moment:
     """What a hook may know of the moment: state and inputs, (..., size) in SI, NED and FRD.
 
@@ -148,6 +167,7 @@ class Moment:
         thrust: what the actuators give, N (or the wrench, where it is commanded), (..., n); in `wrench` only.
         drag: everything that resists motion through the water, damping subnetworks included, as a wrench on
             the body, N and N m, (..., 6); in `wrench` only.
+        fin_lift: how the fins lift with the effects before this one; None as stated. In `wrench` only.
     """
 
     time: Tensor
@@ -162,6 +182,7 @@ class Moment:
     altitude: Tensor | None = None
     thrust: Tensor | None = None
     drag: Tensor | None = None
+    fin_lift: FinLift | None = None
 
 
 @dataclass(frozen=True)

@@ -290,6 +290,7 @@ class EquationsOfMotion(Sensors):
             moment = replace(moment, thrust=thrust, drag=sum(drag, torch.zeros_like(nu)))
         for effect in self.using("wrench"):
             terms[str(effect.name)] = effect.wrench(moment, body)
+            moment = effect.onward(moment)
         return self._with_learned(terms, prepared, nu, rotation), prepared
 
     def _with_learned(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import torch
+from torch import Tensor
 
 from auvnn.physics.products import ProductTable, cross, matvec, per_vector
 from auvnn.shapes import FinFrame, Number, PerPart, Scalar, Vectors3, Velocity, Wrench
@@ -37,25 +38,35 @@ def fin_frame(position: Vectors3, axis: Vectors3) -> FinFrame:
     return torch.cat((plane.expand_as(moment), moment), -1)
 
 
-def lift_coefficient(angle: Scalar, lift_slope: Scalar, stall: Scalar) -> Scalar:
+def lift_coefficient(
+    angle: Scalar,
+    lift_slope: Scalar,
+    stall: Scalar,
+    sharpness: Tensor | float = SHARPNESS,
+    separated: Tensor | float = 1.0,
+) -> Scalar:
     """Return the lift coefficient: attached flow blended smoothly into that of a flat plate.
 
-    C_L = (1 - s) c_La alpha + s 2 sin(alpha) |sin(alpha)| cos(alpha)
-    1 - s = 1 / (1 + exp(k (|alpha| - alpha_0))) with k = 12 / alpha_0
+    C_L = (1 - s) c_La alpha + s c_s 2 sin(alpha) |sin(alpha)| cos(alpha)
+    1 - s = (1 + exp(-k)) / (1 + exp(k (|alpha| / alpha_0 - 1))) with k = 12, c_s = 1
 
-    The lift peaks a little before alpha_0, falls to the plate's and vanishes at +-pi/2.
+    The lift peaks a little before alpha_0, falls to the plate's and vanishes at +-pi/2. The slope at zero is c_La,
+    however gentle the transition.
 
     Args:
         angle: angle of attack alpha, rad, within +-pi/2 (...).
         lift_slope: c_La, 1/rad (...).
         stall: angle alpha_0 in the middle of the transition, rad, positive (...).
+        sharpness: k, alpha_0 over the width of the transition.
+        separated: c_s, share of the normal force of a long flat plate, 2 sin(alpha)^2, that the separated flow has.
 
     Returns:
         (...), with a continuous slope. After Beard and McLain 2012, Small Unmanned Aircraft, section 4.2.
     """
-    attached = torch.sigmoid(SHARPNESS - (SHARPNESS / stall) * angle.abs())
+    at_zero = 1.0 + (torch.exp(-sharpness) if isinstance(sharpness, Tensor) else math.exp(-sharpness))
+    attached = at_zero * torch.sigmoid(sharpness - (sharpness / stall) * angle.abs())
     sine = torch.sin(angle)
-    plate = 2.0 * sine * sine.abs() * torch.cos(angle)
+    plate = 2.0 * separated * sine * sine.abs() * torch.cos(angle)
     return plate + attached * (lift_slope * angle - plate)
 
 
@@ -67,6 +78,8 @@ def fin_wrench(
     lift_slope: PerPart,
     stall: PerPart,
     density: Number,
+    sharpness: Tensor | float = SHARPNESS,
+    separated: Tensor | float = 1.0,
 ) -> Wrench:
     """Return the wrench of fins whose geometry is already in ``frame`` (see ``fin_frame``, ``fin_force``).
 
@@ -78,6 +91,8 @@ def fin_wrench(
         lift_slope: 1/rad, (..., n).
         stall: angle in the middle of the transition, rad, (..., n).
         density: of the water, kg/m3.
+        sharpness: of the transition, see `lift_coefficient`.
+        separated: share of a long flat plate's normal force that the separated flow has.
     """
     rows = matvec(frame.flatten(-3, -2), nu_r)
     flow = rows.unflatten(-1, (-1, 2))
@@ -87,7 +102,8 @@ def fin_wrench(
     inflow = torch.atan2(across, torch.where(speed > 0.0, along, 1.0))
     # A fin is taken as symmetric fore and aft: its angle to the flow counts modulo pi.
     attack = torch.remainder(angle - inflow + 0.5 * math.pi, math.pi) - 0.5 * math.pi
-    size = 0.5 * per_vector(density) * area * lift_coefficient(attack, lift_slope, stall) * speed
+    coefficient = lift_coefficient(attack, lift_slope, stall, sharpness, separated)
+    size = 0.5 * per_vector(density) * area * coefficient * speed
     lift = torch.stack((-size * across, size * along), -1)
     return matvec(frame.flatten(-3, -2).mT, lift.flatten(-2))
 

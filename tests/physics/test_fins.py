@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import torch
+from scipy.optimize import least_squares
 
 from auvnn.physics.fins import fin_force, fin_frame, fin_wrench, lift_coefficient
 
@@ -112,6 +113,41 @@ def test_stall_is_smooth_and_bounded(stall):
     far = angle.abs() > 2.0 * stall
     torch.testing.assert_close(lift[far], plate[far], rtol=0, atol=1e-4)
     assert lift[[0, -1]].abs().max() < 1e-9
+
+
+@pytest.mark.parametrize("sharpness", [1.5, 3.0, 30.0])
+@pytest.mark.parametrize("separated", [0.0, 0.59, 1.0])
+def test_another_stall(sharpness, separated):
+    """Whatever the stall: c_La is the slope at no angle, half of the lift is attached at alpha_0, a plate's is beyond."""
+
+    def lift(angle):
+        numbers = map(tensor, (angle, SLOPE, STALL, sharpness, separated))
+        return float(lift_coefficient(*numbers))
+
+    assert lift(1e-7) / 1e-7 == pytest.approx(SLOPE, rel=1e-5)
+    attached = 0.5 * (1.0 + math.exp(-sharpness))
+    plate = separated * 2.0 * math.sin(STALL) ** 2 * math.cos(STALL)
+    assert lift(STALL) == pytest.approx(attached * SLOPE * STALL + (1.0 - attached) * plate)
+    if sharpness == 30.0:
+        # The plate has the normal force c_s 2 sin(alpha)^2, of which the lift is the part across the flow.
+        across = separated * 2.0 * math.sin(1.2) ** 2
+        assert lift(1.2) == pytest.approx(across * math.cos(1.2), abs=1e-9)
+    left = SLOPE * math.pi * math.exp(sharpness * (1.0 - math.pi / 2 / STALL))
+    assert lift(math.pi / 2) == pytest.approx(0.0, abs=left + 1e-12)
+
+
+def test_a_gentle_stall_is_within_reach():
+    """Of c_La a cos(a) / sqrt(1 + (a / a_0)^4), the independent plant's gentle stall, a twentieth of the peak is left."""
+    angle = np.linspace(0.0, math.pi / 2, 400)
+    gentle = SLOPE * angle * np.cos(angle) / np.sqrt(1.0 + (angle / STALL) ** 4)
+
+    def off(p):
+        numbers = map(tensor, (angle.tolist(), SLOPE, STALL * p[0], 12.0 * p[1], p[2]))
+        return lift_coefficient(*numbers).numpy() - gentle
+
+    left = least_squares(off, (1.0, 1.0, 1.0), bounds=([0.2, 0.1, 0.0], [4.0, 4.0, 3.0])).fun
+    assert np.sqrt(np.mean(left**2)) < 0.05 * gentle.max()
+    assert np.sqrt(np.mean(off((1.0, 1.0, 1.0)) ** 2)) > 0.7 * gentle.max()
 
 
 def test_force_passes_through_cross_flow_without_a_jump():

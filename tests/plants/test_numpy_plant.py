@@ -65,6 +65,8 @@ def nominal(vehicle):
         ("rov95", ("bottom_proximity", "surface_proximity", "biofouling", "ocean_current", "quadratic_damping")),
         ("remus100", ("cg_offset", "payload", "net_buoyancy", "compressibility", "coupled_damping", "ocean_current")),
         ("remus100", ("fin_stall", "body_lift", "turning_forces", "flooding", "trapped_water", "linear_damping")),
+        ("remus100", ("fin_stall", "fin_gain", "fin_offset", "fin_drag", "fin_lag")),
+        ("remus100", ("fin_gain", "fin_offset", "fin_stall")),
         ("rov95", ("cg_offset", "trapped_water", "payload")),
         ("rov95", ("gyro_bias", "velocity_lever_arm", "velocity_scale", "velocity_misalignment", "tilted_vertical",
                    "accelerometer_tilt")),

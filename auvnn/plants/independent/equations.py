@@ -73,9 +73,7 @@ class Equations(Forces):
         self.fins = None
         self.servos = Servos(effects.get("fin_lag", {}).get("time_constant", 0.0))
         if vehicle.fins:
-            self.fins = Fins(
-                vehicle, effects.get("fin_stall", {}).get("factor", 1.0), laws.separation, effects
-            )
+            self.fins = Fins(vehicle, laws.separation, effects)
         self.moves = any(n in effects for n in ("ocean_current", "current_shear", "waves"))
         # Share of the ideal forces of the water's inertia that acts on a body that moves steadily.
         self.gyration = laws.added_coriolis * effects.get("added_mass_coriolis", {}).get("factor", 1.0)

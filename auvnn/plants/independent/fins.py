@@ -18,19 +18,18 @@ class Fins:
 
     The chord turns with the fin's angle; the angle of attack is that from the flow in the fin's plane to the
     chord, taken within a right angle because the profile is the same fore and aft. The lift coefficient blends
-    from c_La alpha into a flat plate's 2 sin|sin| cos about the stall angle, over a twelfth of it.
+    from c_La alpha into a flat plate's 2 sin|sin| cos about the stall angle, over a twelfth of it, by a logistic
+    function that is one at no angle of attack.
 
     Args:
         vehicle: whose fins.
-        factor: on all stall angles.
         separation: share of the lift that is c_La a cos(a) / sqrt(1 + (a / a_0)^4) instead: it stalls gently.
-        effects: on the fins: their gain, offset and drag.
+        effects: on the fins: their gain, offset, drag and stall.
     """
 
     def __init__(
         self,
         vehicle: Vehicle,
-        factor: float = 1.0,
         separation: float = 0.0,
         effects: Mapping[str, Mapping[str, float]] | None = None,
     ) -> None:
@@ -41,13 +40,16 @@ class Fins:
         self.offset = np.array([given.get("fin_offset", {}).get(n, 0.0) for n in names])
         drag = given.get("fin_drag", {})
         self.zero_lift, self.induced = drag.get("zero_lift", 0.0), drag.get("induced", 0.0)
+        stall = given.get("fin_stall", {})
+        self.width = 12.0 * stall.get("sharpness", 1.0)
+        self.plate = 2.0 * stall.get("separated", 1.0)
         self.separation = separation
         fins = vehicle.fins
         self.place, self.axis = np.array([f.position for f in fins]), np.array([f.axis for f in fins])
         self.size = 0.5 * vehicle.water_density * np.array([f.area for f in fins])
         self.slope, self.stall = (
             np.array([f.lift_slope for f in fins]),
-            factor * np.array([f.stall for f in fins]),
+            stall.get("factor", 1.0) * np.array([f.stall for f in fins]),
         )
         ahead = np.array([1.0, 0.0, 0.0]) - self.axis[:, :1] * self.axis
         self.ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
@@ -71,9 +73,10 @@ class Fins:
         side, along = (axis * cross(local, chord)).sum(-1), (local * chord).sum(-1)
         # A chord that points backwards is the same profile the other way round.
         attack = np.arctan2(np.where(along < 0, -side, side), np.abs(along))
-        blend = 1.0 / (1.0 + np.exp(np.minimum(12.0 * (np.abs(attack) / self.stall - 1.0), 700.0)))
+        past = np.minimum(self.width * (np.abs(attack) / self.stall - 1.0), 700.0)
+        blend = (1.0 + np.exp(-self.width)) / (1.0 + np.exp(past))
         sine = np.sin(attack)
-        plate = 2.0 * np.sign(sine) * sine**2 * np.cos(attack)
+        plate = self.plate * np.sign(sine) * sine**2 * np.cos(attack)
         lift = blend * self.slope * attack + (1.0 - blend) * plate
         if self.separation:
             gentle = self.slope * attack * np.cos(attack) / np.sqrt(1.0 + (attack / self.stall) ** 4)
