@@ -332,7 +332,10 @@ def test_where_sensors_are_not_white_a_few_windows_do_not_decide_what_a_name_cos
     costly, by_chance = (-0.2, 0.3, True, 0.06), (-0.2, 0.3, False)
     for white, costs, expected in (
         (False, {"waves": costly}, ["waves"]),
+        # White: where the mean is surely worse it counts, and otherwise the median window may say so too.
         (True, {"waves": costly}, []),
+        (True, {"waves": (-0.2, 0.3, False, 0.06)}, ["waves"]),
+        (True, {"waves": (-0.2, 0.3, False, 0.04)}, []),
         (False, {"waves": (-0.2, 0.3, True, 0.04)}, []),
         (False, {"waves": by_chance, "tether": (0.2, 0.2)}, ["tether"]),
         (False, {"waves": (-0.2, 0.3, True), "tether": (0.2, 0.2)}, []),
