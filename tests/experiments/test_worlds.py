@@ -41,6 +41,7 @@ SAMPLES = {
     "rows-21.jsonl": 20,
     "rows-22.jsonl": 21,
     "rows-23.jsonl": 22,
+    "rows-24.jsonl": 23,
 }
 
 
