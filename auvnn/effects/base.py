@@ -39,7 +39,7 @@ class Effect(nn.Module):
     tell them apart: a current that is the same at all depths, where the depth hardly changes. The effect is then
     given as one of a group, never alone.
 
-    `remembers`: `command` depends on earlier commands through one state each, as `follow` and `advance` say again.
+    `remembers`: what `command` returns depends on earlier commands by one state per command: `follow`, `advance`.
     """
 
     name: ClassVar[str]

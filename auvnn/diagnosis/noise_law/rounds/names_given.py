@@ -168,8 +168,8 @@ class NamesGiven:
             cost = cost_of_name(self.layout, h, current, self.log, self.scale, others_stay=h.name in clear)
             # Where the sensors are not what they should be, a few wrong starts may decide the error of all windows; and
             # wherever their differences do not say that the mean is worse, so may a few in which the vehicle tumbles.
-            sure_mean = self.white_noise and cost.worse
-            paid, moves = cost.error if sure_mean else cost.least, cost.moves
+            surely_worse = self.white_noise and cost.worse
+            paid, moves = cost.error if surely_worse else cost.least, cost.moves
             if h.name in most:
                 # A few windows in which a vehicle nearly loses its way make the error of all, and any name may catch it.
                 paid, moves = cost.typical, cost.moves_typically
