@@ -37,6 +37,7 @@ EFFECTS = Catalogue(
         "flooding": "auvnn.effects.flooding:Flooding",
         "thruster_gain": "auvnn.effects.thruster_gain:ThrusterGain",
         "thrust_asymmetry": "auvnn.effects.thrust_asymmetry:ThrustAsymmetry",
+        "thrust_curve": "auvnn.effects.thrust_curve:ThrustCurve",
         "thruster_deadband": "auvnn.effects.thruster_deadband:ThrusterDeadband",
         "thruster_lag": "auvnn.effects.thruster_lag:ThrusterLag",
         "thrust_overshoot": "auvnn.effects.thrust_overshoot:ThrustOvershoot",

@@ -21,25 +21,23 @@ EXACT = 1e-6
 class Effect(nn.Module):
     """A physical cause: an `nn.Module` whose parameters are physical, in SI units.
 
-    A member overrides the hooks that it touches and leaves the rest alone; a hook left alone costs
-    nothing. With every parameter at its null an effect must vanish exactly, so that "is it missing?"
-    is one question for all of them: how the residual changes with the parameters at the null.
+    A member overrides the hooks that it touches and leaves the rest alone; a hook left alone costs nothing. With every
+    parameter at its null an effect must vanish exactly, so that "is it missing?" is one question for all of them.
 
     Hooks, along the signal path:
         `command`: the commands of a whole stretch, before the thruster curves (dead band).
-        `delay`: by how much the thrust comes late; at most one effect has it.
-        `respond`, `steer`: dynamics between demanded and actual thrust (lag), or fin angles; at most one effect each.
+        `delay`, `respond`, `steer`: how late thrust comes, its lag, that of fin angles; at most one effect each.
         `thrust`: the thrust of each actuator (gain, voltage, loss by inflow).
         `water`: velocity and acceleration of the water, NED.
         `body`: mass, centres, inertia, added mass, buoyancy, damping coefficients.
         `wrench`: any further force and moment on the body.
         `sense`: what the sensors make of the state.
 
-    `plainer` names effects that explain the same trace more plainly wherever a log does not reach far enough to
-    tell them apart: a current that is the same at all depths, where the depth hardly changes. The effect is then
-    given as one of a group, never alone.
-
-    `remembers`: what `command` returns depends on earlier commands by one state per command: `follow`, `advance`.
+    `plainer` names effects that explain the same trace more plainly wherever a log does not reach far enough to tell
+    them apart: a current that is the same at all depths, where the depth hardly changes. The effect is then given as one
+    of a group, never alone. `contains`: plainer effects that it is at some values, each with the parameters they share.
+    `leaves`: effects that look like what its own form gets wrong. `remembers`: what `command` returns depends on earlier
+    commands by one state per command: `follow`, `advance`.
     """
 
     name: ClassVar[str]
@@ -48,17 +46,19 @@ class Effect(nn.Module):
     reference: ClassVar[str]
     channels: ClassVar[tuple[str, ...]] = ()
     excludes: ClassVar[tuple[str, ...]] = ()
-    # Parameters of shape in which what the effect does is linear while it is small: the place of a load.
+    # Parameters of shape in which what the effect does is linear while it is small, the place of a load; and parameters
+    # that act on these levers: what the others do is the same whatever the levers are.
     levers: ClassVar[tuple[str, ...]] = ()
-    # Parameters that act on these levers; what the others do is the same whatever the levers are.
     carried: ClassVar[tuple[str, ...]] = ()
     # For people: effects that leave a similar trace, and the manoeuvre (configs/excitation) that tells them apart.
     confused_with: ClassVar[tuple[str, ...]] = ()
     manoeuvre: ClassVar[str] = ""
     told_apart_by: ClassVar[str] = ""
     plainer: ClassVar[tuple[str, ...]] = ()
+    contains: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     time_varying: ClassVar[bool] = False
     remembers: ClassVar[bool] = False
+    leaves: ClassVar[tuple[str, ...]] = ()
 
     theta: nn.Parameter
     # Standard deviations by parameter, as they were stated or fitted; of what is not in it the default holds.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import torch
 from torch import Tensor
@@ -33,6 +33,7 @@ class ThrustOvershoot(Effect):
     manoeuvre = "pulses"
     told_apart_by = "steps from rest, held for several seconds"
     plainer = ("thruster_lag",)
+    contains: ClassVar = {"thruster_lag": ("time_constant",)}
     remembers = True
 
     @classmethod

@@ -38,7 +38,8 @@ def model(name):
     if name == "networks":
         return GreyBox(load("rov95").vehicle, (), trained_like())
     if name == "actuators":
-        return load("bluerov2").with_effects({**LAG, **LATE, **OVER, "thruster_deadband": {"width": 0.05}})
+        more = {"thruster_deadband": {"width": 0.05}, "thrust_curve": {"thruster_1_positive": 0.8}}
+        return load("bluerov2").with_effects({**LAG, **LATE, **OVER, **more})
     if name == "payload":
         held = {"time": 10.0, "mass": 2.0, "x": 0.2, "buoyancy": 5.0, "X": 1.3}
         return load("rov90").with_effects(

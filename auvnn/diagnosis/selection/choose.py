@@ -32,6 +32,8 @@ Array = NDArray[np.float64]
 ALPHA = 0.05
 # Explanations are refitted in full, nonlinearly, as long as their one-step evidence is within reach of the best.
 LEADERS, REACH, REACH_SHARE = 5, 30.0, 0.5
+# What takes up what earlier names get wrong explains less than such a share of what these explain in the mean.
+LITTLE = 0.5
 # Within this share of its plausible scale of its null, an effect does nothing.
 NOTHING = 1e-4
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -123,3 +123,13 @@ class ModelComparison:
 def confused(one: str, other: str) -> bool:
     """Whether the catalogue knows that one effect is confused with the other."""
     return other in effect_class(one).confused_with or one in effect_class(other).confused_with
+
+
+def left_by(name: str, earlier: Iterable[str]) -> bool:
+    """Whether the catalogue knows that an effect looks like what the form of an earlier one gets wrong.
+
+    Args:
+        name: the effect.
+        earlier: effects found before.
+    """
+    return any(name in effect_class(n).leaves for n in earlier)

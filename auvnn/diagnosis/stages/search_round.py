@@ -12,7 +12,8 @@ from auvnn.diagnosis.answers.table import candidate_table, fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.refine_step import refine_step
 from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
-from auvnn.diagnosis.selection.choose import ALPHA
+from auvnn.diagnosis.selection.choose import ALPHA, LITTLE
+from auvnn.diagnosis.selection.model_comparison import left_by
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.estimation.prediction_error import FitError
 from auvnn.metrics.windows import Windows
@@ -35,7 +36,8 @@ def fit_null(asked: Setting, windows: Windows) -> State:
 def search_round(asked: Setting, state: State) -> State:
     """Test all effects that remain, refit the leaders, take the one that explains best; see the module's text."""
     chosen, first = list(state.chosen), state.first
-    remaining = [n for n in asked.usable if n not in {*chosen, *state.withdrawn, *state.in_groups}]
+    # What could not be told from a name may be missing beside it: then it is no rival.
+    remaining = [n for n in asked.usable if n not in {*chosen, *state.withdrawn}]
     asked.say(f"testing {len(remaining)} effects at the null")
     base = [*asked.base, *[c for c in chosen if c not in asked.base]]
     tested = asked.tests(state.windows)(state.current, remaining, base, chosen, alike=not state.table)
@@ -52,6 +54,10 @@ def search_round(asked: Setting, state: State) -> State:
         return state.step(rest(asked, state.current), [], p_value).but(ended=True)
     chooser = asked.chooser(state.windows)
     choice = chooser.choose(tested.scores, tested.at, base, chosen, state.current)
+    passed = _what_others_leave(state, choice.best)
+    if passed:
+        others = {n: s for n, s in tested.scores.items() if n not in passed}
+        choice = chooser.choose(others, tested.at, base, chosen, state.current)
     state = state.but(failed={**state.failed, **choice.failed}, tried=(*state.tried, *choice.tried))
     if not chosen:
         for explanation in choice.tried:
@@ -60,21 +66,47 @@ def search_round(asked: Setting, state: State) -> State:
         verdict = "unknown" if p_value < ALPHA_UNKNOWN else rest(asked, state.current)
         return state.step(verdict, [], p_value).but(ended=True)
     new = [e for e in choice.best.effects if e not in chosen]
-    if choice.verdict == "ambiguous":
-        new = [e.effects[-1] for e in choice.rivals]
-        state = state.but(groups=(*state.groups, tuple(choice.rivals)))
-    state = state.step(choice.verdict, new, p_value)
+    alike = {e.effects[-1]: group[0].effects[-1] for group in state.groups for e in group[1:]}
+    for name in new:
+        state = state.apart(name)
+    verdict, rivals = choice.verdict, [e for e in choice.rivals if e.effects[-1] not in state.rivals]
+    if verdict == "ambiguous":
+        new = [e.effects[-1] for e in rivals]
+        verdict = "ambiguous" if len(rivals) > 1 else "named"
+        state = state.but(groups=(*state.groups, tuple(rivals)) if len(rivals) > 1 else state.groups)
+    state = state.step(verdict, new, p_value)
     current, gone = choice.best, []
     if chosen:
         current, gone = chooser.withdrawn(choice.best, asked.base)
     if gone:
         state, gone = state.without_groups(gone)
-        state = state.step("withdrawn", gone, p_value).but(withdrawn=(*state.withdrawn, *gone))
+        state = state.but(withdrawn=(*state.withdrawn, *gone))
+        for name, lead in ((n, alike[n]) for n in new if alike.get(n) in gone):
+            # It was the other one of those that could not be told apart.
+            state = state.instead(lead, name)
+            gone.remove(lead)
+        state = state.step("withdrawn", gone, p_value) if gone else state
     chosen = current.effects
     current, windows = _finer(asked, current, state.windows)
     tried = (*state.tried, current)
     path = (*state.path, current)
     return state.but(current=current, windows=windows, chosen=tuple(chosen), tried=tried, path=path)
+
+
+def _what_others_leave(state: State, further: FittedHypothesis | None) -> list[str]:
+    """Return further effects that explain little, and are known to look like what the form of an earlier one gets wrong.
+
+    Args:
+        state: with the names before them.
+        further: the explanation with them; None where there is none.
+    """
+    new = [] if further is None else [n for n in further.effects if n not in state.chosen]
+    left = [n for n in new if left_by(n, state.chosen)]
+    if further is None or not left:
+        return []
+    explanations = state.first, state.current, further
+    first, current, after = (e.squared_error(state.first.fitted.sigma) for e in explanations)
+    return left if current - after < LITTLE * (first - current) / len(state.chosen) else []
 
 
 def regroup(asked: Setting, state: State) -> State:

@@ -162,6 +162,40 @@ class State:
         leading = (standing or self.steps[-1:])[0]
         return leading["verdict"] in ("unknown", "partial") or self.steps[-1]["verdict"] == "unknown"
 
+    @property
+    def rivals(self) -> list[str]:
+        """The effects that the log cannot tell from names, without those that stand for the groups."""
+        return [e.effects[-1] for group in self.groups for e in group[1:]]
+
+    def apart(self, rival: str) -> State:
+        """Return the state with an effect that could not be told from a name as no rival of it: both are missing.
+
+        Args:
+            rival: the effect; the state stays as it is where it is none.
+        """
+        if rival not in self.rivals:
+            return self
+        leads = {g[0].effects[-1] for g in self.groups if any(e.effects[-1] == rival for e in g[1:])}
+        groups = [tuple(e for e in g if e is g[0] or e.effects[-1] != rival) for g in self.groups]
+        told: list[SearchStep] = []
+        for step in self.steps:
+            group = step["verdict"] == "ambiguous" and step["effects"][0] in leads
+            names = [n for n in step["effects"] if not group or n != rival]
+            alone = group and len(names) == 1
+            told.append({**step, "verdict": "named" if alone else step["verdict"], "effects": names})
+        return self.but(groups=tuple(g for g in groups if len(g) > 1), steps=tuple(told))
+
+    def instead(self, name: str, other: str) -> State:
+        """Return the state with the step of one effect in the place of another one's, which is no longer given.
+
+        Args:
+            name: that is not given any more.
+            other: whose step takes its place.
+        """
+        moved = next(s for s in reversed(self.steps) if s["effects"][:1] == [other])
+        left = [s for s in self.steps if s is not moved]
+        return self.but(steps=tuple(moved if s["effects"][:1] == [name] else s for s in left))
+
     def without_groups(self, names: list[str]) -> tuple[State, list[str]]:
         """Return the state without the groups for which some names stand, and these names with all members."""
         gone = [group for group in self.groups if group[0].effects[-1] in names]

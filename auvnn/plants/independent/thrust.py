@@ -83,6 +83,8 @@ class Actuators:
         for name, values in self.effects.items():
             if name == "thruster_deadband":
                 wanted = self._deadband(wanted, values["width"])
+            elif name == "thrust_curve":
+                wanted = self._powers(wanted, values)
             elif name == "thrust_overshoot":
                 wanted, constant = self._overshoot(wanted, values, begin, end), False
 
@@ -106,6 +108,15 @@ class Actuators:
             size = np.abs(share)
             beyond = np.maximum(size - width, 0.0) / (1.0 - width)
             return np.where(size < 1.0, np.copysign(beyond, share), share) * self.full
+
+        return out
+
+    def _powers(self, wanted: Signal, values: Values) -> Signal:
+        ahead, astern = ([values[f"{n}_{side}"] for n in self.names()] for side in ("positive", "negative"))
+
+        def out(t: float) -> Array:
+            share = wanted(t) / self.full
+            return self.full * np.where(share > 0.0, np.abs(share) ** ahead, -(np.abs(share) ** astern))
 
         return out
 

@@ -161,6 +161,7 @@ def test_a_small_lead_is_none_before_more_effects_are_fitted(monkeypatch, lead, 
 
     monkeypatch.setattr(LeaderFits, "_one", one)
     monkeypatch.setattr(leader_fits, "rivals_of", lambda *given, **more: [])
+    monkeypatch.setattr(leader_fits, "contained_in", lambda *_: {})
     looks = LeaderFits(None, None, lambda _: None)  # type: ignore[arg-type]
     at: Any = Round(SimpleNamespace(scores=scores), SimpleNamespace(evidence=-1000.0), [], chosen)  # type: ignore[arg-type]
     ahead = lambda found, odds: [h for h in found if h.evidence > -1000.0 + odds]  # noqa: E731

@@ -28,6 +28,7 @@ MODELS = {
     "delay below a step": {"actuation_delay": {"delay": 0.02}},
     "overshoot": OVER,
     "dead band": {"thruster_deadband": {"width": 0.1}},
+    "curve": {"thrust_curve": {"thruster_1_positive": 0.8, "thruster_2_negative": 1.3}},
     "all, in a current": {
         **LAG,
         **LATE,

@@ -14,7 +14,7 @@ from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, shap
 from auvnn.diagnosis.hypotheses.within_record import within_record
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
-from auvnn.diagnosis.noise_law.rounds.leaders import rivals_of
+from auvnn.diagnosis.noise_law.rounds.leaders import contained_in, rivals_of
 from auvnn.diagnosis.score_tests.null_tests import Tested
 from auvnn.diagnosis.selection.model_comparison import confused
 from auvnn.estimation.priors import parameters_of, set_parameters
@@ -160,7 +160,14 @@ class LeaderFits:
         found = self._each([*known, *worth, *_ahead(at, odds)], at, known)
         # Beside what was found tests are weaker: a rival of a further name need not be clear among all effects.
         rivals = rivals_of(found, at.tested.scores, level, among_all=not at.chosen)
-        return _by_evidence([*found, *self._each(rivals, at)])
+        found += self._each(rivals, at)
+        names = [h.name for h in found]
+        for name, begin in contained_in(self.layout, found, at.current, at.tested.scores).items():
+            plain = self._from([begin], name, at)
+            if plain is not None:
+                self.take(at.current, plain)
+                names.append(name)
+        return _by_evidence(self._each(names, at))
 
     def wider(self, at: Round, found: Sequence[Hypothesis], level: float) -> list[Hypothesis]:
         """Return what was found together with more of the effects whose tests are significant, fitted and judged.
@@ -226,13 +233,18 @@ class LeaderFits:
             at: the round.
             known: its fit by the first search.
         """
-        tested, found = at.tested, []
+        tested = at.tested
         null = parameters_of(tested.at.model, [name])
         # At its null place and time an effect says nothing of them: they are where its test has found them.
         shape = shapes(self.layout, name)
         begins = [np.where(shape, initial_guess(self.layout, name, tested.scores[name].estimate), null)]
         begins += [] if known is None else [parameters_of(known.fitted.model, [name])]
         begins += [at.begins[name]] if name in at.begins else []
+        return self._from(begins, name, at)
+
+    def _from(self, begins: Sequence[Array], name: str, at: Round) -> Hypothesis | None:
+        """Return the likeliest fit of an effect from several values of its parameters; None where there is none."""
+        tested, found = at.tested, list[Hypothesis]()
         for begin in begins:
             model = tested.at.model.rebuilt(tested.at.model.copied_effects())
             set_parameters(model, [name], begin)

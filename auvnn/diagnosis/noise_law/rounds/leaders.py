@@ -6,7 +6,7 @@ first search may have found it together with others only; its values there are w
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.model_comparison import confused
@@ -49,6 +50,29 @@ def rivals_of(
     names = [n for n, s in scores.items() if n not in known and s.degrees and confused(best.name, n)]
     names = [n for n in names if scores[n].p_value < sure]
     return sorted(names, key=lambda n: -scores[n].evidence)[:RIVALS]
+
+
+def contained_in(
+    layout: Layout, found: Sequence[Hypothesis], current: Hypothesis, open_to: Container[str]
+) -> dict[str, Array]:
+    """Return the plainer effects that those which explain something contain, each with values from which to fit it.
+
+    A lag of seconds is an overshoot of less than nothing, and its own slope at the null does not lead there.
+
+    Args:
+        layout: for what the effects' parameters are.
+        found: explanations that were fitted.
+        current: the explanation without their last effects.
+        open_to: effects that may be named.
+    """
+    begins = {}
+    for h in found:
+        values = h.explanation.fitted.model.effect(h.name).values()
+        for name, shared in effect_class(h.name).contains.items():
+            if name in open_to and h.evidence > current.evidence:
+                described = layout.described(name)
+                begins[name] = np.array([values[p.name] if p.name in shared else p.null for p in described])
+    return begins
 
 
 def fitted_alone(asked: Setting, state: State) -> list[FittedHypothesis]:

@@ -30,8 +30,8 @@ from auvnn.diagnosis.noise_law.rounds.one_step_leaders import fitted_one_step
 from auvnn.diagnosis.noise_law.rounds.path import Path
 from auvnn.diagnosis.noise_law.under_law import NULL_STEPS, UnderLaw
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
-from auvnn.diagnosis.selection.choose import ALPHA
-from auvnn.diagnosis.selection.model_comparison import ODDS, confused
+from auvnn.diagnosis.selection.choose import ALPHA, LITTLE
+from auvnn.diagnosis.selection.model_comparison import ODDS, confused, left_by
 from auvnn.diagnosis.stages.state import Setting
 from auvnn.effects import effect_class
 from auvnn.estimation.priors import parameters_of
@@ -41,8 +41,6 @@ from auvnn.metrics.windows import Windows
 Array = NDArray[np.float64]
 # Share of the gain of all names that a further one must bring.
 FURTHER_SHARE = 0.1
-# What takes up what an earlier name gets wrong explains less than such a share of what the names explain in the mean.
-LITTLE = 0.5
 
 
 class NameAfterName(UnderLaw):
@@ -105,7 +103,8 @@ class NameAfterName(UnderLaw):
         """
         tried, whole = list[Hypothesis](), 1.0
         while len(path.chosen) < most:
-            result = self._round(null, path.current, path.chosen, self._passed(path), fitted)
+            # What could not be told from a name may be missing beside it: then it is no rival.
+            result = self._round(null, path.current, path.chosen, path.dropped, fitted)
             if result is None:
                 break
             if not path.chosen:
@@ -125,6 +124,8 @@ class NameAfterName(UnderLaw):
             group = self._with_simpler(tied(self.layout, good, path.current), good, path, null)
             if len(group) > GROUP:
                 break
+            path.take_apart(group[0].name)
+            group = [h for h in group if h.name not in path.rivals]
             names = [h.name for h in group]
             verdict = "ambiguous" if len(group) > 1 else "named"
             path.steps.append({"verdict": verdict, "effects": names, "p_value": result.sure[group[0].name]})
@@ -259,19 +260,21 @@ class NameAfterName(UnderLaw):
         return replace(known, scores={n: s for n, s in known.scores.items() if n in remaining})
 
     def _takes_up(self, further: Hypothesis, path: Path, null: Hypothesis) -> bool:
-        """Whether a further effect only takes up what the shape of an earlier one gets wrong.
+        """Whether a further effect only takes up what earlier ones get wrong.
 
         Where thrust ahead and astern follow curves of another shape, a mean force is left beside the asymmetry that is
         named: an effect that the catalogue knows to be confused with an earlier one, that explains little beside it, and
-        beside which measured inputs still predict the force, is no further cause.
+        beside which measured inputs still predict the force, is no further cause. Nor is one that explains little and is
+        known to look like what the form of an earlier one gets wrong (`leaves`).
 
         Args:
             further: the explanation with it.
             path: with the names before it.
             null: the explanation without any.
         """
-        if not any(confused(further.name, name) for name in path.chosen):
+        left = left_by(further.name, path.chosen)
+        if not left and not any(confused(further.name, name) for name in path.chosen):
             return False
         one_of_them = (path.current.evidence - null.evidence) / len(path.chosen)
         little = further.evidence - path.current.evidence < LITTLE * one_of_them
-        return little and self.predicted(further) is not None
+        return little and (left or self.predicted(further) is not None)

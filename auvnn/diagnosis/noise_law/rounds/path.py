@@ -102,6 +102,24 @@ class Path:
         group.append(other.explanation)
         self._step(name, [e.effects[-1] for e in group])
 
+    @property
+    def rivals(self) -> list[str]:
+        """The effects that the log cannot tell from names."""
+        return [e.effects[-1] for g in self.groups for e in g[1:]]
+
+    def take_apart(self, rival: str) -> None:
+        """Say of an effect that could not be told from a name that it is no rival: the log needs it beside the name.
+
+        Args:
+            rival: the effect; nothing changes where it is none.
+        """
+        for k, group in enumerate(self.groups):
+            left = [group[0], *[e for e in group[1:] if e.effects[-1] != rival]]
+            if len(left) < len(group):
+                self.groups[k] = left
+                self._step(left[0].effects[-1], [e.effects[-1] for e in left])
+        self.groups = [g for g in self.groups if len(g) > 1]
+
     def members(self, name: str) -> int:
         """Return how many effects, the name among them, the log cannot tell from a name.
 

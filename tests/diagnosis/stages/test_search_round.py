@@ -1,0 +1,149 @@
+"""A round of the search: members of groups asked for again, and what earlier names leave passed over."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from auvnn.diagnosis.selection.choose import Choice
+from auvnn.diagnosis.stages import search_round as module
+from auvnn.diagnosis.stages.search_round import search_round
+from auvnn.diagnosis.stages.state import State
+
+USABLE = ["payload", "waves", "tether", "thrust_asymmetry", "constant_force"]
+
+
+def fit(error: float, *effects: str) -> Any:
+    return SimpleNamespace(effects=effects, squared_error=lambda _: error)
+
+
+class Asked:
+    """What is asked, with a chooser whose choices are given by what it may choose from."""
+
+    def __init__(self, choices: list[Choice]) -> None:
+        self.usable, self.base, self.most = USABLE, [], 5
+        self.say, self.choices, self.offered = lambda _: None, choices, []
+        self.gone: list[str] = []
+
+    def tests(self, windows: Any) -> Any:
+        def tested(current: Any, remaining: Any, *_: Any, **__: Any) -> Any:
+            return SimpleNamespace(p_value=0.0, scores=dict.fromkeys(remaining), at=None, alike=None)
+
+        return tested
+
+    def chooser(self, windows: Any) -> Any:
+        def choose(scores: Any, *_: Any) -> Choice:
+            self.offered.append([*scores])
+            return self.choices[len(self.offered) - 1]
+
+        return SimpleNamespace(choose=choose, withdrawn=lambda best, base: (best, [*self.gone]))
+
+
+def begun(*chosen: str, groups: Any = (), **more: Any) -> State:
+    first: Any = SimpleNamespace(
+        fitted=SimpleNamespace(sigma=np.ones(18)), effects=(), squared_error=lambda _: 100.0
+    )
+    given: Any = {
+        "windows": None, "first": first, "current": fit(60.0, *chosen), "chosen": chosen, "groups": groups,
+        "table": {"x": None}, **more,
+    }  # fmt: skip
+    return State(**given)
+
+
+def named(best: Any, *rivals: Any) -> Choice:
+    return Choice("ambiguous" if rivals else "named", best, [], [best, *rivals] if rivals else [])
+
+
+@pytest.fixture(autouse=True)
+def whole_steps(monkeypatch):
+    monkeypatch.setattr(module, "_finer", lambda asked, found, windows: (found, windows))
+
+
+TIED = (fit(60.0, "payload"), fit(60.0, "waves"), fit(60.0, "tether"))
+STEP = {"verdict": "ambiguous", "effects": ["payload", "waves", "tether"], "p_value": 0.0}
+
+
+def test_a_member_of_a_group_that_is_needed_beside_the_one_that_leads_is_no_rival_of_it():
+    asked: Any = Asked([named(fit(30.0, "payload", "waves"))])
+    state: Any = search_round(asked, begun("payload", groups=(TIED,), steps=(STEP,)))
+    assert asked.offered == [["waves", "tether", "thrust_asymmetry", "constant_force"]]
+    assert [(s["verdict"], s["effects"]) for s in state.steps] == [
+        ("ambiguous", ["payload", "tether"]), ("named", ["waves"]),
+    ]  # fmt: skip
+    assert [[e.effects[-1] for e in g] for g in state.groups] == [["payload", "tether"]]
+    # Of two, the one that leads is left alone.
+    pair = {**STEP, "effects": ["payload", "waves"]}
+    asked = Asked([named(fit(30.0, "payload", "waves"))])
+    state = search_round(asked, begun("payload", groups=(TIED[:2],), steps=(pair,)))
+    assert [(s["verdict"], s["effects"]) for s in state.steps] == [
+        ("named", ["payload"]),
+        ("named", ["waves"]),
+    ]
+    assert state.groups == () and state.chosen == ("payload", "waves")
+
+
+def test_a_member_beside_which_the_one_that_leads_is_needless_takes_its_place():
+    asked: Any = Asked([named(fit(30.0, "payload", "tether", "waves"))])
+    asked.gone = ["payload"]
+    pair, later = (
+        {**STEP, "effects": ["payload", "waves"]},
+        {**STEP, "verdict": "named", "effects": ["tether"]},
+    )
+    begins = begun("payload", "tether", groups=(TIED[:2],), steps=(pair, later))
+    state: Any = search_round(asked, begins)
+    assert [(s["verdict"], s["effects"]) for s in state.steps] == [
+        ("named", ["waves"]),
+        ("named", ["tether"]),
+    ]
+    assert state.withdrawn == ("payload",) and state.groups == ()
+    # What is needless besides is said to be withdrawn.
+    asked = Asked([named(fit(30.0, "payload", "tether", "waves"))])
+    asked.gone = ["payload", "tether"]
+    state = search_round(asked, begins)
+    assert [(s["verdict"], s["effects"]) for s in state.steps] == [
+        ("named", ["waves"]), ("named", ["tether"]), ("withdrawn", ["tether"]),
+    ]  # fmt: skip
+
+
+def test_a_member_of_a_group_is_in_no_second_one():
+    alike = fit(31.0, "payload", "waves"), fit(31.0, "payload", "constant_force")
+    asked: Any = Asked([named(fit(30.0, "payload", "thrust_asymmetry"), *alike)])
+    state: Any = search_round(asked, begun("payload", groups=(TIED,), steps=(STEP,)))
+    assert [s["effects"] for s in state.steps] == [STEP["effects"], ["thrust_asymmetry", "constant_force"]]
+    asked = Asked([named(fit(30.0, "payload", "thrust_asymmetry"), alike[0])])
+    state = search_round(asked, begun("payload", groups=(TIED,), steps=(STEP,)))
+    assert [(s["verdict"], s["effects"]) for s in state.steps[1:]] == [("named", ["thrust_asymmetry"])]
+    assert len(state.groups) == 1
+
+
+def test_so_is_one_that_came_together_with_another_effect():
+    both, other = (
+        fit(50.0, "thrust_asymmetry", "constant_force", "tether"),
+        fit(55.0, "thrust_asymmetry", "tether"),
+    )
+    asked: Any = Asked([named(both), named(other)])
+    assert search_round(asked, begun("thrust_asymmetry")).chosen == ("thrust_asymmetry", "tether")
+    assert asked.offered[1] == ["payload", "waves", "tether"]
+
+
+@pytest.mark.parametrize(
+    ("chosen", "error", "passed"),
+    [
+        # The asymmetry took 40 of 100: half as much is what its form may get wrong.
+        (("thrust_asymmetry",), 41.0, True),
+        (("thrust_asymmetry",), 39.0, False),
+        (("thrust_asymmetry", "payload"), 49.0, False),
+        (("thrust_asymmetry", "payload"), 51.0, True),
+        (("payload",), 59.0, False),
+    ],
+)
+def test_a_small_constant_force_beside_an_asymmetry_of_the_thrust_is_passed_over(chosen, error, passed):
+    bias, other = fit(error, *chosen, "constant_force"), fit(58.0, *chosen, "tether")
+    asked: Any = Asked([named(bias), named(other)])
+    state: Any = search_round(asked, begun(*chosen))
+    assert state.chosen[-1] == ("tether" if passed else "constant_force")
+    assert len(asked.offered) == (2 if passed else 1) and "constant_force" in asked.offered[0]
+    assert not passed or "constant_force" not in asked.offered[1]
