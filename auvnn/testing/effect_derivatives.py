@@ -21,7 +21,8 @@ def has_right_gradient(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = 
         vehicle: in which it is tried.
         actuation: "thrusters" or "wrench".
     """
-    model, scene = built(kind, vehicle, actuation), make_scene(vehicle, actuation, runs=2, rows=2, warmup=1)
+    # As many commands as it takes for each to have either sign.
+    model, scene = built(kind, vehicle, actuation), make_scene(vehicle, actuation, runs=4, rows=2, warmup=1)
     outputs, theta = as_function(model, scene)
     mix = torch.randn(
         4, outputs(theta).numel(), generator=torch.Generator().manual_seed(1), dtype=torch.float64

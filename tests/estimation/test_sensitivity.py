@@ -102,7 +102,12 @@ def test_sensitivities_to_all_effects_at_once_and_to_the_start(model, accelerati
     names = model.effect_names
     assert set(EFFECTS.names()) <= set(names)
     # So many effects at once make for a quick vehicle: the steps must be shorter than one effect would need.
-    log = make_log(model, runs=1, duration=0.7, rate=60.0, accelerations=accelerations, uneven=uneven)
+    # Each command has either sign while it lasts.
+    size = model.actuators.size
+    command = 0.4 * np.sin(9.0 * np.arange(43)[:, None] / 60.0 + 2.0 * np.pi * np.arange(size) / size)
+    log = make_log(
+        model, runs=1, duration=0.7, rate=60.0, accelerations=accelerations, uneven=uneven, command=command
+    )
     windows = cut_windows(log, 0.25, 0.4, warmup=0.2)
     initial = initial_states(model, windows)
     found = respond(model, windows, initial, names)
