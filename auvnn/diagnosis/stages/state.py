@@ -192,8 +192,16 @@ class State:
             name: that is not given any more.
             other: whose step takes its place.
         """
-        moved = next(s for s in reversed(self.steps) if s["effects"][:1] == [other])
-        left = [s for s in self.steps if s is not moved]
+        moved = next(s for s in reversed(self.steps) if other in s["effects"])
+        if moved["verdict"] == "named":
+            # Of several names that one step gave together the others stay there.
+            others = [n for n in moved["effects"] if n != other]
+            left = [
+                {**s, "effects": others} if s is moved else s for s in self.steps if s is not moved or others
+            ]
+            moved = {**moved, "effects": [other]}
+        else:
+            left = [s for s in self.steps if s is not moved]
         return self.but(steps=tuple(moved if s["effects"][:1] == [name] else s for s in left))
 
     def without_groups(self, names: list[str]) -> tuple[State, list[str]]:

@@ -99,6 +99,11 @@ def test_a_member_beside_which_the_one_that_leads_is_needless_takes_its_place():
         ("named", ["tether"]),
     ]
     assert state.withdrawn == ("payload",) and state.groups == ()
+    # Of two effects that are named together the other one stays where it is.
+    asked = Asked([named(fit(30.0, "payload", "tether", "constant_force", "waves"))])
+    asked.gone = ["payload"]
+    state = search_round(asked, begins)
+    assert [s["effects"] for s in state.steps] == [["waves"], ["tether"], ["constant_force"]]
     # What is needless besides is said to be withdrawn.
     asked = Asked([named(fit(30.0, "payload", "tether", "waves"))])
     asked.gone = ["payload", "tether"]
