@@ -42,6 +42,7 @@ SAMPLES = {
     "rows-22.jsonl": 21,
     "rows-23.jsonl": 22,
     "rows-24.jsonl": 23,
+    "rows-25.jsonl": 24,
 }
 
 
