@@ -39,13 +39,12 @@ from auvnn.diagnosis.noise_law.rounds.beside_all_names import (
     rivals_among,
     that_leads_instead,
     those_that_lose,
-    without_lost,
 )
 from auvnn.diagnosis.noise_law.rounds.name_after_name import NameAfterName
 from auvnn.diagnosis.noise_law.rounds.path import Path
 from auvnn.diagnosis.noise_law.under_law import NULL_STEPS
 from auvnn.diagnosis.selection.model_comparison import ODDS
-from auvnn.diagnosis.selection.rivals import Rivals, rivals_tried
+from auvnn.diagnosis.selection.rivals import Rivals, rivals_tried, without_lost
 from auvnn.diagnosis.stages.state import State
 from auvnn.effects import effect_class
 

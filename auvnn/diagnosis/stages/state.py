@@ -18,6 +18,7 @@ from auvnn.diagnosis.residuals.additive_force_test import AdditiveForce
 from auvnn.diagnosis.residuals.variance_component_test import Unnamed
 from auvnn.diagnosis.score_tests.null_tests import NullTests
 from auvnn.diagnosis.selection.choose import Chooser
+from auvnn.diagnosis.selection.rivals import without_lost
 from auvnn.executors import Executor
 from auvnn.executors.serial import SERIAL
 from auvnn.logs import Log
@@ -173,17 +174,9 @@ class State:
         Args:
             rival: the effect; the state stays as it is where it is none.
         """
-        if rival not in self.rivals:
-            return self
-        leads = {g[0].effects[-1] for g in self.groups if any(e.effects[-1] == rival for e in g[1:])}
-        groups = [tuple(e for e in g if e is g[0] or e.effects[-1] != rival) for g in self.groups]
-        told: list[SearchStep] = []
-        for step in self.steps:
-            group = step["verdict"] == "ambiguous" and step["effects"][0] in leads
-            names = [n for n in step["effects"] if not group or n != rival]
-            alone = group and len(names) == 1
-            told.append({**step, "verdict": "named" if alone else step["verdict"], "effects": names})
-        return self.but(groups=tuple(g for g in groups if len(g) > 1), steps=tuple(told))
+        lost = {(g[0].effects[-1], rival) for g in self.groups}
+        steps, groups = without_lost(self.steps, self.groups, lost)
+        return self.but(groups=tuple(map(tuple, groups)), steps=tuple(steps))
 
     def instead(self, name: str, other: str) -> State:
         """Return the state with the step of one effect in the place of another one's, which is no longer given.

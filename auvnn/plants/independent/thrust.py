@@ -121,7 +121,7 @@ class Actuators:
         return out
 
     def _overshoot(self, wanted: Signal, values: Values, begin: float, end: float) -> Signal:
-        # A dead band before it only maps held commands to held ones, so that the flow's equation is linear here.
+        # A dead band or a curve before it only maps held commands to held ones, so that the flow's equation is linear.
         command, tau = wanted(begin), values["time_constant"]
         excess = np.array([values[n] for n in self.names()])
         flow = command if self.flow is None else self.flow

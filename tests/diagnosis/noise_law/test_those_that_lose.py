@@ -12,8 +12,8 @@ from auvnn.diagnosis.noise_law.rounds.beside_all_names import (
     loses,
     that_leads_instead,
     those_that_lose,
-    without_lost,
 )
+from auvnn.diagnosis.selection.rivals import without_lost
 from tests.diagnosis.noise_law.stand_ins import explanation, fit, one_by_one, worth
 
 

@@ -14,7 +14,7 @@ compared, not terms).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence, Set
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis, predicts_better
@@ -257,26 +256,3 @@ def _extra(layout: Layout, name: str, rival: str) -> int:
     if rival in effect_class(name).plainer:
         return 0
     return max(len(layout.columns[rival]) - len(layout.columns[name]), 0)
-
-
-def without_lost(
-    steps: Sequence[SearchStep], groups: Sequence[Sequence[FittedHypothesis]], lost: Set[tuple[str, str]]
-) -> tuple[list[SearchStep], list[list[FittedHypothesis]]]:
-    """Return steps and groups without the rivals that have lost; a name that is left alone makes no group.
-
-    Args:
-        steps: of the search.
-        groups: explanations that could not be told apart, the one that leads first.
-        lost: name of the one that leads, and of its rival.
-    """
-    kept: list[list[FittedHypothesis]] = []
-    for group in groups:
-        lead = group[0].effects[-1]
-        left = [e for e in group if (lead, e.effects[-1]) not in lost]
-        kept += [left] if len(left) > 1 else []
-    told: list[SearchStep] = []
-    for step in steps:
-        names = [n for n in step["effects"] if (step["effects"][0], n) not in lost]
-        alone = step["verdict"] == "ambiguous" and len(names) == 1
-        told.append({**step, "verdict": "named" if alone else step["verdict"], "effects": names})
-    return told, kept

@@ -57,7 +57,7 @@ def contained_in(
 ) -> dict[str, Array]:
     """Return the plainer effects that those which explain something contain, each with values from which to fit it.
 
-    A lag of seconds is an overshoot of less than nothing, and its own slope at the null does not lead there.
+    A lag of seconds is an overshoot whose excess is -1, and its own slope at the null does not lead there.
 
     Args:
         layout: for what the effects' parameters are.

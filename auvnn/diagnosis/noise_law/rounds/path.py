@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.hypothesis import GROUP, Hypothesis, explains_an_axis
+from auvnn.diagnosis.selection.rivals import without_lost
 
 
 @dataclass
@@ -113,12 +114,8 @@ class Path:
         Args:
             rival: the effect; nothing changes where it is none.
         """
-        for k, group in enumerate(self.groups):
-            left = [group[0], *[e for e in group[1:] if e.effects[-1] != rival]]
-            if len(left) < len(group):
-                self.groups[k] = left
-                self._step(left[0].effects[-1], [e.effects[-1] for e in left])
-        self.groups = [g for g in self.groups if len(g) > 1]
+        lost = {(g[0].effects[-1], rival) for g in self.groups}
+        self.steps, self.groups = without_lost(self.steps, self.groups, lost)
 
     def members(self, name: str) -> int:
         """Return how many effects, the name among them, the log cannot tell from a name.
