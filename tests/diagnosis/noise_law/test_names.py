@@ -10,15 +10,12 @@ import pytest
 
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.answers.tolerance import Tolerance
-from auvnn.diagnosis.noise_law import under_law
 from auvnn.diagnosis.noise_law.hypothesis import explains_an_axis, predicts_better, shares_left, tied
-from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.rounds import free_running_cost as free_running_cost_module
 from auvnn.diagnosis.noise_law.rounds import names_given
 from auvnn.diagnosis.noise_law.rounds.free_running_cost import Cost, free_running_cost
 from auvnn.diagnosis.noise_law.rounds.leader_fits import Round
 from auvnn.diagnosis.noise_law.rounds.names_given import NamesGiven
-from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
@@ -406,48 +403,6 @@ def test_a_window_without_a_sample_of_a_velocity_is_none_of_the_median():
     assert free_running_cost_module._median(scale, rolled) == pytest.approx((3.0 + 5.0) / 2.0)
     by_window = free_running_cost_module._by_window(scale, rolled)
     assert free_running_cost_module._surely_less(by_window, by_window + 5.0)
-
-
-@pytest.mark.parametrize(
-    ("further", "gained", "predicted", "expected"),
-    [
-        ("constant_force", 40.0, 0.3, True),
-        # What the form of an asymmetry gets wrong looks like a constant force, whatever inputs predict.
-        ("constant_force", 40.0, 0.05, True),
-        ("constant_force", 40.0, None, True),
-        # Known to be confused with one before it, and no more than that.
-        ("thruster_gain", 40.0, 0.3, True),
-        ("thruster_gain", 40.0, 0.05, False),
-        ("thruster_gain", 40.0, None, False),
-        # Half as much as the two names before it, each, is more than what they get wrong.
-        ("constant_force", 49.0, 0.3, True),
-        ("constant_force", 51.0, 0.3, False),
-        # Not known to be confused with what was named before it.
-        ("gyro_bias", 40.0, 0.3, False),
-    ],
-)
-def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_is_no_name(
-    further, gained, predicted, expected, monkeypatch
-):
-    told = None if predicted is None else InputPrediction("X", "u", 0.5, predicted)
-    asked: Any = ForceSearch.__new__(ForceSearch)
-    asked.in_closed_loop = True
-    monkeypatch.setattr(under_law, "predicted_by_inputs", lambda *_, **__: told)
-    monkeypatch.setattr(asked, "say", lambda _: None, raising=False)
-    monkeypatch.setattr(asked, "about", lambda _: None)
-    monkeypatch.setattr(asked, "_sums", lambda _: None)
-    found = SimpleNamespace(
-        estimate=SimpleNamespace(law=object()),
-        weighed=None,
-        name=further,
-        explanation=None,
-        evidence=700.0 + gained,
-    )
-    path: Any = SimpleNamespace(
-        chosen=["payload", "thrust_asymmetry"], current=SimpleNamespace(evidence=700.0)
-    )
-    null: Any = SimpleNamespace(evidence=500.0)
-    assert asked._takes_up(found, path, null) is expected
 
 
 def test_runs_left_out_are_predicted_better_in_the_mean_or_in_most_windows(monkeypatch):
