@@ -7,7 +7,7 @@ from typing import Any
 from torch import Tensor
 
 from auvnn.effects.base import Effect
-from auvnn.effects.hooks import Parameter
+from auvnn.effects.hooks import EACH, Parameter
 
 
 class ActuationDelay(Effect):
@@ -30,7 +30,7 @@ class ActuationDelay(Effect):
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
         """Return the delay."""
-        return (Parameter("delay", "s", 0.0, 0.1, 0.0, 2.0, timing=True),)
+        return (Parameter("delay", "s", 0.0, 0.1, 0.0, 2.0, timing=True, actuator=EACH),)
 
     def delay(self) -> Tensor:
         """Return the delay."""

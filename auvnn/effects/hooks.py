@@ -6,6 +6,9 @@ from dataclasses import dataclass, replace
 
 from torch import Tensor
 
+# Stands for every actuator, each by itself.
+EACH = -1
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -23,6 +26,9 @@ class Parameter:
             others at their nulls the effect vanishes whatever its value, so that nothing tells it there.
         timing: whether it says how long after its sample a command acts, s. When within an interval a command was given
             is not in a log: an interval's standard deviation is part of its standard error.
+        actuator: of the effects on commands and on how thrust and fins follow them: the number of the only actuator on
+            which it acts, or `EACH` where it acts on each by itself. None where what one actuator does depends on the
+            commands of others, or where this is not known; slopes then take longer.
     """
 
     name: str
@@ -34,6 +40,7 @@ class Parameter:
     probes: tuple[float, ...] = ()
     shape: bool = False
     timing: bool = False
+    actuator: int | None = None
 
 
 @dataclass(frozen=True)

@@ -40,8 +40,11 @@ class ThrustCurve(Effect):
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
         """Return two exponents per actuator, of positive and of negative commands."""
-        names = [f"{n}_{side}" for side in ("positive", "negative") for n in actuators(vehicle, actuation)]
-        return tuple(Parameter(n, "1", 1.0, 0.2, 0.3, 3.0) for n in names)
+        return tuple(
+            Parameter(f"{name}_{side}", "1", 1.0, 0.2, 0.3, 3.0, actuator=i)
+            for side in ("positive", "negative")
+            for i, name in enumerate(actuators(vehicle, actuation))
+        )
 
     def settle(self, vehicle: Any, actuation: str) -> None:
         """Keep what a full command is."""

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from auvnn.effects.base import Effect
 from auvnn.effects.factors import actuators
-from auvnn.effects.hooks import Parameter
+from auvnn.effects.hooks import EACH, Parameter
 
 # Rows whose filter is worked out as one product of matrices.
 CHUNK = 128
@@ -40,8 +40,11 @@ class ThrustOvershoot(Effect):
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
         """Return the excess of each actuator, a share of the change of demand, and the time in which it fades."""
         return (
-            Parameter("time_constant", "s", 1.0, 0.5, 0.05, 30.0),
-            *(Parameter(n, "1", 0.0, 0.5, -1.0, 20.0, probes=(0.5,)) for n in actuators(vehicle, actuation)),
+            Parameter("time_constant", "s", 1.0, 0.5, 0.05, 30.0, actuator=EACH),
+            *(
+                Parameter(n, "1", 0.0, 0.5, -1.0, 20.0, probes=(0.5,), actuator=i)
+                for i, n in enumerate(actuators(vehicle, actuation))
+            ),
         )
 
     def command(self, command: Tensor, times: Tensor) -> Tensor:

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from auvnn.effects.base import Effect
-from auvnn.effects.hooks import Parameter
+from auvnn.effects.hooks import EACH, Parameter
 from auvnn.effects.sizes import full_wrench
 
 
@@ -32,7 +32,7 @@ class ThrusterDeadband(Effect):
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
         """Return half the width of the band, as a share of full command."""
-        return (Parameter("width", "1", 0.0, 0.07, 0.0, 0.6),)
+        return (Parameter("width", "1", 0.0, 0.07, 0.0, 0.6, actuator=EACH),)
 
     def settle(self, vehicle: Any, actuation: str) -> None:
         """Keep what a full command is."""

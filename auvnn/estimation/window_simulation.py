@@ -10,7 +10,8 @@ from torch import Tensor, nn
 from torch.func import functional_call
 
 from auvnn.effects import Sensed
-from auvnn.estimation.few_inputs import slopes
+from auvnn.effects.hooks import EACH
+from auvnn.estimation.few_inputs import Directions, slopes
 from auvnn.metrics.free_run import away, predict
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
@@ -206,13 +207,15 @@ def simulate_windows(
     with torch.no_grad():
         mean, start = module(windows, substeps)
     acting = {id(e) for e in model.before_thrust}
-    keys, columns, at = {}, [], 0
+    by_itself = all(p.actuator is not None for e in model.before_thrust for p in e.parameters_of)
+    keys, columns, only, at = {}, [], [], 0
     for name in names:
         k = model.effect_names.index(name)
         size = model.members[k].theta.numel()
         if id(model.members[k]) in acting:
             keys[f"model.effects.{k}.theta"] = model.members[k].theta.detach()
             columns += range(at, at + size)
+            only += [p.actuator for p in model.members[k].parameters_of]
         at += size
     if not keys:
         none = mean.new_zeros(*mean.shape, 0)
@@ -223,7 +226,9 @@ def simulate_windows(
         some = dict(zip(keys, values.split(sizes), strict=True))
         return functional_call(module, some, (windows, substeps))
 
-    joined = [x.detach() for x in slopes(thrusts, torch.cat(list(keys.values())))]
+    values = torch.cat(list(keys.values()))
+    shared = Directions.together([EACH if a is None or not by_itself else a for a in only])
+    joined = [shared.apart(x.detach()) for x in slopes(thrusts, values, shared.seeds(values))]
     return SimulatedWindows(eta, nu, error, mean, start, columns, joined[0], joined[1], defect)
 
 

@@ -3,7 +3,7 @@
 import torch
 from torch.func import jacfwd, vmap
 
-from auvnn.estimation.few_inputs import slopes
+from auvnn.estimation.few_inputs import Directions, slopes
 
 DOUBLE = torch.float64
 
@@ -41,3 +41,22 @@ def test_what_does_not_depend_on_the_numbers_has_no_slope():
     )
     assert torch.equal(still, torch.zeros(3, 2, dtype=DOUBLE))
     assert torch.equal(moving, torch.diag(torch.tensor([4.0, 6.0], dtype=DOUBLE)))
+
+
+def test_values_that_act_on_different_columns_share_a_direction_and_lose_nothing():
+    def output(x):
+        # Column k depends on x_k and x_{3 + k}, and all of them on x_6.
+        grid = torch.linspace(0.2, 1.0, 5, dtype=DOUBLE).unsqueeze(-1)
+        return [torch.sin(grid * x[:3]) * torch.exp(-x[3:6] * grid * x[6])]
+
+    at = torch.tensor([0.5, 1.0, 2.0, 0.1, 0.2, 0.4, 1.5], dtype=DOUBLE)
+    shared = Directions.together([0, 1, 2, 0, 1, 2, -1])
+    assert shared.of.tolist() == [0, 0, 0, 1, 1, 1, 2]
+    (found,) = slopes(output, at, shared.seeds(at))
+    assert found.shape == (5, 3, 3)
+    expected = jacfwd(lambda x: output(x)[0])(at)
+    torch.testing.assert_close(shared.apart(found), expected, rtol=1e-14, atol=1e-15)
+
+
+def test_what_may_act_on_all_shares_with_nothing():
+    assert Directions.together([-1, 0, -1, 0, 1]).of.tolist() == [0, 1, 2, 3, 1]
