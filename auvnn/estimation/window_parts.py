@@ -64,7 +64,8 @@ def _part(windows: Windows, begin: int, rows: int) -> Windows:
         nu=windows.nu[:, index],
         nu_dot=of(windows.nu_dot, index),
         inputs=Inputs(
-            given.command[:, both], of(given.fins, both), of(given.voltage, both), of(given.altitude, both)
+            given.command[:, both],
+            *(of(x, both) for x in (given.fins, given.voltage, given.altitude, given.within)),
         ),
         mask=windows.mask[:, index] * beyond[:, None],
         length=np.clip(windows.length - begin, 0, rows),
@@ -90,7 +91,7 @@ def _joined(parts: list[Windows]) -> Windows:
         eta=eta,
         nu=nu,
         nu_dot=of("nu_dot"),
-        inputs=Inputs(command, of("fins"), of("voltage"), of("altitude")),
+        inputs=Inputs(command, *(of(n) for n in ("fins", "voltage", "altitude", "within"))),
         mask=mask,
         length=rows("length"),
     )

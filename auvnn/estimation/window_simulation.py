@@ -15,7 +15,7 @@ from auvnn.estimation.few_inputs import Directions, slopes
 from auvnn.metrics.free_run import away, predict
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.models.actuation.actuators import Drive
+from auvnn.models.actuation.drive import Drive
 from auvnn.models.free_running.one_interval import one_interval
 from auvnn.models.free_running.rollout import steps_per_interval
 from auvnn.physics.attitude import quat_conjugate, quat_multiply, quat_to_matrix, quat_to_rotvec
@@ -43,6 +43,7 @@ class Thrust(nn.Module):
             substeps,
             windows.warmup,
             windows.inputs.fins,
+            windows.inputs.within,
         )
 
     def forward(self, windows: Windows, substeps: int) -> tuple[Tensor, Tensor]:

@@ -85,7 +85,8 @@ class Windows:
         index = chosen if isinstance(chosen, slice) else torch.as_tensor(chosen)
         i = self.inputs
         inputs = Inputs(
-            i.command[index], *(None if x is None else x[index] for x in (i.fins, i.voltage, i.altitude))
+            i.command[index],
+            *(None if x is None else x[index] for x in (i.fins, i.voltage, i.altitude, i.within)),
         )
         return replace(
             self,

@@ -25,7 +25,7 @@ from auvnn.models.inputs import Inputs
 from auvnn.models.model_kernels import _KERNELS, _made, _ready, _RightHandSide, require_plain
 
 if TYPE_CHECKING:
-    from auvnn.models.actuation.actuators import Drive
+    from auvnn.models.actuation.drive import Drive
     from auvnn.models.grey_box import GreyBox
 
 ENGINES = ("auto", "torch", "compiled", "firm")

@@ -18,12 +18,16 @@ class Inputs:
         fins: fin angles, rad, (..., T, m), or None for fins held at zero.
         voltage: V, (..., T), or None.
         altitude: height above the bottom, m, (..., T), or None.
+        within: commands over P equal parts of each row's interval, (..., T, P, n), where they change between samples and
+            that is known; None where they are held. The command of a row then is that with the mean thrust, which solvers
+            with steps of their own take.
     """
 
     command: Tensor
     fins: Tensor | None = None
     voltage: Tensor | None = None
     altitude: Tensor | None = None
+    within: Tensor | None = None
 
     def rows(self, first: int, last: int | None = None) -> Inputs:
         """Return rows `first` to `last` (excluded)."""
@@ -33,6 +37,7 @@ class Inputs:
             None if self.fins is None else self.fins[..., part, :],
             None if self.voltage is None else self.voltage[..., part],
             None if self.altitude is None else self.altitude[..., part],
+            None if self.within is None else self.within[..., part, :, :],
         )
 
     @property
@@ -66,4 +71,5 @@ def joined(parts: Sequence[Inputs]) -> Inputs:
         rows(p.fins for p in parts),
         rows(p.voltage for p in parts),
         rows(p.altitude for p in parts),
+        rows(p.within for p in parts),
     )

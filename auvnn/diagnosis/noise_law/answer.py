@@ -21,6 +21,7 @@ from auvnn.diagnosis.noise_law.commands.in_place_of_names import (
     without,
     without_timed,
 )
+from auvnn.diagnosis.noise_law.commands.share import with_share
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncertain_wrench
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.noise_law.left_force import leaves_force
@@ -83,6 +84,8 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
     if untimed is not None and law is not None:
         gone = replaced(untimed, least)
         asked, least, held = without(asked, gone), untimed, law
+    with suppress(*UNSOLVED):
+        held = with_share(asked.layout, least, state.windows, held)
     windows = held.applied(state.windows)
     try:
         uncertain = uncertain_wrench(least, state.windows, held)

@@ -3,54 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import torch
 from torch import Tensor, nn
 
-from auvnn.effects import Effect, Response
+from auvnn.effects import Effect
 from auvnn.errors import ConfigError
+from auvnn.models.actuation.drive import Drive, delayed, lagged, side_by_side, states_of
 from auvnn.models.actuation.thrust_signal import Answer, ThrustSignal
 from auvnn.physics.thrusters import allocation_matrix, quadratic_thrust, table_thrust
 from auvnn.vehicle import Vehicle
-
-
-@dataclass(frozen=True)
-class Drive:
-    """The thrust over T rows' intervals, each cut into equal steps, N (or the wrench).
-
-    Where an effect has the fins follow their commands, their actual angles, rad, come after the thrust: n is then the
-    number of thrusters and fins together.
-
-    Attributes:
-        means: average thrust over each step, (..., T, steps, n), or (..., T, 1, n) where all steps have the same.
-        slopes: rise of the equivalent straight line over each step, or None where the thrust is constant.
-        starts: thrust just after the interval began, (..., T, n): what an accelerometer sees there.
-        steps: per interval.
-    """
-
-    means: Tensor
-    slopes: Tensor | None
-    starts: Tensor
-    steps: int
-
-    @property
-    def mean(self) -> list[list[Tensor]]:
-        """Average thrust, [interval][step], (..., n): views, so that a loop need not index."""
-        if self.means.shape[-2] == 1:
-            return [[row] * self.steps for row in self.means.squeeze(-2).unbind(-2)]
-        return [list(row.unbind(-2)) for row in self.means.unbind(-3)]
-
-    @property
-    def slope(self) -> list[list[Tensor]] | None:
-        """Slopes, [interval][step], or None."""
-        return None if self.slopes is None else [list(row.unbind(-2)) for row in self.slopes.unbind(-3)]
-
-    @property
-    def start(self) -> list[Tensor]:
-        """Thrust as each interval begins, [interval]."""
-        return list(self.starts.unbind(-2))
 
 
 def _double(values: Any) -> Tensor:
@@ -143,7 +106,7 @@ class Actuators(nn.Module):
         """
         demand = self.demand(command, times, effects)
         lag = answer_of(effects, "respond")
-        states = demand if lag is None else _states(demand, times, lag, 1)[0]
+        states = demand if lag is None else states_of(demand, times, lag, 1)[0]
         return ThrustSignal(demand, states, times, lag)
 
     def steering(self, fins: Tensor | None, times: Tensor, effects: Sequence[Effect]) -> ThrustSignal | None:
@@ -157,7 +120,7 @@ class Actuators(nn.Module):
         steer = answer_of(effects, "steer")
         if steer is None or fins is None:
             return None
-        return ThrustSignal(fins, _states(fins, times, steer, 1)[0], times, steer)
+        return ThrustSignal(fins, states_of(fins, times, steer, 1)[0], times, steer)
 
     def drive(
         self,
@@ -167,6 +130,7 @@ class Actuators(nn.Module):
         substeps: int = 1,
         warmup: int = 0,
         fins: Tensor | None = None,
+        within: Tensor | None = None,
     ) -> Drive:
         """Work out the thrust over a stretch, after the effects on commands and the actuators' dynamics.
 
@@ -181,16 +145,42 @@ class Actuators(nn.Module):
             warmup: rows before the stretch.
             fins: commanded fin angles, rad, (..., warmup + T, m); where an effect has the fins follow them, the actual
                 angles come after the thrust.
+            within: commands over equal parts of each interval, (..., warmup + T, parts, n), see `Inputs`. They stand for
+                `command` where each part is a whole number of steps.
 
         Returns:
             The thrust over the T - 1 intervals of the stretch, and at its last row.
         """
-        thrust = self._thrust(command, times, effects, substeps, warmup)
+        if within is None or substeps % within.shape[-2]:
+            thrust = self._thrust(command, times, effects, substeps, warmup)
+        else:
+            thrust = self._over_parts(within, times, effects, substeps, warmup)
         steer = answer_of(effects, "steer")
         if steer is None or fins is None:
             return thrust
-        angles = _lagged(fins, *_states(fins, times, steer, substeps), substeps, warmup)
-        return _side_by_side(thrust, angles)
+        angles = lagged(fins, *states_of(fins, times, steer, substeps), substeps, warmup)
+        return side_by_side(thrust, angles)
+
+    def _over_parts(
+        self, within: Tensor, times: Tensor, effects: Sequence[Effect], substeps: int, warmup: int
+    ) -> Drive:
+        """Return the thrust of commands that are held for a part of an interval, each part as a row of its own."""
+        parts = within.shape[-2]
+        steps = times[..., 1:] - times[..., :-1]
+        # No interval follows the last row: its parts are as long as those before, as if the record went on.
+        steps = torch.cat([steps, steps[..., -1:]], dim=-1) / parts
+        fine = times.unsqueeze(-1) + steps.unsqueeze(-1) * torch.arange(parts, device=times.device)
+        found = self._thrust(
+            within.flatten(-3, -2), fine.flatten(-2), effects, substeps // parts, warmup * parts
+        )
+        rows = within.shape[-3] - warmup
+        means = found.means.expand(*found.means.shape[:-2], substeps // parts, -1)
+        return Drive(
+            means.unflatten(-3, (rows, parts)).flatten(-3, -2),
+            None if found.slopes is None else found.slopes.unflatten(-3, (rows, parts)).flatten(-3, -2),
+            found.starts[..., ::parts, :],
+            substeps,
+        )
 
     def _thrust(
         self, command: Tensor, times: Tensor, effects: Sequence[Effect], substeps: int, warmup: int
@@ -202,12 +192,12 @@ class Actuators(nn.Module):
             plain = Drive(rows.unsqueeze(-2), None, rows, substeps)
             states = demand
         else:
-            states, answer = _states(demand, times, lag, substeps)
-            plain = _lagged(demand, states, answer, substeps, warmup)
+            states, answer = states_of(demand, times, lag, substeps)
+            plain = lagged(demand, states, answer, substeps, warmup)
         if late is None:
             return plain
         signal = ThrustSignal(demand, states, times, lag)
-        return _delayed(plain, signal, late.delay(), substeps, warmup)
+        return delayed(plain, signal, late.delay(), substeps, warmup)
 
 
 def _only(effects: Sequence[Effect], hook: str) -> Effect | None:
@@ -227,73 +217,3 @@ def answer_of(effects: Sequence[Effect], hook: str) -> Answer | None:
     """
     effect = _only(effects, hook)
     return None if effect is None else getattr(effect, hook)
-
-
-def _side_by_side(thrust: Drive, angles: Drive) -> Drive:
-    """Return thrust and fin angles as one, (..., n + m)."""
-    assert angles.slopes is not None
-    slopes = thrust.slopes
-    if slopes is None:
-        slopes = torch.zeros_like(thrust.means).expand(*thrust.means.shape[:-2], thrust.steps, -1)
-    means = thrust.means.expand(slopes.shape)
-    return Drive(
-        torch.cat([means, angles.means], dim=-1),
-        torch.cat([slopes, angles.slopes], dim=-1),
-        torch.cat([thrust.starts, angles.starts], dim=-1),
-        thrust.steps,
-    )
-
-
-def _states(demand: Tensor, times: Tensor, lag: Answer, substeps: int) -> tuple[Tensor, Response]:
-    """Return the thrust as each row begins, (..., T, n), and the answer to a unit gap over each step."""
-    # No interval follows the last row; its thrust is needed only at its very start.
-    steps = torch.cat([times[..., 1:] - times[..., :-1], torch.zeros_like(times[..., :1])], dim=-1)
-    h = steps.to(demand).unsqueeze(-1) / substeps
-    # The answer is linear in the gap between state and demand: one call for all steps tells how the gap closes,
-    # and the recursion in time is left with two operations a row.
-    unit = torch.ones_like(h)
-    answer = lag(unit, torch.zeros_like(h), h)
-    rows = demand.unbind(-2)
-    over = (answer.end**substeps).unbind(-2)
-    state, states = rows[0], []
-    for row, left in zip(rows, over, strict=True):
-        states.append(state)
-        state = row + (state - row) * left
-    return torch.stack(states, dim=-2), answer
-
-
-def _lagged(demand: Tensor, states: Tensor, answer: Response, substeps: int, warmup: int) -> Drive:
-    gap = (states - demand)[..., warmup:, :]
-    demand = demand[..., warmup:, :]
-    end, mean, slope, start = (
-        x[..., warmup:, :] for x in (answer.end, answer.mean, answer.slope, answer.start)
-    )
-    means, slopes = [], []
-    for part in range(substeps):
-        now = gap * end**part
-        means.append(demand + now * mean)
-        slopes.append(now * slope)
-    return Drive(torch.stack(means, dim=-2), torch.stack(slopes, dim=-2), demand + gap * start, substeps)
-
-
-def _delayed(plain: Drive, signal: ThrustSignal, delay: Tensor, substeps: int, warmup: int) -> Drive:
-    """Return the drive that comes `delay` seconds later; without delay it is `plain` to the last bit."""
-    times = signal.times[..., warmup:]
-    rows = times.shape[-1]
-    steps = times[..., 1:] - times[..., :-1]
-    # The last row is held for no time: a step like the one before stands in for it.
-    last = steps[..., -1:] if rows > 1 else torch.ones_like(times)
-    steps = torch.cat([steps, last], dim=-1) / substeps
-    begin = times.unsqueeze(-1) + steps.unsqueeze(-1) * torch.arange(substeps, device=times.device)
-    begin, length = begin.flatten(-2), steps.repeat_interleave(substeps, dim=-1)
-    longest = 1.0 if times.is_meta else float(steps.max())
-    late = delay.to(times)
-    mean, slope = signal.over(begin - late, length, longest)
-    # The same sums without delay take away their own rounding, so that a delay of zero changes nothing at all.
-    mean_now, slope_now = signal.over(begin, length, longest)
-    means = plain.means + (mean - mean_now).unflatten(-2, (rows, substeps))
-    slopes = (slope - slope_now).unflatten(-2, (rows, substeps))
-    if plain.slopes is not None:
-        slopes = slopes + plain.slopes
-    start = torch.where(late > 0, signal.at(times - late), plain.starts)
-    return Drive(means, slopes, start, substeps)

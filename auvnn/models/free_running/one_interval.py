@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
-from auvnn.models.actuation.actuators import Drive
+from auvnn.models.actuation.drive import Drive
 from auvnn.models.engine import compiled_run
 from auvnn.models.free_running.rollout import fixed_steps
 from auvnn.models.free_running.tableaus import TABLEAUS

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from auvnn.effects import Effect
 from auvnn.errors import ConfigError
-from auvnn.models.actuation.actuators import Drive
+from auvnn.models.actuation.drive import Drive
 from auvnn.models.engine import compiled_run
 from auvnn.models.free_running.excursions import extrapolated
 from auvnn.models.free_running.limits import LIMIT
@@ -121,6 +121,7 @@ def rollout(
         substeps,
         warmup,
         _alongside(inputs.fins, rows) if model.using("steer") else None,
+        inputs.within,
     )
     whole, inputs, times = (inputs, times), inputs.rows(warmup), times[..., warmup:]
     state = (eta0.expand(*batch, 7), nu0.expand(*batch, 6))

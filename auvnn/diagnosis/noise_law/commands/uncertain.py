@@ -106,13 +106,15 @@ def law_differences(model: GreyBox, windows: Windows, held: Holding) -> Array:
         return _thrust(model, command + share * (following - command), windows)
 
     with torch.no_grad():
-        straight = between(windows, LINEAR)
+        straight = between(windows, LINEAR, curves=held.curves)
         if held.name == "ahead":
             return _rms([_wrench(model, windows) - _wrench(model, straight)], windows)
         if held.name == "averaged":
             return _rms([_wrench(model, straight) - _wrench(model, held.applied(windows))], windows)
-        bent = _wrench(model, between(windows, LINEAR, smooth=True)) - _wrench(model, straight)
-        return _rms([bent, (line(0.0) + 4.0 * line(0.5) + line(1.0)) / 6.0 - line(0.5)], windows)
+        along = _thrust(model, straight.inputs.command, windows)
+        cubic = between(windows, LINEAR, smooth=True, curves=held.curves)
+        bent = _wrench(model, cubic) - _wrench(model, straight)
+        return _rms([bent, (line(0.0) + 4.0 * line(0.5) + line(1.0)) / 6.0 - along], windows)
 
 
 def noise_answered(end: FittedHypothesis, windows: Windows) -> Array:

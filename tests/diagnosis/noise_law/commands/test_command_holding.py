@@ -19,9 +19,13 @@ from auvnn.diagnosis.noise_law.commands.holding import (
     AVERAGED,
     Holding,
     between,
-    cubic_weights,
+    cubic_at,
     holding,
+    line_at,
+    step_at,
 )
+from auvnn.diagnosis.noise_law.commands.mean_thrust import MeanThrust
+from auvnn.estimation.window_parts import split
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, sines, small_vehicle, thinned
 
@@ -59,15 +63,38 @@ def test_a_share_mixes_each_sample_with_the_next(model):
     assert torch.equal(mixed[:, -1], plain[:, -1]) and between(windows, 0.0) is windows
 
 
-def test_the_cubic_through_four_samples_has_the_mean_of_any_cubic():
+def mean_of_power(power, low, high):
+    return (high ** (power + 1) - low ** (power + 1)) / ((power + 1) * (high - low))
+
+
+@pytest.mark.parametrize("part", [(0.0, 1.0), (0.25, 0.5)])
+def test_the_cubic_through_four_samples_has_the_mean_of_any_cubic(part):
     """By the closed form of the integral of a power; over the interval itself -1, 13, 13, -1 over 24."""
-    assert np.allclose(cubic_weights(0.5), np.array([-1.0, 13.0, 13.0, -1.0]) / 24.0)
     at = np.array([-1.0, 0.0, 1.0, 2.0])
-    for share in (0.0, 0.3, 0.41, 1.0):
+    for share in (0.0, 0.3, 0.5, 1.0):
+        moments, weights = cubic_at(share, part)
+        found = np.array(weights) @ np.array(moments)
+        if share == 0.5 and part == (0.0, 1.0):
+            assert np.allclose(found, np.array([-1.0, 13.0, 13.0, -1.0]) / 24.0)
         for power in range(4):
-            low, high = share - 0.5, share + 0.5
-            mean = (high ** (power + 1) - low ** (power + 1)) / (power + 1)
-            assert np.dot(cubic_weights(share), at**power) == pytest.approx(mean, abs=1e-12)
+            mean = mean_of_power(power, share - 0.5 + part[0], share - 0.5 + part[1])
+            assert np.dot(found, at**power) == pytest.approx(mean, abs=1e-12)
+
+
+def test_moments_on_the_line_have_the_mean_of_any_power_up_to_the_seventh():
+    for part in ((0.0, 1.0), (0.5, 0.75)):
+        moments, weights = line_at(0.5, part)
+        for power in range(8):
+            found = sum(w * m[1] ** power for m, w in zip(moments, weights, strict=True))
+            assert found == pytest.approx(mean_of_power(power, *part), rel=1e-12)
+        assert all(sum(m) == pytest.approx(1.0) for m in moments)
+
+
+def test_a_command_that_changes_once_is_the_one_before_it_and_then_the_next():
+    """With 0.3 of the interval left: nothing of its first half, a fifth of (0.5, 0.75), all of the last quarter."""
+    for part, after in (((0.0, 0.5), 0.0), ((0.5, 0.75), 0.2), ((0.75, 1.0), 1.0), ((0.0, 1.0), 0.3)):
+        moments, weights = step_at(0.3, part)
+        assert moments == [(1.0, 0.0), (0.0, 1.0)] and weights == pytest.approx((1.0 - after, after))
 
 
 def test_a_smooth_command_is_the_mean_of_its_cubic(model):
@@ -75,6 +102,60 @@ def test_a_smooth_command_is_the_mean_of_its_cubic(model):
     mixed, plain = between(windows, 0.5, smooth=True).inputs.command, windows.inputs.command
     own = (-plain[:, :-3] + 13.0 * plain[:, 1:-2] + 13.0 * plain[:, 2:-1] - plain[:, 3:]) / 24.0
     assert torch.allclose(mixed[:, 1:-2], own)
+
+
+def test_a_command_stands_for_the_mean_thrust(model):
+    """Of a quadratic curve, over a straight line that does not change its sign: T = F (a^2 + a b + b^2) / 3."""
+    windows = windows_for(model, make_log(model, duration=12.0, rate=5.0))
+    plain = windows.inputs.command
+    found = between(windows, 0.5, curves=MeanThrust.of(model)).inputs.command[:, :-1]
+    a, b = plain[:, :-1], plain[:, 1:]
+    mean = torch.sign(a) * (a * a + a * b + b * b) / 3.0
+    same = a * b > 0.0
+    torch.testing.assert_close((found * found.abs())[same], mean[same], rtol=1e-5, atol=1e-7)
+    # Through zero: -|a|^3 / 3 and b^3 / 3 over the whole rise.
+    crossed = (b.abs() ** 3 - a.abs() ** 3) / (3.0 * (a.abs() + b.abs())) * torch.sign(b)
+    rest = a * b < 0.0
+    assert rest.any()
+    # The curve bends sharply at zero: four moments are good to some percent of the largest thrust there.
+    assert ((found * found.abs())[rest] - crossed[rest]).abs().max() < 0.03 * mean.abs().max()
+
+
+def test_a_command_that_stays_and_one_of_a_wrench_are_their_own(model):
+    windows = windows_for(model, make_log(model, duration=12.0, rate=5.0))
+    still = torch.full_like(windows.inputs.command, 0.37)
+    held = replace(windows, inputs=replace(windows.inputs, command=still))
+    curves = MeanThrust.of(model)
+    assert torch.allclose(between(held, 0.5, curves=curves).inputs.command, still, rtol=1e-15, atol=0.0)
+    assert MeanThrust.of(GreyBox(small_vehicle(), actuation="wrench")) is None
+
+
+def test_each_step_of_an_interval_has_its_own_mean(model):
+    """0.2 s at steps of 0.05 s, on a straight line: four parts, whose mean is that of the interval."""
+    windows = windows_for(model, make_log(model, duration=12.0, rate=5.0))
+    inputs, plain = between(windows, 0.5).inputs, windows.inputs.command
+    assert inputs.within.shape == (*plain.shape[:2], 4, 8)
+    rise = plain[:, 1:] - plain[:, :-1]
+    for k in range(4):
+        own = plain[:, :-1] + (k + 0.5) / 4.0 * rise
+        assert torch.allclose(inputs.within[:, :-1, k], own)
+    assert torch.allclose(inputs.within.mean(-2), inputs.command)
+    curves = MeanThrust.of(model)
+    inputs = between(windows, 0.5, curves=curves).inputs
+    thrust, parts = (model.actuators.static(x) for x in (inputs.command, inputs.within))
+    # Where a command goes through zero the moments of the whole interval miss a little of the bend.
+    same = (plain[:, :-1] * plain[:, 1:] > 0.0).expand_as(rise)
+    torch.testing.assert_close(parts.mean(-2)[:, :-1][same], thrust[:, :-1][same], rtol=1e-4, atol=1e-4)
+    assert not torch.allclose(inputs.within.mean(-2), inputs.command)
+
+
+def test_windows_that_are_divided_and_picked_keep_what_is_within(model):
+    windows = between(windows_for(model, make_log(model, duration=12.0, rate=5.0)), 0.5)
+    assert torch.equal(windows.pick(slice(1, 2)).inputs.within, windows.inputs.within[1:2])
+    assert torch.equal(windows.inputs.rows(3, 7).within, windows.inputs.within[:, 3:7])
+    parts, _, _ = split(windows, 2.0)
+    assert parts.inputs.within.shape[:2] == parts.inputs.command.shape[:2]
+    assert torch.allclose(parts.inputs.within.mean(-2), parts.inputs.command)
 
 
 def test_a_fit_that_grows_without_bound_is_passed_over(model):

@@ -15,6 +15,7 @@ from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.commands import uncertain
 from auvnn.diagnosis.noise_law.commands.holding import Holding
+from auvnn.diagnosis.noise_law.commands.mean_thrust import MeanThrust
 from auvnn.diagnosis.noise_law.commands.uncertain import (
     UncertainWrench,
     in_closed_loop,
@@ -36,7 +37,8 @@ def commanded(values, curve=lambda u: u):
     command = torch.zeros(1, len(values), 6, dtype=torch.float64)
     command[0, :, 0] = torch.as_tensor(values)
     actuators = SimpleNamespace(static=curve, allocation=torch.eye(6, dtype=torch.float64))
-    windows: Any = Shape(Given(command), length=np.array([len(values) - 2]))
+    times = 0.05 * torch.arange(len(values), dtype=torch.float64).unsqueeze(0)
+    windows: Any = Shape(Given(command), np.array([len(values) - 2]), times)
     return SimpleNamespace(actuators=actuators), windows
 
 
@@ -46,6 +48,7 @@ class Given:
 
     command: torch.Tensor
     fins: torch.Tensor | None = None
+    within: torch.Tensor | None = None
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,8 @@ class Shape:
 
     inputs: Given
     length: np.ndarray
+    times: torch.Tensor
+    max_step: float = 0.05
     nu: torch.Tensor | None = None
     warmup: int = 2
 
@@ -71,6 +76,16 @@ def test_a_curve_of_the_thrust_adds_what_the_mean_command_does_not_give():
     model, windows = commanded(0.1 * np.arange(20.0), lambda u: u**2)
     found = law_differences(model, windows, Holding("smooth", 0.5, 9.0, 9.0))
     assert found[0] == pytest.approx(0.1**2 / 12.0, rel=1e-9)
+
+
+def test_where_the_mean_thrust_is_taken_a_curve_adds_nothing():
+    """The same line, with the commands whose square is the mean of the squares."""
+    model, windows = commanded(0.04 * np.arange(20.0), lambda u: u**2)
+    grid = np.linspace(0.0, 1.0, 100001)
+    curves = MeanThrust(grid, np.repeat((grid**2)[:, None], 6, axis=1))
+    plain = law_differences(model, windows, Holding("linear", 0.5, 9.0, 9.0))
+    found = law_differences(model, windows, Holding("linear", 0.5, 9.0, 9.0, curves=curves))
+    assert plain[0] == pytest.approx(0.04**2 / 12.0, rel=1e-9) and found[0] < 1e-4 * plain[0]
 
 
 def test_commands_that_change_within_intervals_leave_half_their_step():
@@ -184,7 +199,8 @@ def test_fins_in_the_flow_count_too():
     nu = torch.zeros(1, 38, 6, dtype=torch.float64)
     nu[..., 0] = 1.5
     given = Given(torch.zeros(1, 40, 1, dtype=torch.float64), torch.as_tensor(fins)[None])
-    windows: Any = Shape(given, length=np.array([38]), nu=nu)
+    times = 0.05 * torch.arange(40, dtype=torch.float64).unsqueeze(0)
+    windows: Any = Shape(given, np.array([38]), times, nu=nu)
     found = law_differences(model, windows, Holding("ahead", 0.3, 9.0, 9.0))
     fin = model.vehicle.fins[2]
     lift = 0.5 * model.vehicle.water_density * fin.area * fin.lift_slope * 1.5**2 * 0.01

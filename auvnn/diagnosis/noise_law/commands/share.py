@@ -1,0 +1,74 @@
+"""By how much of an interval commands that go straight or along a cubic are ahead of the log: asked of a fit to these.
+
+The first question is put to a fit of held commands, whose errors are mostly those of holding: they hide that a controller
+of 100 Hz, whose commands are held for 10 ms, is late by 5 ms. A fit to commands between samples sees that, as a lag or a
+delay of the thrust if it is told nowhere else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
+from auvnn.diagnosis.noise_law.commands.holding import (
+    LINEAR,
+    PLAINER,
+    Holding,
+    between,
+    cost_at_best,
+    least_share,
+)
+from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
+from auvnn.metrics.windows import Windows
+
+# Steps of the fit: it begins where that of held commands ended.
+ITERATIONS = 6
+
+
+def with_share(layout: Layout, end: FittedHypothesis, windows: Windows, held: Holding) -> Holding:
+    """Return how commands go once the share has been asked of a fit to commands that go so.
+
+    Args:
+        layout: of the model as it is stated.
+        end: the explanation by which commands were asked for.
+        windows: of commands at the log's samples, as read.
+        held: how commands go by it.
+
+    Raises:
+        FitError: the fit has nowhere to begin.
+        numpy.linalg.LinAlgError: free running with the fit grows without bound.
+    """
+    if held.name not in ("linear", "ahead", "smooth"):
+        return held
+    base = [n for n in end.names if n not in end.effects]
+    fit = fit_hypothesis(
+        layout,
+        held.applied(windows),
+        base,
+        end.effects,
+        start=end.fitted,
+        guess=replace(layout, model=end.fitted.model),
+        iterations=ITERATIONS,
+    )
+    sums = fit.fitted.statistics
+    factor = variance_inflation(sums.slope, sums.total, sums.run)
+
+    def cost(share: float, smooth: bool) -> float:
+        some = between(windows, share, smooth=smooth, curves=held.curves)
+        return cost_at_best(fit, some) / factor
+
+    plain = cost_at_best(fit, held.applied(windows)) / factor
+    found, most = held, PLAINER
+    for name, begin in (("ahead", held.share), ("smooth", held.share), ("smooth", LINEAR)):
+        best = least_share(partial(cost, smooth=name == "smooth"), begin)
+        if best is None:
+            continue
+        share, least, odds = best
+        if 0.5 * (plain - least) + odds > most:
+            most = 0.5 * (plain - least) + odds
+            found = replace(
+                held, name=name, share=share, odds=held.odds + most, gain=held.gain + plain - least
+            )
+    return found
