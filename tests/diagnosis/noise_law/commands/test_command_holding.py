@@ -18,6 +18,7 @@ from auvnn.diagnosis.noise_law.answer import _held
 from auvnn.diagnosis.noise_law.commands.holding import (
     AVERAGED,
     Holding,
+    _best,
     between,
     cubic_at,
     holding,
@@ -26,7 +27,8 @@ from auvnn.diagnosis.noise_law.commands.holding import (
 )
 from auvnn.diagnosis.noise_law.commands.mean_thrust import MeanThrust
 from auvnn.estimation.window_parts import split
-from auvnn.models import GreyBox
+from auvnn.metrics.windows import cut_windows
+from auvnn.models import GreyBox, load
 from tests.small_logs import make_log, sines, small_vehicle, thinned
 
 STEP = 5
@@ -128,6 +130,20 @@ def test_a_command_that_stays_and_one_of_a_wrench_are_their_own(model):
     curves = MeanThrust.of(model)
     assert torch.allclose(between(held, 0.5, curves=curves).inputs.command, still, rtol=1e-15, atol=0.0)
     assert MeanThrust.of(GreyBox(small_vehicle(), actuation="wrench")) is None
+    # The thrust of this table is largest at 0.97: behind it one command stands for all, but for itself.
+    falling = MeanThrust.of(load("bluerov2_heavy"))
+    full = torch.full((1, 2, 8), 0.985, dtype=torch.float64)
+    assert torch.equal(falling.command_for([full, full], (0.5, 0.5)), full)
+
+
+def test_the_least_share_is_looked_for_where_a_wide_parabola_leads():
+    """A cost that grows with the fourth power far from its least, at 0.12: from one half a parabola leads to 0.30."""
+
+    def cost(share):
+        return 1000.0 * ((share - 0.12) ** 2 + 3.0 * (share - 0.12) ** 4)
+
+    ((share, least, odds),) = _best(cost, [cost(0.0), cost(0.5), cost(1.0)])
+    assert share == pytest.approx(0.12, abs=0.01) and least < 1.0 and odds < 0.0
 
 
 def test_each_step_of_an_interval_has_its_own_mean(model):
@@ -153,7 +169,9 @@ def test_windows_that_are_divided_and_picked_keep_what_is_within(model):
     windows = between(windows_for(model, make_log(model, duration=12.0, rate=5.0)), 0.5)
     assert torch.equal(windows.pick(slice(1, 2)).inputs.within, windows.inputs.within[1:2])
     assert torch.equal(windows.inputs.rows(3, 7).within, windows.inputs.within[:, 3:7])
-    parts, _, _ = split(windows, 2.0)
+    long = between(cut_windows(make_log(model, duration=50.0, rate=5.0), 24.0), 0.5)
+    parts, _, _ = split(long, 8.0)
+    assert len(parts) > len(long)
     assert parts.inputs.within.shape[:2] == parts.inputs.command.shape[:2]
     assert torch.allclose(parts.inputs.within.mean(-2), parts.inputs.command)
 
