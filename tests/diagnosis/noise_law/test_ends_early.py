@@ -14,7 +14,7 @@ from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench
 from auvnn.diagnosis.noise_law.noise_colour import Colour
 from auvnn.metrics.coloured_noise import NoiseColour
 
-NOTHING: Any = SimpleNamespace(floor=None, say=lambda _: None)
+NOTHING: Any = SimpleNamespace(floor=None, layout=None, say=lambda _: None)
 
 
 class Stage(SimpleNamespace):
