@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 from pathlib import Path
 
@@ -43,6 +44,7 @@ SAMPLES = {
     "rows-23.jsonl": 22,
     "rows-24.jsonl": 23,
     "rows-25.jsonl": 24,
+    "rows-26.jsonl": 25,
 }
 
 
@@ -77,7 +79,7 @@ def test_the_fresh_rows_are_logs_of_the_plan_on_which_rules_are_made():
 
 
 def test_the_fresh_logs_of_each_world_give_what_is_told():
-    text = (HERE / "README.md").read_text()
+    text = (HERE / "history.md").read_text()
     for world, said in (("disturbed", ("20 of 21", "1 of 39")), ("shaped", ("9 of 17", "3 of 20"))):
         rows = [r for r in rows_of(MADE) if r["part"] in (world, f"{world}_nothing")]
         seen = [r for r in rows if r["kind"] == "effect" and worlds.visible(r)]
@@ -109,9 +111,21 @@ def test_the_rows_give_what_is_told(name):
         "intervals_right": sum(abs(z) < Z95 for r in rows for z in z_of(r)),
     }
     assert found == expected
-    text = (HERE / "README.md").read_text()
+    text = "".join((HERE / n).read_text() for n in ("README.md", "history.md"))
     for words in (
         f"{found['visible_named_or_tied']} of {found['visible']} visible",
         f"{found['wrong_first']} of {found['logs']} logs",
     ):
         assert words in text
+
+
+def test_the_tables_are_those_of_the_rows():
+    spec = importlib.util.spec_from_file_location("samples", HERE / "samples.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert list(module.samples()) == list(range(1, len(SAMPLES) + 1))
+    text = (HERE / "README.md").read_text().splitlines()
+    for lines in (module.table(), module.table(3)):
+        begin = text.index(lines[0])
+        assert text[begin : begin + len(lines)] == lines

@@ -25,13 +25,14 @@ def stochastic_words(stochastic: Mapping[str, Any]) -> list[str]:
         lines.append(f"The sensors' noise is not white; its correlation times: {times}.")
     commands = stochastic.get("commands")
     if commands and commands["between_samples"] != "held":
-        next_one = commands["share_of_next"]
+        next_one, what = commands["share_of_next"], "thrust"
         along = f"as {1 - next_one:.0%} of its own sample's and {next_one:.0%} of the next one's"
         if commands["between_samples"] == "smooth":
             along = f"along the cubic through four samples, {next_one - 0.5:+.2f} of an interval from its own"
         elif commands["between_samples"] == "averaged":
+            what = "command"
             along = f"as the average of {commands['samples']} samples about it, because commands have noise"
-        lines.append(f"Commands change between the log's samples: the mean of an interval was taken {along}.")
+        lines.append(f"Commands change between the log's samples: the mean {what} of an interval was taken {along}.")
     uncertain = {a: v for a, v in (commands or {}).get("uncertain", {}).items() if v > 0.0}
     if uncertain:
         sizes = [f"{MOTIONS[a]} {v:.2g} {'N' if a in 'XYZ' else 'N m'}" for a, v in uncertain.items()]
