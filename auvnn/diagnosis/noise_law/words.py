@@ -32,7 +32,9 @@ def stochastic_words(stochastic: Mapping[str, Any]) -> list[str]:
         elif commands["between_samples"] == "averaged":
             what = "command"
             along = f"as the average of {commands['samples']} samples about it, because commands have noise"
-        lines.append(f"Commands change between the log's samples: the mean {what} of an interval was taken {along}.")
+        lines.append(
+            f"Commands change between the log's samples: the mean {what} of an interval was taken {along}."
+        )
     uncertain = {a: v for a, v in (commands or {}).get("uncertain", {}).items() if v > 0.0}
     if uncertain:
         sizes = [f"{MOTIONS[a]} {v:.2g} {'N' if a in 'XYZ' else 'N m'}" for a, v in uncertain.items()]
