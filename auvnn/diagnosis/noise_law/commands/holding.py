@@ -25,38 +25,27 @@ regression calibration.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from functools import partial
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from scipy.stats import binom
-from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.commands.mean_thrust import MeanThrust
+from auvnn.diagnosis.noise_law.commands.paths import LAWS, between
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.metrics.windows import Windows
-from auvnn.models.free_running.rollout import steps_per_interval
 
 Array = NDArray[np.float64]
 LINEAR = 0.5
 # Shares next to one another that a second parabola goes through.
 NEAR = 0.1
-# Places within an interval and their weights: exact up to the seventh power of the time.
-PLACES, WEIGHTS = (
-    x / 2.0 + shift for x, shift in zip(np.polynomial.legendre.leggauss(4), (0.5, 0.0), strict=True)
-)
 # Samples whose mean is tried for commands with noise; more are tried as long as they are worth it.
 AVERAGED = (4, 8, 16)
-# Moments as weights of neighbouring samples, and the weights of the moments; and what gives them of part of an interval.
-Moments = tuple[Sequence[tuple[float, ...]], tuple[float, ...]]
-Law = Callable[[float, tuple[float, float]], Moments]
 # Where the straight line does as well as a share of its own up to these odds, it is the plainer answer.
 PLAINER = float(np.log(10.0))
 
@@ -79,12 +68,12 @@ class Holding:
     odds: float
     gain: float
     samples: int = 0
-    curves: MeanThrust | None = None
+    curves: MeanThrust | None = field(default=None, compare=False)
 
     def applied(self, windows: Windows) -> Windows:
         """Return windows of commands that go so."""
-        smooth = self.name == "smooth"
-        return between(windows, self.share, smooth=smooth, samples=self.samples, curves=self.curves)
+        along = self.name if self.name in LAWS else "ahead"
+        return between(windows, self.share, along, samples=self.samples, curves=self.curves)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
@@ -93,94 +82,6 @@ class Holding:
 
 
 HELD = Holding("held", 0.0, 0.0, 0.0)
-
-
-def between(
-    windows: Windows,
-    share: float,
-    *,
-    smooth: bool = False,
-    samples: int = 0,
-    curves: MeanThrust | None = None,
-) -> Windows:
-    """Return windows whose commands and fins have the means that they take between samples.
-
-    Args:
-        windows: of commands that are held.
-        share: of the next sample's command in an interval's mean.
-        smooth: along the cubic through four samples instead of the straight line through two.
-        samples: in the mean with binomial weights, an even number; zero for the share's own law.
-        curves: of the thrusters: the command whose thrust is the mean thrust is returned, but for a mean with binomial
-            weights, which takes noise out of the commands.
-    """
-    if share == 0.0 and not smooth:
-        return windows
-    given = windows.inputs
-    if samples:
-        weights = binomial_weights(samples)
-        fins = None if given.fins is None else _along(given.fins, weights)
-        return replace(windows, inputs=replace(given, command=_along(given.command, weights), fins=fins))
-    law = cubic_at if smooth else line_at if share == LINEAR else step_at
-    parts = steps_per_interval(windows.times, windows.max_step)
-    fins = None if given.fins is None else _mean(given.fins, law, share, (0.0, 1.0), None)
-    command = _mean(given.command, law, share, (0.0, 1.0), curves)
-    within = None
-    if parts > 1:
-        edges = np.arange(parts + 1) / parts
-        within = torch.stack(
-            [_mean(given.command, law, share, (a, b), curves) for a, b in pairwise(edges)], dim=-2
-        )
-    return replace(windows, inputs=replace(given, command=command, fins=fins, within=within))
-
-
-def _mean(
-    values: Tensor, law: Law, share: float, part: tuple[float, float], curves: MeanThrust | None
-) -> Tensor:
-    """Return what stands for a part of every interval, from begin to end as shares of it."""
-    moments, weights = law(share, part)
-    paths = [_along(values, moment) for moment in moments]
-    if curves is not None:
-        return curves.command_for(paths, weights)
-    return torch.stack([w * x for w, x in zip(weights, paths, strict=True)]).sum(0)
-
-
-def _along(values: Tensor, weights: Sequence[float]) -> Tensor:
-    """Return sums of neighbouring samples, (B, L, n), half of the weights before the middle of each interval."""
-    before, after = len(weights) // 2 - 1, len(weights) // 2
-    ends = values[:, :1].expand(-1, before, -1), values[:, -1:].expand(-1, after, -1)
-    whole = torch.cat([ends[0], values, ends[1]], dim=1)
-    count = values.shape[1]
-    return torch.stack([w * whole[:, j : j + count] for j, w in enumerate(weights)]).sum(0)
-
-
-def binomial_weights(samples: int) -> tuple[float, ...]:
-    """Return binomial weights of so many samples, half of them before the middle of an interval, half after it."""
-    return tuple(float(w) for w in binom.pmf(np.arange(samples), samples - 1, 0.5))
-
-
-def cubic_at(share: float, part: tuple[float, float]) -> Moments:
-    """Return weights of samples -1, 0, 1, 2 in the cubic through them, at moments of a part of an interval.
-
-    Args:
-        share: by how much the interval is moved, less one half.
-        part: begin and end, as shares of the interval.
-    """
-    at = (-1.0, 0.0, 1.0, 2.0)
-    times = share - 0.5 + part[0] + (part[1] - part[0]) * PLACES
-    weights = [tuple(float(np.prod([(t - m) / (j - m) for m in at if m != j])) for j in at) for t in times]
-    return weights, tuple(WEIGHTS)
-
-
-def line_at(share: float, part: tuple[float, float]) -> Moments:
-    """Return the same of samples 0 and 1 on the straight line between them, whatever the share."""
-    times = part[0] + (part[1] - part[0]) * PLACES
-    return [(1.0 - t, t) for t in times], tuple(WEIGHTS)
-
-
-def step_at(share: float, part: tuple[float, float]) -> Moments:
-    """Return the same of commands that change from sample 0 to sample 1 when that share of the interval is left."""
-    after = float(np.clip(part[1] - (1.0 - share), 0.0, part[1] - part[0]) / (part[1] - part[0]))
-    return [(1.0, 0.0), (0.0, 1.0)], (1.0 - after, after)
 
 
 def holding(first: FittedHypothesis, windows: Windows) -> Holding:
@@ -202,16 +103,15 @@ def holding(first: FittedHypothesis, windows: Windows) -> Holding:
     sums = first.fitted.statistics
     factor = variance_inflation(sums.slope, sums.total, sums.run)
 
-    def cost(share: float, smooth: bool = False, samples: int = 0) -> float:
-        some = between(windows, share, smooth=smooth, samples=samples, curves=curves)
+    def cost(share: float, along: str = "ahead", samples: int = 0) -> float:
+        some = between(windows, share, along, samples=samples, curves=curves)
         return cost_at_best(first, some) / factor
 
-    plain, half, full = (cost(share) for share in (0.0, LINEAR, 1.0))
-    cubic = [cost(share, True) for share in (0.0, LINEAR, 1.0)]
-    found = Holding("linear", LINEAR, 0.5 * (plain - half), plain - half, curves=curves)
-    rivals = [("smooth", LINEAR, cubic[1], 0.0)]
-    rivals += [("ahead", *at) for at in _best(cost, (plain, half, full))]
-    rivals += [("smooth", *at) for at in _best(partial(cost, smooth=True), cubic)]
+    plain, straight = cost(0.0), cost(LINEAR, "linear")
+    found = Holding("linear", LINEAR, 0.5 * (plain - straight), plain - straight, curves=curves)
+    wide = {along: [cost(share, along) for share in (0.0, LINEAR, 1.0)] for along in ("ahead", "smooth")}
+    rivals = [("smooth", LINEAR, wide["smooth"][1], 0.0)]
+    rivals += [(n, *at) for n, costs in wide.items() for at in _best(partial(cost, along=n), costs)]
     for name, share, least, odds in rivals:
         if 0.5 * (plain - least) + odds > found.odds + PLAINER:
             found = Holding(name, share, 0.5 * (plain - least) + odds, plain - least, curves=curves)

@@ -16,10 +16,10 @@ from auvnn.diagnosis.noise_law.commands.holding import (
     LINEAR,
     PLAINER,
     Holding,
-    between,
     cost_at_best,
     least_share,
 )
+from auvnn.diagnosis.noise_law.commands.paths import between
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.metrics.windows import Windows
 
@@ -55,14 +55,14 @@ def with_share(layout: Layout, end: FittedHypothesis, windows: Windows, held: Ho
     sums = fit.fitted.statistics
     factor = variance_inflation(sums.slope, sums.total, sums.run)
 
-    def cost(share: float, smooth: bool) -> float:
-        some = between(windows, share, smooth=smooth, curves=held.curves)
+    def cost(share: float, along: str) -> float:
+        some = between(windows, share, along, curves=held.curves)
         return cost_at_best(fit, some) / factor
 
     plain = cost_at_best(fit, held.applied(windows)) / factor
     found, most = held, PLAINER
     for name, begin in (("ahead", held.share), ("smooth", held.share), ("smooth", LINEAR)):
-        best = least_share(partial(cost, smooth=name == "smooth"), begin)
+        best = least_share(partial(cost, along=name), begin)
         if best is None:
             continue
         share, least, odds = best

@@ -18,7 +18,8 @@ from scipy.stats import f as f_distribution
 from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.noise_law.commands.holding import LINEAR, Holding, between
+from auvnn.diagnosis.noise_law.commands.holding import LINEAR, Holding
+from auvnn.diagnosis.noise_law.commands.paths import between
 from auvnn.diagnosis.residuals.forces import fins_of
 from auvnn.effects.base import AXES
 from auvnn.estimation.window_normal_equations import linearise
@@ -106,13 +107,13 @@ def law_differences(model: GreyBox, windows: Windows, held: Holding) -> Array:
         return _thrust(model, command + share * (following - command), windows)
 
     with torch.no_grad():
-        straight = between(windows, LINEAR, curves=held.curves)
+        straight = between(windows, LINEAR, "linear", curves=held.curves)
         if held.name == "ahead":
             return _rms([_wrench(model, windows) - _wrench(model, straight)], windows)
         if held.name == "averaged":
             return _rms([_wrench(model, straight) - _wrench(model, held.applied(windows))], windows)
         along = _thrust(model, straight.inputs.command, windows)
-        cubic = between(windows, LINEAR, smooth=True, curves=held.curves)
+        cubic = between(windows, LINEAR, "smooth", curves=held.curves)
         bent = _wrench(model, cubic) - _wrench(model, straight)
         return _rms([bent, (line(0.0) + 4.0 * line(0.5) + line(1.0)) / 6.0 - along], windows)
 

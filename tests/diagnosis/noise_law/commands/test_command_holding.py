@@ -19,13 +19,10 @@ from auvnn.diagnosis.noise_law.commands.holding import (
     AVERAGED,
     Holding,
     _best,
-    between,
-    cubic_at,
     holding,
-    line_at,
-    step_at,
 )
 from auvnn.diagnosis.noise_law.commands.mean_thrust import MeanThrust
+from auvnn.diagnosis.noise_law.commands.paths import between, cubic_at, line_at, step_at
 from auvnn.estimation.window_parts import split
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox, load
@@ -65,6 +62,14 @@ def test_a_share_mixes_each_sample_with_the_next(model):
     assert torch.equal(mixed[:, -1], plain[:, -1]) and between(windows, 0.0) is windows
 
 
+def test_a_change_in_the_middle_is_no_straight_line(model):
+    """At 0.2 s and steps of 0.05 s: two parts of the sample's command and two of the next one's."""
+    windows = windows_for(model, make_log(model, duration=12.0, rate=5.0))
+    plain, within = windows.inputs.command, between(windows, 0.5).inputs.within
+    assert torch.equal(within[:, :-1, 1], plain[:, :-1]) and torch.equal(within[:, :-1, 2], plain[:, 1:])
+    assert not torch.allclose(within, between(windows, 0.5, "linear").inputs.within)
+
+
 def mean_of_power(power, low, high):
     return (high ** (power + 1) - low ** (power + 1)) / ((power + 1) * (high - low))
 
@@ -101,7 +106,7 @@ def test_a_command_that_changes_once_is_the_one_before_it_and_then_the_next():
 
 def test_a_smooth_command_is_the_mean_of_its_cubic(model):
     windows = windows_for(model, make_log(model, duration=12.0, rate=5.0))
-    mixed, plain = between(windows, 0.5, smooth=True).inputs.command, windows.inputs.command
+    mixed, plain = between(windows, 0.5, "smooth").inputs.command, windows.inputs.command
     own = (-plain[:, :-3] + 13.0 * plain[:, 1:-2] + 13.0 * plain[:, 2:-1] - plain[:, 3:]) / 24.0
     assert torch.allclose(mixed[:, 1:-2], own)
 
@@ -110,7 +115,7 @@ def test_a_command_stands_for_the_mean_thrust(model):
     """Of a quadratic curve, over a straight line that does not change its sign: T = F (a^2 + a b + b^2) / 3."""
     windows = windows_for(model, make_log(model, duration=12.0, rate=5.0))
     plain = windows.inputs.command
-    found = between(windows, 0.5, curves=MeanThrust.of(model)).inputs.command[:, :-1]
+    found = between(windows, 0.5, "linear", curves=MeanThrust.of(model)).inputs.command[:, :-1]
     a, b = plain[:, :-1], plain[:, 1:]
     mean = torch.sign(a) * (a * a + a * b + b * b) / 3.0
     same = a * b > 0.0
@@ -128,7 +133,9 @@ def test_a_command_that_stays_and_one_of_a_wrench_are_their_own(model):
     still = torch.full_like(windows.inputs.command, 0.37)
     held = replace(windows, inputs=replace(windows.inputs, command=still))
     curves = MeanThrust.of(model)
-    assert torch.allclose(between(held, 0.5, curves=curves).inputs.command, still, rtol=1e-15, atol=0.0)
+    assert torch.allclose(
+        between(held, 0.5, "linear", curves=curves).inputs.command, still, rtol=1e-15, atol=0.0
+    )
     assert MeanThrust.of(GreyBox(small_vehicle(), actuation="wrench")) is None
     # The thrust of this table is largest at 0.97: behind it one command stands for all, but for itself.
     falling = MeanThrust.of(load("bluerov2_heavy"))
@@ -149,7 +156,7 @@ def test_the_least_share_is_looked_for_where_a_wide_parabola_leads():
 def test_each_step_of_an_interval_has_its_own_mean(model):
     """0.2 s at steps of 0.05 s, on a straight line: four parts, whose mean is that of the interval."""
     windows = windows_for(model, make_log(model, duration=12.0, rate=5.0))
-    inputs, plain = between(windows, 0.5).inputs, windows.inputs.command
+    inputs, plain = between(windows, 0.5, "linear").inputs, windows.inputs.command
     assert inputs.within.shape == (*plain.shape[:2], 4, 8)
     rise = plain[:, 1:] - plain[:, :-1]
     for k in range(4):
@@ -157,7 +164,7 @@ def test_each_step_of_an_interval_has_its_own_mean(model):
         assert torch.allclose(inputs.within[:, :-1, k], own)
     assert torch.allclose(inputs.within.mean(-2), inputs.command)
     curves = MeanThrust.of(model)
-    inputs = between(windows, 0.5, curves=curves).inputs
+    inputs = between(windows, 0.5, "linear", curves=curves).inputs
     thrust, parts = (model.actuators.static(x) for x in (inputs.command, inputs.within))
     # Where a command goes through zero the moments of the whole interval miss a little of the bend.
     same = (plain[:, :-1] * plain[:, 1:] > 0.0).expand_as(rise)
@@ -166,10 +173,10 @@ def test_each_step_of_an_interval_has_its_own_mean(model):
 
 
 def test_windows_that_are_divided_and_picked_keep_what_is_within(model):
-    windows = between(windows_for(model, make_log(model, duration=12.0, rate=5.0)), 0.5)
+    windows = between(windows_for(model, make_log(model, duration=12.0, rate=5.0)), 0.5, "linear")
     assert torch.equal(windows.pick(slice(1, 2)).inputs.within, windows.inputs.within[1:2])
     assert torch.equal(windows.inputs.rows(3, 7).within, windows.inputs.within[:, 3:7])
-    long = between(cut_windows(make_log(model, duration=50.0, rate=5.0), 24.0), 0.5)
+    long = between(cut_windows(make_log(model, duration=50.0, rate=5.0), 24.0), 0.5, "linear")
     parts, _, _ = split(long, 8.0)
     assert len(parts) > len(long)
     assert parts.inputs.within.shape[:2] == parts.inputs.command.shape[:2]
