@@ -52,7 +52,9 @@ class FinDrag(FinEffect):
         inflow = torch.atan2(across, torch.where(speed > 1e-12, along, 1.0))
         now = self.now(moment)
         attack = torch.remainder(now.angles - inflow + 0.5 * torch.pi, torch.pi) - 0.5 * torch.pi
-        lift = lift_coefficient(attack, slope, stall * now.stall, SHARPNESS * now.sharpness, now.separated)
+        lift = lift_coefficient(
+            attack, slope, stall * now.stall, SHARPNESS * now.sharpness, now.separated, now.crossflow
+        )
         zero_lift, induced = self.theta.to(moment.nu).unbind(-1)
         size = 0.5 * density * area * (zero_lift + induced * lift * lift) * speed
         return matvec(rows.mT, (-size.unsqueeze(-1) * flow).flatten(-2))

@@ -86,6 +86,7 @@ class LiftEffect(FinEffect):
             density,
             SHARPNESS * lift.sharpness,
             lift.separated,
+            lift.crossflow,
         )
 
     def wrench(self, moment: Moment, body: Body) -> Tensor:

@@ -147,6 +147,7 @@ class FinLift:
         stall: factor on the angles at which the fins stall.
         sharpness: factor on how abruptly they do.
         separated: factor on the lift of the separated flow.
+        crossflow: lift of the flow around the tips, 1/rad^2.
     """
 
     angles: Tensor
@@ -154,6 +155,7 @@ class FinLift:
     stall: Tensor | float = 1.0
     sharpness: Tensor | float = 1.0
     separated: Tensor | float = 1.0
+    crossflow: Tensor | float = 0.0
 
 
 @dataclass(frozen=True)

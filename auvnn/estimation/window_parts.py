@@ -65,7 +65,10 @@ def _part(windows: Windows, begin: int, rows: int) -> Windows:
         nu_dot=of(windows.nu_dot, index),
         inputs=Inputs(
             given.command[:, both],
-            *(of(x, both) for x in (given.fins, given.voltage, given.altitude, given.within)),
+            *(
+                of(x, both)
+                for x in (given.fins, given.voltage, given.altitude, given.within, given.fins_within)
+            ),
         ),
         mask=windows.mask[:, index] * beyond[:, None],
         length=np.clip(windows.length - begin, 0, rows),
@@ -91,7 +94,7 @@ def _joined(parts: list[Windows]) -> Windows:
         eta=eta,
         nu=nu,
         nu_dot=of("nu_dot"),
-        inputs=Inputs(command, *(of(n) for n in ("fins", "voltage", "altitude", "within"))),
+        inputs=Inputs(command, *(of(n) for n in ("fins", "voltage", "altitude", "within", "fins_within"))),
         mask=mask,
         length=rows("length"),
     )

@@ -27,7 +27,8 @@ BLOCK = 48
 class Thrust(nn.Module):
     """Mean thrust of every interval, and the thrust as it begins, as functions of the effects' parameters.
 
-    Where an effect has the fins follow their commands, their angles come after the thrust and count among the n.
+    Where an effect has the fins follow their commands, or they go by parts of an interval, their angles come after the
+    thrust and count among the n.
     """
 
     def __init__(self, model: GreyBox) -> None:
@@ -36,14 +37,16 @@ class Thrust(nn.Module):
 
     def drive(self, windows: Windows, substeps: int) -> Drive:
         """Return the thrust over every step, by so many steps in an interval."""
+        given = windows.inputs
         return self.model.actuators.drive(
-            windows.inputs.command,
+            given.command,
             windows.times,
             self.model.before_thrust,
             substeps,
             windows.warmup,
-            windows.inputs.fins,
-            windows.inputs.within,
+            given.fins,
+            given.within,
+            given.fins_within,
         )
 
     def forward(self, windows: Windows, substeps: int) -> tuple[Tensor, Tensor]:

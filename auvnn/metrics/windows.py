@@ -86,7 +86,10 @@ class Windows:
         i = self.inputs
         inputs = Inputs(
             i.command[index],
-            *(None if x is None else x[index] for x in (i.fins, i.voltage, i.altitude, i.within)),
+            *(
+                None if x is None else x[index]
+                for x in (i.fins, i.voltage, i.altitude, i.within, i.fins_within)
+            ),
         )
         return replace(
             self,

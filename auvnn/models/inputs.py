@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -21,6 +21,7 @@ class Inputs:
         within: commands over P equal parts of each row's interval, (..., T, P, n), where they change between samples and
             that is known; None where they are held. The command of a row then is that with the mean thrust, which solvers
             with steps of their own take.
+        fins_within: fin angles over the same parts, rad, (..., T, P, m); None where they are held.
     """
 
     command: Tensor
@@ -28,6 +29,7 @@ class Inputs:
     voltage: Tensor | None = None
     altitude: Tensor | None = None
     within: Tensor | None = None
+    fins_within: Tensor | None = None
 
     def rows(self, first: int, last: int | None = None) -> Inputs:
         """Return rows `first` to `last` (excluded)."""
@@ -38,7 +40,27 @@ class Inputs:
             None if self.voltage is None else self.voltage[..., part],
             None if self.altitude is None else self.altitude[..., part],
             None if self.within is None else self.within[..., part, :, :],
+            None if self.fins_within is None else self.fins_within[..., part, :, :],
         )
+
+    def by_steps(self, substeps: int) -> Inputs:
+        """Return these without what goes by parts of an interval, where a part is no whole number of steps.
+
+        Args:
+            substeps: equal steps per interval.
+        """
+        parts = [x.shape[-2] for x in (self.within, self.fins_within) if x is not None]
+        if all(substeps % size == 0 for size in parts):
+            return self
+        return replace(self, within=None, fins_within=None)
+
+    def fins_move(self, steered: bool) -> bool:
+        """Return whether the fins' angles change within an interval, and so come beside the thrust.
+
+        Args:
+            steered: whether an effect has the fins follow their commands.
+        """
+        return self.fins is not None and (steered or self.fins_within is not None)
 
     @property
     def given(self) -> tuple[bool, ...]:
@@ -72,4 +94,5 @@ def joined(parts: Sequence[Inputs]) -> Inputs:
         rows(p.voltage for p in parts),
         rows(p.altitude for p in parts),
         rows(p.within for p in parts),
+        rows(p.fins_within for p in parts),
     )

@@ -44,11 +44,12 @@ def lift_coefficient(
     stall: Scalar,
     sharpness: Tensor | float = SHARPNESS,
     separated: Tensor | float = 1.0,
+    crossflow: Tensor | float = 0.0,
 ) -> Scalar:
     """Return the lift coefficient: attached flow blended smoothly into that of a flat plate.
 
-    C_L = (1 - s) c_La alpha + s c_s 2 sin(alpha) |sin(alpha)| cos(alpha)
-    1 - s = (1 + exp(-k)) / (1 + exp(k (|alpha| / alpha_0 - 1))) with k = 12, c_s = 1
+    C_L = (1 - s) (c_La alpha + c_c alpha |alpha|) + s c_s 2 sin(alpha) |sin(alpha)| cos(alpha)
+    1 - s = (1 + exp(-k)) / (1 + exp(k (|alpha| / alpha_0 - 1))) with k = 12, c_s = 1, c_c = 0
 
     The lift peaks a little before alpha_0, falls to the plate's and vanishes at +-pi/2. The slope at zero is c_La,
     however gentle the transition.
@@ -59,6 +60,8 @@ def lift_coefficient(
         stall: angle alpha_0 in the middle of the transition, rad, positive (...).
         sharpness: k, alpha_0 over the width of the transition.
         separated: c_s, share of the normal force of a long flat plate, 2 sin(alpha)^2, that the separated flow has.
+        crossflow: c_c, 1/rad^2, lift of the flow around the tips, the cross-flow drag over the effective aspect ratio
+            (Whicker and Fehlner 1958).
 
     Returns:
         (...), with a continuous slope. After Beard and McLain 2012, Small Unmanned Aircraft, section 4.2.
@@ -67,7 +70,7 @@ def lift_coefficient(
     attached = at_zero * torch.sigmoid(sharpness - (sharpness / stall) * angle.abs())
     sine = torch.sin(angle)
     plate = 2.0 * separated * sine * sine.abs() * torch.cos(angle)
-    return plate + attached * (lift_slope * angle - plate)
+    return plate + attached * ((lift_slope + crossflow * angle.abs()) * angle - plate)
 
 
 def fin_wrench(
@@ -80,6 +83,7 @@ def fin_wrench(
     density: Number,
     sharpness: Tensor | float = SHARPNESS,
     separated: Tensor | float = 1.0,
+    crossflow: Tensor | float = 0.0,
 ) -> Wrench:
     """Return the wrench of fins whose geometry is already in ``frame`` (see ``fin_frame``, ``fin_force``).
 
@@ -93,6 +97,7 @@ def fin_wrench(
         density: of the water, kg/m3.
         sharpness: of the transition, see `lift_coefficient`.
         separated: share of a long flat plate's normal force that the separated flow has.
+        crossflow: lift of the flow around the tips, 1/rad^2.
     """
     rows = matvec(frame.flatten(-3, -2), nu_r)
     flow = rows.unflatten(-1, (-1, 2))
@@ -102,7 +107,7 @@ def fin_wrench(
     inflow = torch.atan2(across, torch.where(speed > 0.0, along, 1.0))
     # A fin is taken as symmetric fore and aft: its angle to the flow counts modulo pi.
     attack = torch.remainder(angle - inflow + 0.5 * math.pi, math.pi) - 0.5 * math.pi
-    coefficient = lift_coefficient(attack, lift_slope, stall, sharpness, separated)
+    coefficient = lift_coefficient(attack, lift_slope, stall, sharpness, separated, crossflow)
     size = 0.5 * per_vector(density) * area * coefficient * speed
     lift = torch.stack((-size * across, size * along), -1)
     return matvec(frame.flatten(-3, -2).mT, lift.flatten(-2))

@@ -52,12 +52,14 @@ def test_a_model_saved_with_the_stall_angle_alone_is_still_read(tmp_path):
     model = GreyBox(example_vehicle()).with_effects({"fin_stall": {"factor": 1.3}})
     model.save(tmp_path)
     text = (tmp_path / "model.yaml").read_text()
-    assert "{factor: 1.3, separated: 1.0, sharpness: 1.0}" in text
+    assert "{factor: 1.3, separated: 1.0, sharpness: 1.0, crossflow: 0.0}" in text
     (tmp_path / "older.yaml").write_text(
-        text.replace(", separated: 1.0, sharpness: 1.0", "").replace("actuation: thrusters\n", "")
+        text.replace(", separated: 1.0, sharpness: 1.0, crossflow: 0.0", "").replace(
+            "actuation: thrusters\n", ""
+        )
     )
     (effect,) = load(tmp_path / "older.yaml").members
-    assert effect.values() == {"factor": 1.3, "separated": 1.0, "sharpness": 1.0}
+    assert effect.values() == {"factor": 1.3, "separated": 1.0, "sharpness": 1.0, "crossflow": 0.0}
 
 
 def test_a_vehicle_without_fins_lacks_them():

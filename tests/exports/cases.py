@@ -50,7 +50,8 @@ def model(name):
         return GreyBox(example_vehicle(), (), trained_like()).with_effects({
             **LAG, "ocean_current": {"v_north": 0.2, "v_east": -0.1}, "waves": {"amplitude": 0.2},
             "voltage_droop": {"exponent": 1.2}, "bottom_proximity": {"strength": 0.4},
-            "fin_stall": {"factor": 1.5, "separated": 0.6, "sharpness": 0.4}, "fin_gain": {"fin_1": 0.7},
+            "fin_stall": {"factor": 1.5, "separated": 0.6, "sharpness": 0.4, "crossflow": 0.5},
+            "fin_gain": {"fin_1": 0.7},
             "body_lift": {"Yuv": 3.0}, "compressibility": {"per_metre": 1e-3}, "propeller_torque": {"coefficient": 0.02},
             "thrust_inflow_loss": {"coefficient": 2.0}, "cross_flow_drag": None,
         })  # fmt: skip

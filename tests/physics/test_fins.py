@@ -150,6 +150,15 @@ def test_a_gentle_stall_is_within_reach():
     assert np.sqrt(np.mean(off((1.0, 1.0, 1.0)) ** 2)) > 0.7 * gentle.max()
 
 
+@pytest.mark.parametrize("angle", [0.03, 0.1, -0.1])
+def test_the_tips_add_a_square_of_the_angle_to_the_attached_lift(angle):
+    """Whicker and Fehlner (1958): C_L = c_La alpha + C_Dc / a alpha^2 where nothing is separated."""
+    numbers = (angle, SLOPE, STALL, 40.0, 1.0, 0.5)
+    expected = SLOPE * angle + math.copysign(0.5 * angle**2, angle)
+    assert float(lift_coefficient(*map(tensor, numbers))) == pytest.approx(expected, rel=1e-6)
+    assert expected != pytest.approx(SLOPE * angle, rel=1e-3)
+
+
 def test_force_passes_through_cross_flow_without_a_jump():
     """The angle of attack wraps at +-pi/2, where the lift is zero."""
     near = [fins([0.0, 0.0, 0.0, 0, 0, 0], [0.0, 0.0])]

@@ -27,8 +27,9 @@ def stochastic_words(stochastic: Mapping[str, Any]) -> list[str]:
     if commands and commands["between_samples"] != "held":
         next_one, what = commands["share_of_next"], "thrust"
         along = f"as {1 - next_one:.0%} of its own sample's and {next_one:.0%} of the next one's"
+        through = "the thrusts of four samples" if "interpolated" in commands else "four samples"
         if commands["between_samples"] == "smooth":
-            along = f"along the cubic through four samples, {next_one - 0.5:+.2f} of an interval from its own"
+            along = f"along the cubic through {through}, {next_one - 0.5:+.2f} of an interval from its own"
         elif commands["between_samples"] == "averaged":
             what = "command"
             along = f"as the average of {commands['samples']} samples about it, because commands have noise"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import torch
@@ -131,6 +131,7 @@ class Actuators(nn.Module):
         warmup: int = 0,
         fins: Tensor | None = None,
         within: Tensor | None = None,
+        fins_within: Tensor | None = None,
     ) -> Drive:
         """Work out the thrust over a stretch, after the effects on commands and the actuators' dynamics.
 
@@ -143,44 +144,21 @@ class Actuators(nn.Module):
             effects: in order of action.
             substeps: equal steps per interval.
             warmup: rows before the stretch.
-            fins: commanded fin angles, rad, (..., warmup + T, m); where an effect has the fins follow them, the actual
-                angles come after the thrust.
+            fins: commanded fin angles, rad, (..., warmup + T, m); where an effect has the fins follow them, or they
+                change within an interval, the actual angles come after the thrust.
             within: commands over equal parts of each interval, (..., warmup + T, parts, n), see `Inputs`. They stand for
                 `command` where each part is a whole number of steps.
+            fins_within: fin angles over the same parts, rad, (..., warmup + T, parts, m).
 
         Returns:
             The thrust over the T - 1 intervals of the stretch, and at its last row.
         """
-        if within is None or substeps % within.shape[-2]:
-            thrust = self._thrust(command, times, effects, substeps, warmup)
-        else:
-            thrust = self._over_parts(within, times, effects, substeps, warmup)
+        rows = (times, effects, substeps, warmup)
+        thrust = _by_parts(self._thrust, command, within, *rows)
         steer = answer_of(effects, "steer")
-        if steer is None or fins is None:
+        if fins is None or (steer is None and (fins_within is None or substeps % fins_within.shape[-2])):
             return thrust
-        angles = lagged(fins, *states_of(fins, times, steer, substeps), substeps, warmup)
-        return side_by_side(thrust, angles)
-
-    def _over_parts(
-        self, within: Tensor, times: Tensor, effects: Sequence[Effect], substeps: int, warmup: int
-    ) -> Drive:
-        """Return the thrust of commands that are held for a part of an interval, each part as a row of its own."""
-        parts = within.shape[-2]
-        steps = times[..., 1:] - times[..., :-1]
-        # No interval follows the last row: its parts are as long as those before, as if the record went on.
-        steps = torch.cat([steps, steps[..., -1:]], dim=-1) / parts
-        fine = times.unsqueeze(-1) + steps.unsqueeze(-1) * torch.arange(parts, device=times.device)
-        found = self._thrust(
-            within.flatten(-3, -2), fine.flatten(-2), effects, substeps // parts, warmup * parts
-        )
-        rows = within.shape[-3] - warmup
-        means = found.means.expand(*found.means.shape[:-2], substeps // parts, -1)
-        return Drive(
-            means.unflatten(-3, (rows, parts)).flatten(-3, -2),
-            None if found.slopes is None else found.slopes.unflatten(-3, (rows, parts)).flatten(-3, -2),
-            found.starts[..., ::parts, :],
-            substeps,
-        )
+        return side_by_side(thrust, _by_parts(_angles, fins, fins_within, *rows))
 
     def _thrust(
         self, command: Tensor, times: Tensor, effects: Sequence[Effect], substeps: int, warmup: int
@@ -198,6 +176,43 @@ class Actuators(nn.Module):
             return plain
         signal = ThrustSignal(demand, states, times, lag)
         return delayed(plain, signal, late.delay(), substeps, warmup)
+
+
+def _angles(fins: Tensor, times: Tensor, effects: Sequence[Effect], substeps: int, warmup: int) -> Drive:
+    """Return fin angles, as they are commanded or as an effect has them follow."""
+    steer = answer_of(effects, "steer")
+    if steer is None:
+        rows = fins[..., warmup:, :]
+        return Drive(rows.unsqueeze(-2), None, rows, substeps)
+    return lagged(fins, *states_of(fins, times, steer, substeps), substeps, warmup)
+
+
+def _by_parts(
+    work: Callable[[Tensor, Tensor, Sequence[Effect], int, int], Drive],
+    held: Tensor,
+    within: Tensor | None,
+    times: Tensor,
+    effects: Sequence[Effect],
+    substeps: int,
+    warmup: int,
+) -> Drive:
+    """Return what becomes of values that are held for a row, or for a part of its interval: a row of its own then."""
+    if within is None or substeps % within.shape[-2]:
+        return work(held, times, effects, substeps, warmup)
+    parts = within.shape[-2]
+    steps = times[..., 1:] - times[..., :-1]
+    # No interval follows the last row: its parts are as long as those before, as if the record went on.
+    steps = torch.cat([steps, steps[..., -1:]], dim=-1) / parts
+    fine = times.unsqueeze(-1) + steps.unsqueeze(-1) * torch.arange(parts, device=times.device)
+    found = work(within.flatten(-3, -2), fine.flatten(-2), effects, substeps // parts, warmup * parts)
+    rows = within.shape[-3] - warmup
+    means = found.means.expand(*found.means.shape[:-2], substeps // parts, -1)
+    return Drive(
+        means.unflatten(-3, (rows, parts)).flatten(-3, -2),
+        None if found.slopes is None else found.slopes.unflatten(-3, (rows, parts)).flatten(-3, -2),
+        found.starts[..., ::parts, :],
+        substeps,
+    )
 
 
 def _only(effects: Sequence[Effect], hook: str) -> Effect | None:

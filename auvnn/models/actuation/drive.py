@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -15,8 +16,8 @@ from auvnn.models.actuation.thrust_signal import Answer, ThrustSignal
 class Drive:
     """The thrust over T rows' intervals, each cut into equal steps, N (or the wrench).
 
-    Where an effect has the fins follow their commands, their actual angles, rad, come after the thrust: n is then the
-    number of thrusters and fins together.
+    Where an effect has the fins follow their commands, or they change within an interval, their actual angles, rad, come
+    after the thrust: n is then the number of thrusters and fins together.
 
     Attributes:
         means: average thrust over each step, (..., T, steps, n), or (..., T, 1, n) where all steps have the same.
@@ -50,15 +51,18 @@ class Drive:
 
 def side_by_side(thrust: Drive, angles: Drive) -> Drive:
     """Return thrust and fin angles as one, (..., n + m)."""
-    assert angles.slopes is not None
-    slopes = thrust.slopes
-    if slopes is None:
-        slopes = torch.zeros_like(thrust.means).expand(*thrust.means.shape[:-2], thrust.steps, -1)
-    means = thrust.means.expand(slopes.shape)
+    both = (thrust, angles)
+    straight = any(x.slopes is not None for x in both)
+    slopes = [torch.zeros_like(x.means) if x.slopes is None else x.slopes for x in both]
+    steps = max(x.shape[-2] for x in (*slopes, thrust.means, angles.means))
+
+    def joined(parts: Sequence[Tensor]) -> Tensor:
+        return torch.cat([x.expand(*x.shape[:-2], steps, -1) for x in parts], dim=-1)
+
     return Drive(
-        torch.cat([means, angles.means], dim=-1),
-        torch.cat([slopes, angles.slopes], dim=-1),
-        torch.cat([thrust.starts, angles.starts], dim=-1),
+        joined([x.means for x in both]),
+        joined(slopes) if straight else None,
+        torch.cat([x.starts for x in both], dim=-1),
         thrust.steps,
     )
 

@@ -44,6 +44,7 @@ def one_interval(
     voltage, altitude = (
         None if x is None else held(x, -1 % x.dim()) for x in (inputs.voltage, inputs.altitude)
     )
+    turning = None if inputs.fins_within is None else held(inputs.fins_within, -3 % inputs.fins_within.dim())
     alone = Drive(
         drive.means[..., :last, None, :, :],
         None if drive.slopes is None else drive.slopes[..., :last, None, :, :],
@@ -53,7 +54,7 @@ def one_interval(
     run = (
         model,
         (begin[..., :7], begin[..., 7:]),
-        Inputs(command, fins, voltage, altitude),
+        Inputs(command, fins, voltage, altitude, fins_within=turning),
         pairs,
         alone,
         substeps,

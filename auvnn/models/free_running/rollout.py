@@ -110,8 +110,10 @@ def rollout(
     substeps = steps_per_interval(times, max_step)
     if substeps * (times.shape[-1] - warmup) > MAX_STEPS:
         raise ConfigError(_over_budget(substeps * (times.shape[-1] - warmup), max_step))
+    inputs = inputs.by_steps(substeps)
     rows = torch.broadcast_shapes(inputs.command.shape[:-1], times.shape)
-    if model.using("steer") and inputs.fins is not None:
+    turning = inputs.fins_move(bool(model.using("steer")))
+    if turning and inputs.fins is not None:
         rows = torch.broadcast_shapes(rows, inputs.fins.shape[:-1])
     members = [e for e in model.effects if isinstance(e, Effect)]
     drive = model.actuators.drive(
@@ -120,8 +122,9 @@ def rollout(
         members,
         substeps,
         warmup,
-        _alongside(inputs.fins, rows) if model.using("steer") else None,
+        _alongside(inputs.fins, rows) if turning else None,
         inputs.within,
+        inputs.fins_within,
     )
     whole, inputs, times = (inputs, times), inputs.rows(warmup), times[..., warmup:]
     state = (eta0.expand(*batch, 7), nu0.expand(*batch, 6))

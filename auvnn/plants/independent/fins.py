@@ -18,8 +18,8 @@ class Fins:
 
     The chord turns with the fin's angle; the angle of attack is that from the flow in the fin's plane to the
     chord, taken within a right angle because the profile is the same fore and aft. The lift coefficient blends
-    from c_La alpha into a flat plate's 2 sin|sin| cos about the stall angle, over a twelfth of it, by a logistic
-    function that is one at no angle of attack.
+    from c_La alpha, and c_c alpha^2 of the flow around the tips, into a flat plate's 2 sin|sin| cos about the
+    stall angle, over a twelfth of it, by a logistic function that is one at no angle of attack.
 
     Args:
         vehicle: whose fins.
@@ -42,6 +42,7 @@ class Fins:
         self.zero_lift, self.induced = drag.get("zero_lift", 0.0), drag.get("induced", 0.0)
         stall = given.get("fin_stall", {})
         self.width = 12.0 * stall.get("sharpness", 1.0)
+        self.tips = stall.get("crossflow", 0.0)
         self.plate = 2.0 * stall.get("separated", 1.0)
         self.separation = separation
         fins = vehicle.fins
@@ -78,6 +79,7 @@ class Fins:
         sine = np.sin(attack)
         plate = self.plate * np.sign(sine) * sine**2 * np.cos(attack)
         lift = blend * self.slope * attack + (1.0 - blend) * plate
+        lift = lift + blend * self.tips * np.sign(attack) * attack**2
         if self.separation:
             gentle = self.slope * attack * np.cos(attack) / np.sqrt(1.0 + (attack / self.stall) ** 4)
             lift = lift + self.separation * (gentle - lift)

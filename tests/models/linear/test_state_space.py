@@ -159,7 +159,7 @@ def test_networks_fins_voltage_and_altitude_are_inputs():
         {
             "voltage_droop": {"exponent": 1.2},
             "bottom_proximity": {"strength": 0.4},
-            "fin_stall": {"factor": 1.5, "separated": 0.6, "sharpness": 0.4},
+            "fin_stall": {"factor": 1.5, "separated": 0.6, "sharpness": 0.4, "crossflow": 0.5},
         }
     )
     eta, nu, command = drawn(model, 2)

@@ -10,7 +10,8 @@ a share of zero holds the command, one half is the straight line, anything betwe
 changes so much of an interval before its sample. Where the command bends much within an interval, the straight line
 falls short: `smooth` is the cubic through four samples, over the interval that the share moves in the same way. Curves of
 thrust bend, too, and it is the mean thrust that counts (`MeanThrust`); where the integrator takes several steps in an
-interval, each has its own mean.
+interval, each has its own mean. Line and cubic go through the commands of the samples or through their thrusts, as the
+log is likelier.
 
 A fast controller answers the noise of its sensors, too, and a log that takes every twentieth of its commands has
 that noise in each sample, but not the next nineteen that outweigh it. Taken as held, it attenuates what the vehicle seems
@@ -25,7 +26,7 @@ regression calibration.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -78,6 +79,8 @@ class Holding:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
         told = {"between_samples": self.name, "share_of_next": self.share, "log_odds": self.odds}
+        if self.curves is not None and self.curves.through_thrusts:
+            told["interpolated"] = "thrust"
         return {**told, "samples": self.samples} if self.samples else told
 
 
@@ -103,24 +106,54 @@ def holding(first: FittedHypothesis, windows: Windows) -> Holding:
     sums = first.fitted.statistics
     factor = variance_inflation(sums.slope, sums.total, sums.run)
 
-    def cost(share: float, along: str = "ahead", samples: int = 0) -> float:
+    def cost(
+        share: float, along: str = "ahead", samples: int = 0, curves: MeanThrust | None = curves
+    ) -> float:
         some = between(windows, share, along, samples=samples, curves=curves)
         return cost_at_best(first, some) / factor
 
     plain, straight = cost(0.0), cost(LINEAR, "linear")
     found = Holding("linear", LINEAR, 0.5 * (plain - straight), plain - straight, curves=curves)
-    wide = {along: [cost(share, along) for share in (0.0, LINEAR, 1.0)] for along in ("ahead", "smooth")}
-    rivals = [("smooth", LINEAR, wide["smooth"][1], 0.0)]
-    rivals += [(n, *at) for n, costs in wide.items() for at in _best(partial(cost, along=n), costs)]
-    for name, share, least, odds in rivals:
-        if 0.5 * (plain - least) + odds > found.odds + PLAINER:
-            found = Holding(name, share, 0.5 * (plain - least) + odds, plain - least, curves=curves)
+    for name, through in laws_of(curves):
+        of = partial(cost, along=name, curves=through)
+        wide = [of(share) for share in (0.0, LINEAR, 1.0)]
+        rivals = [(LINEAR, wide[1], 0.0)] if name == "smooth" else []
+        for share, least, odds in [*rivals, *_best(of, wide)]:
+            if 0.5 * (plain - least) + odds > found.odds + PLAINER:
+                found = Holding(name, share, 0.5 * (plain - least) + odds, plain - least, curves=through)
     for samples in AVERAGED:
         gain = plain - cost(LINEAR, samples=samples)
         if 0.5 * gain <= found.odds + PLAINER:
             break
         found = Holding("averaged", LINEAR, 0.5 * gain, gain, samples)
-    return found if found.odds > ODDS else HELD
+    return through_thrusts(found, plain, cost) if found.odds > ODDS else HELD
+
+
+def laws_of(curves: MeanThrust | None) -> list[tuple[str, MeanThrust | None]]:
+    """Return the laws that have a share of their own, each with what it takes of the thrusters' curves.
+
+    Args:
+        curves: of the thrusters; None for a commanded wrench, whose samples have no thrusts of their own.
+    """
+    found = [("ahead", curves), ("smooth", curves)]
+    return found if curves is None else [*found, ("smooth", curves.of_thrusts())]
+
+
+def through_thrusts(found: Holding, plain: float, cost: Callable[..., float]) -> Holding:
+    """Return how commands go, by a line or cubic through thrusts where the log is likelier so.
+
+    Args:
+        found: how they go between the commands of samples.
+        plain: cost of what its gain is counted from.
+        cost: of a share, `along` a law, with `curves` of the thrust.
+    """
+    if found.curves is None or found.curves.through_thrusts or found.name not in ("linear", "smooth"):
+        return found
+    curves = found.curves.of_thrusts()
+    more = plain - cost(found.share, along=found.name, curves=curves) - found.gain
+    if not more > 0.0:
+        return found
+    return replace(found, odds=found.odds + 0.5 * more, gain=found.gain + more, curves=curves)
 
 
 def _best(cost: Callable[[float], float], wide: Sequence[float]) -> list[tuple[float, float, float]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -23,13 +23,22 @@ class MeanThrust:
     A curve bends: over an interval in which the command rises by d, a quadratic one gives d^2 / 12 of full thrust more
     than at the mean command. The thrust that effects make of commands bends nearly alike.
 
+    An allocation makes commands of thrusts. Those of a smooth wrench are smooth then, and the commands bend at once where
+    a thrust goes through zero, so that a curve through the thrusts of the samples is nearer to what went on between them.
+
     Attributes:
         command: that are looked up, (G,).
         thrust: at these, never falling, N, (G, n).
+        through_thrusts: whether lines and cubics go through the thrusts of the samples, not through their commands.
     """
 
     command: NDArray[np.float64]
     thrust: NDArray[np.float64]
+    through_thrusts: bool = False
+
+    def of_thrusts(self) -> MeanThrust:
+        """Return the same curves for lines and cubics through the thrusts of the samples."""
+        return replace(self, through_thrusts=True)
 
     @classmethod
     def of(cls, model: GreyBox) -> MeanThrust | None:
@@ -55,6 +64,7 @@ class MeanThrust:
             curve = self.thrust[:, i]
             parts = [np.interp(path[..., i].numpy(), self.command, curve) for path in paths]
             wanted = sum(w * part for part, w in zip(parts, weights, strict=True))
+            # A cubic may go beyond what a thruster has; it gives its most then.
             found[..., i] = torch.from_numpy(np.interp(wanted, curve, self.command))
         still = torch.stack([(path - paths[0]).abs() for path in paths]).amax(0) == 0.0
         return torch.where(still, mean, found)

@@ -52,15 +52,20 @@ def between(
         return replace(windows, inputs=replace(given, command=_along(given.command, weights), fins=fins))
     law = LAWS[along]
     parts = steps_per_interval(windows.times, windows.max_step)
-    fins = None if given.fins is None else _mean(given.fins, law, share, (0.0, 1.0), None)
-    command = _mean(given.command, law, share, (0.0, 1.0), curves)
-    within = None
-    if parts > 1:
-        edges = np.arange(parts + 1) / parts
-        within = torch.stack(
-            [_mean(given.command, law, share, (a, b), curves) for a, b in pairwise(edges)], dim=-2
-        )
-    return replace(windows, inputs=replace(given, command=command, fins=fins, within=within))
+    edges = np.arange(parts + 1) / parts
+
+    def of(values: Tensor | None, curves: MeanThrust | None) -> tuple[Tensor | None, Tensor | None]:
+        if values is None:
+            return None, None
+        each = [_mean(values, law, share, (a, b), curves) for a, b in pairwise(edges)] if parts > 1 else None
+        whole = _mean(values, law, share, (0.0, 1.0), curves)
+        return whole, None if each is None else torch.stack(each, dim=-2)
+
+    command, within = of(given.command, curves)
+    assert command is not None
+    fins, fins_within = of(given.fins, None)
+    inputs = replace(given, command=command, fins=fins, within=within, fins_within=fins_within)
+    return replace(windows, inputs=inputs)
 
 
 def _mean(
@@ -68,6 +73,12 @@ def _mean(
 ) -> Tensor:
     """Return what stands for a part of every interval, from begin to end as shares of it."""
     moments, weights = law(share, part)
+    if curves is not None and curves.through_thrusts:
+        # Of thrusts the mean over the path is one weighted sum of those of the samples.
+        whole = [
+            sum(w * m for w, m in zip(weights, each, strict=True)) for each in zip(*moments, strict=True)
+        ]
+        return curves.command_for(_neighbours(values, len(whole)), whole)
     paths = [_along(values, moment) for moment in moments]
     if curves is not None:
         return curves.command_for(paths, weights)
@@ -76,11 +87,16 @@ def _mean(
 
 def _along(values: Tensor, weights: Sequence[float]) -> Tensor:
     """Return sums of neighbouring samples, (B, L, n), half of the weights before the middle of each interval."""
-    before, after = len(weights) // 2 - 1, len(weights) // 2
+    near = _neighbours(values, len(weights))
+    return torch.stack([w * x for w, x in zip(weights, near, strict=True)]).sum(0)
+
+
+def _neighbours(values: Tensor, count: int) -> list[Tensor]:
+    """Return as many neighbouring samples of each interval, (B, L, n) each, half of them before its middle."""
+    before, after = count // 2 - 1, count // 2
     ends = values[:, :1].expand(-1, before, -1), values[:, -1:].expand(-1, after, -1)
     whole = torch.cat([ends[0], values, ends[1]], dim=1)
-    count = values.shape[1]
-    return torch.stack([w * whole[:, j : j + count] for j, w in enumerate(weights)]).sum(0)
+    return [whole[:, j : j + values.shape[1]] for j in range(count)]
 
 
 def binomial_weights(samples: int) -> tuple[float, ...]:

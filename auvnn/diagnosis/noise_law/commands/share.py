@@ -17,9 +17,12 @@ from auvnn.diagnosis.noise_law.commands.holding import (
     PLAINER,
     Holding,
     cost_at_best,
+    laws_of,
     least_share,
+    through_thrusts,
 )
-from auvnn.diagnosis.noise_law.commands.paths import between
+from auvnn.diagnosis.noise_law.commands.mean_thrust import MeanThrust
+from auvnn.diagnosis.noise_law.commands.paths import LAWS, between
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.metrics.windows import Windows
 
@@ -40,7 +43,7 @@ def with_share(layout: Layout, end: FittedHypothesis, windows: Windows, held: Ho
         FitError: the fit has nowhere to begin.
         numpy.linalg.LinAlgError: free running with the fit grows without bound.
     """
-    if held.name not in ("linear", "ahead", "smooth"):
+    if held.name not in LAWS:
         return held
     base = [n for n in end.names if n not in end.effects]
     fit = fit_hypothesis(
@@ -55,20 +58,20 @@ def with_share(layout: Layout, end: FittedHypothesis, windows: Windows, held: Ho
     sums = fit.fitted.statistics
     factor = variance_inflation(sums.slope, sums.total, sums.run)
 
-    def cost(share: float, along: str) -> float:
-        some = between(windows, share, along, curves=held.curves)
+    def cost(share: float, along: str, curves: MeanThrust | None) -> float:
+        some = between(windows, share, along, curves=curves)
         return cost_at_best(fit, some) / factor
 
+    stated = held.curves and replace(held.curves, through_thrusts=False)
     plain = cost_at_best(fit, held.applied(windows)) / factor
     found, most = held, PLAINER
-    for name, begin in (("ahead", held.share), ("smooth", held.share), ("smooth", LINEAR)):
-        best = least_share(partial(cost, along=name), begin)
-        if best is None:
-            continue
-        share, least, odds = best
-        if 0.5 * (plain - least) + odds > most:
-            most = 0.5 * (plain - least) + odds
-            found = replace(
-                held, name=name, share=share, odds=held.odds + most, gain=held.gain + plain - least
-            )
-    return found
+    for name, curves in laws_of(stated):
+        for begin in (held.share, LINEAR) if name == "smooth" else (held.share,):
+            best = least_share(partial(cost, along=name, curves=curves), begin)
+            if best is None:
+                continue
+            share, least, odds = best
+            if 0.5 * (plain - least) + odds > most:
+                most, gain = 0.5 * (plain - least) + odds, held.gain + plain - least
+                found = replace(held, name=name, share=share, odds=held.odds + most, gain=gain, curves=curves)
+    return through_thrusts(found, plain + held.gain, cost)

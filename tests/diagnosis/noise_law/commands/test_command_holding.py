@@ -23,6 +23,7 @@ from auvnn.diagnosis.noise_law.commands.holding import (
 )
 from auvnn.diagnosis.noise_law.commands.mean_thrust import MeanThrust
 from auvnn.diagnosis.noise_law.commands.paths import between, cubic_at, line_at, step_at
+from auvnn.diagnosis.noise_law.commands.share import with_share
 from auvnn.estimation.window_parts import split
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox, load
@@ -126,6 +127,48 @@ def test_a_command_stands_for_the_mean_thrust(model):
     assert rest.any()
     # The curve bends sharply at zero: four moments are good to some percent of the largest thrust there.
     assert ((found * found.abs())[rest] - crossed[rest]).abs().max() < 0.03 * mean.abs().max()
+
+
+@pytest.mark.parametrize("along", ["linear", "smooth"])
+def test_a_curve_through_thrusts_has_their_mean(model, along):
+    """Thrusts that go along one cubic (one line), some through zero: the mean over each interval, by its integral."""
+    windows = windows_for(model, make_log(model, duration=12.0, rate=5.0))
+    places = torch.arange(windows.inputs.command.shape[1], dtype=torch.float64)
+    middle = 0.5 * len(places)
+    random = np.random.default_rng(3)
+    powers = 4 if along == "smooth" else 2
+    size = random.uniform(-1.0, 1.0, (powers, 8)) / middle ** np.arange(powers)[:, None] / powers
+    share = 0.3 if along == "smooth" else 0.5
+
+    def thrust(of):
+        return sum(torch.from_numpy(size[p]) * of(p)[:, None] for p in range(powers))
+
+    at = thrust(lambda p: (places - middle) ** p)
+    command = torch.sign(at) * at.abs().sqrt()
+    some = replace(windows, inputs=replace(windows.inputs, command=command.expand(len(windows), -1, -1)))
+    curves = MeanThrust.of(model)
+    found = between(some, share, along, curves=curves.of_thrusts()).inputs.command[0]
+    begin = places - middle + share - 0.5
+    mean = thrust(lambda p: ((begin + 1.0) ** (p + 1) - begin ** (p + 1)) / (p + 1))
+    inside = slice(1, -2)
+    torch.testing.assert_close((found * found.abs())[inside], mean[inside], rtol=0.0, atol=2e-7)
+    # Through the commands themselves it is another thrust, where they bend.
+    other = between(some, share, along, curves=curves).inputs.command[0]
+    assert (other * other.abs() - mean)[inside].abs().max() > 1e-4
+
+
+@pytest.mark.parametrize("smooth", ["thrust", "command"])
+def test_a_log_says_whether_its_thrusts_or_its_commands_are_smooth(model, smooth):
+    """Ten ticks a sample, sines of the thrust (of the command): with a quadratic curve only one of them is smooth."""
+    t = np.arange(int(30.0 * 50.0) + 1) / 50.0
+    wave = 0.35 * sines(t, 8, seed=11, low=0.2, high=0.8)
+    command = np.clip(np.sign(wave) * np.sqrt(np.abs(wave)) if smooth == "thrust" else wave, -1.0, 1.0)
+    log = thinned(make_log(model, duration=30.0, rate=50.0, noise=0.1, max_step=0.02, command=command), 10)
+    windows, layout = windows_for(model, log), lay_out(model, [])
+    first = fit_hypothesis(layout, windows, list(layout.names), (), iterations=4)
+    found = with_share(layout, first, windows, holding(first, windows))
+    assert found.to_dict().get("interpolated", "command") == smooth
+    assert found.name in ("linear", "smooth") and found.share == pytest.approx(0.45, abs=0.05)
 
 
 def test_a_command_that_stays_and_one_of_a_wrench_are_their_own(model):

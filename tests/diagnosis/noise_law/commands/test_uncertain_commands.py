@@ -49,6 +49,7 @@ class Given:
     command: torch.Tensor
     fins: torch.Tensor | None = None
     within: torch.Tensor | None = None
+    fins_within: torch.Tensor | None = None
 
 
 @dataclass(frozen=True)
