@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.noise_law.commands.holding import HELD, Holding, cost_at_best, holding
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
+from auvnn.diagnosis.noise_law.commands.holding import (
+    HELD,
+    Holding,
+    cost_at_best,
+    cost_with,
+    holding,
+)
 from auvnn.diagnosis.noise_law.commands.in_place_of_names import (
     in_place_of_names,
     replaced,
@@ -78,9 +85,9 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
     began = state
     if not state.leaves_something:
         return _names_alone(asked, began, *_with_fewer_names(asked, state))
-    least, held = _held(state)
+    least, held = _held(asked.layout, state)
     untimed, gone = without_timed(asked, state, least), dict[str, str]()
-    law = None if untimed is None else replaces(untimed, least, held, state.windows)
+    law = None if untimed is None else replaces(untimed, least, held, state.windows, asked.layout)
     if untimed is not None and law is not None:
         gone = replaced(untimed, least)
         asked, least, held = without(asked, gone), untimed, law
@@ -167,7 +174,7 @@ def _with_fewer_names(asked: Setting, state: State) -> tuple[State, dict[str, An
     return again.but(failed={**again.failed, **gone}), {"commands": law.to_dict()}, []
 
 
-def _held(state: State) -> tuple[FittedHypothesis, Holding]:
+def _held(layout: Layout, state: State) -> tuple[FittedHypothesis, Holding]:
     """Return the explanation that leaves least, whatever the search made of it, and how commands go by it.
 
     One that was tried and is about to diverge says nothing of them: then the next best is asked. The fit without any name
@@ -179,14 +186,14 @@ def _held(state: State) -> tuple[FittedHypothesis, Holding]:
     least, held = state.first, HELD
     for end in sorted(known, key=lambda e: e.squared_error(sigma)):
         with suppress(np.linalg.LinAlgError):
-            least, held = end, holding(end, state.windows)
+            least, held = end, holding(end, state.windows, layout)
             break
     if held.name == "held" and least is not state.first:
         with suppress(np.linalg.LinAlgError):
-            plain = holding(state.first, state.windows)
+            plain = holding(state.first, state.windows, layout)
             if plain.name == "averaged" and not state.chosen:
                 return least, plain
-            alone = cost_at_best(state.first, plain.applied(state.windows))
+            alone = cost_with(plain, state.first, state.windows, layout=layout)
             if plain.odds > 0.0 and alone <= cost_at_best(least, state.windows, sigma):
                 return state.first, plain
     return least, held

@@ -17,7 +17,9 @@ A fast controller answers the noise of its sensors, too, and a log that takes ev
 that noise in each sample, but not the next nineteen that outweigh it. Taken as held, it attenuates what the vehicle seems
 to answer (errors in variables), as if it were heavier. `averaged` is a mean of more samples about the interval's middle,
 with binomial weights. Commands that change later than logged are another matter: that is `actuation_delay`. The log is
-asked by the likelihood of free running with everything that is uncertain following.
+asked by the likelihood of free running with everything that is uncertain following: to first order, about a fit to held
+commands; where the errors with other ones are too large for that, about a fit to these (a vehicle that steers by fins is
+far off its course within seconds of another fin angle).
 
 Reference: Carroll, Ruppert, Stefanski and Crainiceanu (2006), Measurement error in nonlinear models, chapter 4, on
 regression calibration.
@@ -33,11 +35,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.commands.mean_thrust import MeanThrust
 from auvnn.diagnosis.noise_law.commands.paths import LAWS, between
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.diagnosis.selection.model_comparison import ODDS
+from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.metrics.windows import Windows
 
@@ -49,6 +53,10 @@ NEAR = 0.1
 AVERAGED = (4, 8, 16)
 # Where the straight line does as well as a share of its own up to these odds, it is the plainer answer.
 PLAINER = float(np.log(10.0))
+# A squared error of so many times that of held commands is beyond the first order about a fit to these.
+FAR = 2.0
+# Steps of a fit to other commands: it begins where that of held ones ended.
+ITERATIONS = 6
 
 
 @dataclass(frozen=True)
@@ -87,7 +95,7 @@ class Holding:
 HELD = Holding("held", 0.0, 0.0, 0.0)
 
 
-def holding(first: FittedHypothesis, windows: Windows) -> Holding:
+def holding(first: FittedHypothesis, windows: Windows, layout: Layout | None = None) -> Holding:
     """Ask how commands go from sample to sample.
 
     A share of its own is where parabolas through the squared errors at several shares are least.
@@ -95,6 +103,8 @@ def holding(first: FittedHypothesis, windows: Windows) -> Holding:
     Args:
         first: a fit of commands that are held.
         windows: those it was fitted to.
+        layout: of the model as it is stated, for a fit to other commands where the first order is not enough; without it
+            none is made.
 
     Raises:
         numpy.linalg.LinAlgError: free running with the fit grows without bound.
@@ -105,18 +115,23 @@ def holding(first: FittedHypothesis, windows: Windows) -> Holding:
     curves = MeanThrust.of(first.fitted.model)
     sums = first.fitted.statistics
     factor = variance_inflation(sums.slope, sums.total, sums.run)
+    sigma, about = first.fitted.sigma, first
 
     def cost(
         share: float, along: str = "ahead", samples: int = 0, curves: MeanThrust | None = curves
     ) -> float:
         some = between(windows, share, along, samples=samples, curves=curves)
-        return cost_at_best(first, some) / factor
+        return cost_at_best(about, some, sigma) / factor
 
     plain, straight = cost(0.0), cost(LINEAR, "linear")
+    if layout is not None and straight > FAR * plain:
+        about = _nearer(layout, first, between(windows, LINEAR, "linear", curves=curves))
+        straight = cost(LINEAR, "linear")
     found = Holding("linear", LINEAR, 0.5 * (plain - straight), plain - straight, curves=curves)
     for name, through in laws_of(curves):
         of = partial(cost, along=name, curves=through)
-        wide = [of(share) for share in (0.0, LINEAR, 1.0)]
+        # Held commands are those of the first fit, whatever the others are taken about.
+        wide = [of(share) if share or about is not first else plain for share in (0.0, LINEAR, 1.0)]
         rivals = [(LINEAR, wide[1], 0.0)] if name == "smooth" else []
         for share, least, odds in [*rivals, *_best(of, wide)]:
             if 0.5 * (plain - least) + odds > found.odds + PLAINER:
@@ -127,6 +142,35 @@ def holding(first: FittedHypothesis, windows: Windows) -> Holding:
             break
         found = Holding("averaged", LINEAR, 0.5 * gain, gain, samples)
     return through_thrusts(found, plain, cost) if found.odds > ODDS else HELD
+
+
+def _nearer(layout: Layout, first: FittedHypothesis, windows: Windows) -> FittedHypothesis:
+    """Return a fit to other commands; the first one where there is none."""
+    try:
+        return fitted_to(layout, first, windows, first.fitted.sigma)
+    except (FitError, np.linalg.LinAlgError):
+        return first
+
+
+def fitted_to(
+    layout: Layout, end: FittedHypothesis, windows: Windows, sigma: Array | None = None
+) -> FittedHypothesis:
+    """Return an explanation fitted to other commands, from where it was.
+
+    Args:
+        layout: of the model as it is stated.
+        end: the explanation.
+        windows: of the other commands.
+        sigma: fixed weights; estimated where absent.
+
+    Raises:
+        FitError: the fit has nowhere to begin.
+    """
+    base = [n for n in end.names if n not in end.effects]
+    guess = replace(layout, model=end.fitted.model)
+    return fit_hypothesis(
+        layout, windows, base, end.effects, start=end.fitted, guess=guess, sigma=sigma, iterations=ITERATIONS
+    )
 
 
 def laws_of(curves: MeanThrust | None) -> list[tuple[str, MeanThrust | None]]:
@@ -187,6 +231,32 @@ def _vertex(costs: Sequence[float], middle: float, step: float) -> tuple[float, 
         return None
     share = middle - (high - low) / (2.0 * step) / bend
     return float(np.clip(share, 0.0, 1.0)), float(np.sqrt(2.0 / bend))
+
+
+def cost_with(
+    law: Holding,
+    first: FittedHypothesis,
+    windows: Windows,
+    sigma: Array | None = None,
+    layout: Layout | None = None,
+) -> float:
+    """Return the squared error of `cost_at_best` with commands that go by a law, about a fit to these where need be.
+
+    Args:
+        law: how commands go.
+        first: a fit of commands that are held.
+        windows: those it was fitted to.
+        sigma: (18,) weights, by default those of the fit.
+        layout: as `holding` takes it.
+
+    Raises:
+        numpy.linalg.LinAlgError: free running with the fit grows without bound.
+    """
+    some = law.applied(windows)
+    found = cost_at_best(first, some, sigma)
+    if layout is None or law.name == "held" or found <= FAR * cost_at_best(first, windows, sigma):
+        return found
+    return cost_at_best(_nearer(layout, first, some), some, first.fitted.sigma if sigma is None else sigma)
 
 
 def cost_at_best(first: FittedHypothesis, windows: Windows, sigma: Array | None = None) -> float:

@@ -15,7 +15,14 @@ from contextlib import suppress
 from dataclasses import replace
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.noise_law.commands.holding import HELD, Holding, cost_at_best, holding
+from auvnn.diagnosis.hypotheses.stated_priors import Layout
+from auvnn.diagnosis.noise_law.commands.holding import (
+    HELD,
+    Holding,
+    cost_at_best,
+    cost_with,
+    holding,
+)
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.diagnosis.stages.state import Setting, State
@@ -46,7 +53,7 @@ def in_place_of_names(asked: Setting, state: State) -> tuple[FittedHypothesis, H
     if untimed is not None:
         known.setdefault(frozenset(untimed.effects), untimed)
     for before in sorted(known.values(), key=lambda e: len(e.effects)):
-        law = replaces(before, end, HELD, state.windows)
+        law = replaces(before, end, HELD, state.windows, asked.layout)
         if law is not None:
             return before, law
     return None
@@ -93,7 +100,11 @@ def without_timed(asked: Setting, state: State, end: FittedHypothesis) -> Fitted
 
 
 def replaces(
-    before: FittedHypothesis, end: FittedHypothesis, held: Holding, windows: Windows
+    before: FittedHypothesis,
+    end: FittedHypothesis,
+    held: Holding,
+    windows: Windows,
+    layout: Layout | None = None,
 ) -> Holding | None:
     """Return the law of the commands with which an explanation does as well as one with more names, or None.
 
@@ -105,16 +116,17 @@ def replaces(
         end: that with more.
         held: the law of the commands with that.
         windows: of commands that are held.
+        layout: as `holding` takes it.
     """
     sums = end.fitted.statistics
     factor = variance_inflation(sums.slope, sums.total, sums.run)
     sigma = end.fitted.sigma
     with suppress(*UNSOLVED):
-        law = holding(before, windows)
+        law = holding(before, windows, layout)
         if law.odds <= 0.0:
             return None
-        alone = cost_at_best(before, law.applied(windows), sigma)
-        with_names = cost_at_best(end, held.applied(windows), sigma)
+        alone = cost_with(law, before, windows, sigma, layout)
+        with_names = cost_with(held, end, windows, sigma, layout)
         spared = len(end.fitted.theta) - len(before.fitted.theta) - (held.odds <= 0.0)
         least = PARAMETER * spared * factor
         if {*end.effects} - {*before.effects} <= {*timed(end)}:

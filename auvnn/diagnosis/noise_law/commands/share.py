@@ -10,13 +10,14 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.commands.holding import (
     LINEAR,
     PLAINER,
     Holding,
     cost_at_best,
+    fitted_to,
     laws_of,
     least_share,
     through_thrusts,
@@ -26,8 +27,8 @@ from auvnn.diagnosis.noise_law.commands.paths import LAWS, between
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.metrics.windows import Windows
 
-# Steps of the fit: it begins where that of held commands ended.
-ITERATIONS = 6
+# It is asked again as long as it moves by so much, so many times at most: far away the first order misleads.
+MOVED, MOST_TIMES = 0.02, 3
 
 
 def with_share(layout: Layout, end: FittedHypothesis, windows: Windows, held: Holding) -> Holding:
@@ -43,18 +44,18 @@ def with_share(layout: Layout, end: FittedHypothesis, windows: Windows, held: Ho
         FitError: the fit has nowhere to begin.
         numpy.linalg.LinAlgError: free running with the fit grows without bound.
     """
-    if held.name not in LAWS:
-        return held
-    base = [n for n in end.names if n not in end.effects]
-    fit = fit_hypothesis(
-        layout,
-        held.applied(windows),
-        base,
-        end.effects,
-        start=end.fitted,
-        guess=replace(layout, model=end.fitted.model),
-        iterations=ITERATIONS,
-    )
+    for _ in range(MOST_TIMES):
+        if held.name not in LAWS:
+            return held
+        before, held = held, _asked_once(layout, end, windows, held)
+        if held.name == before.name and abs(held.share - before.share) < MOVED:
+            break
+    return held
+
+
+def _asked_once(layout: Layout, end: FittedHypothesis, windows: Windows, held: Holding) -> Holding:
+    """Return the law that is likeliest about a fit to commands that go by the one before."""
+    fit = fitted_to(layout, end, held.applied(windows))
     sums = fit.fitted.statistics
     factor = variance_inflation(sums.slope, sums.total, sums.run)
 
@@ -66,7 +67,8 @@ def with_share(layout: Layout, end: FittedHypothesis, windows: Windows, held: Ho
     plain = cost_at_best(fit, held.applied(windows)) / factor
     found, most = held, PLAINER
     for name, curves in laws_of(stated):
-        for begin in (held.share, LINEAR) if name == "smooth" else (held.share,):
+        far = name == "smooth" and abs(held.share - LINEAR) > MOVED
+        for begin in (held.share, LINEAR) if far else (held.share,):
             best = least_share(partial(cost, along=name, curves=curves), begin)
             if best is None:
                 continue

@@ -240,7 +240,7 @@ def test_a_fit_that_grows_without_bound_is_passed_over(model):
         state: Any = SimpleNamespace(
             first=first, tried=list(tried), current=wild, refuted=None, windows=windows, chosen=()
         )
-        return _held(state)
+        return _held(None, state)
 
     assert found(first, wild) == (first, holding(first, windows))
     assert found(wild)[1].name == "held"
@@ -282,7 +282,7 @@ def test_names_stand_against_another_law_only_if_they_explain_more(model, monkey
     less = replace(first.fitted.statistics, channel=0.9 * first.fitted.statistics.channel)
     named = replace(first, effects=("lag",), fitted=replace(first.fitted, statistics=less))
     held = Holding("held", 0.0, 0.0, 0.0)
-    monkeypatch.setattr(answer, "holding", lambda e, w: held if e is named else holding(e, w))
+    monkeypatch.setattr(answer, "holding", lambda e, w, layout: held if e is named else holding(e, w))
     cost = answer.cost_at_best
     monkeypatch.setattr(
         answer, "cost_at_best", lambda e, *more: cost(e, *more) * (explains if e is named else 1.0)
@@ -290,7 +290,7 @@ def test_names_stand_against_another_law_only_if_they_explain_more(model, monkey
     state: Any = SimpleNamespace(
         first=first, tried=(named,), refuted=None, current=named, windows=windows, chosen=("lag",)
     )
-    least, law = _held(state)
+    least, law = _held(None, state)
     assert (law.name == "held") == (name == "held") and (least is named) == (name == "held")
 
 
@@ -303,10 +303,10 @@ def test_noisy_commands_count_where_no_name_stands(model, monkeypatch, chosen, n
     less = replace(first.fitted.statistics, channel=0.5 * first.fitted.statistics.channel)
     tried = replace(first, effects=("lag",), fitted=replace(first.fitted, statistics=less))
     held, averaged = Holding("held", 0.0, 0.0, 0.0), Holding("averaged", 0.5, 9.0, 9.0, 4)
-    monkeypatch.setattr(answer, "holding", lambda e, w: held if e is tried else averaged)
+    monkeypatch.setattr(answer, "holding", lambda e, w, layout: held if e is tried else averaged)
     monkeypatch.setattr(answer, "cost_at_best", lambda e, *more: float(e is first))
     state: Any = SimpleNamespace(
         first=first, tried=(tried,), refuted=None, current=first, windows=windows, chosen=chosen
     )
-    least, law = _held(state)
+    least, law = _held(None, state)
     assert law.name == name and least is tried

@@ -44,7 +44,9 @@ def ended(model: GreyBox, log: Log, order: list[str]) -> tuple[Any, State]:
     base = list(layout.nuisance)
     first = fit_hypothesis(layout, windows, base, ())
     path = tuple(fit_hypothesis(layout, windows, base, order[: k + 1]) for k in range(2))
-    asked = SimpleNamespace(base=tuple(base), chooser=lambda w: Chooser(layout, w, lambda _: None))
+    asked = SimpleNamespace(
+        layout=layout, base=tuple(base), chooser=lambda w: Chooser(layout, w, lambda _: None)
+    )
     return asked, State(windows, first, path[-1], chosen=tuple(order), path=path)
 
 
