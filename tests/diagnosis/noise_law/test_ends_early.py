@@ -84,7 +84,7 @@ def answered(monkeypatch, *, interrupted, force, coloured, leaves=True):
             raise np.linalg.LinAlgError("no")
         return None if force is None else (state, None, None)
 
-    monkeypatch.setattr(answer, "_held", lambda _: (None, HELD))
+    monkeypatch.setattr(answer, "_held", lambda *_: (None, HELD))
     monkeypatch.setattr(answer, "without_timed", lambda *_: None)
     monkeypatch.setattr(answer, "uncertain_wrench", lambda *_: UncertainWrench(np.zeros(6), np.zeros(6), 0.1))
     monkeypatch.setattr(answer, "noise_colour", lambda *_: Colour(noise, 5000.0))

@@ -27,8 +27,8 @@ from auvnn.diagnosis.noise_law.commands.paths import LAWS, between
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.metrics.windows import Windows
 
-# It is asked again as long as it moves by so much, so many times at most: far away the first order misleads.
-MOVED, MOST_TIMES = 0.02, 3
+# A share that is so far from one half is asked about one half, too.
+MOVED = 0.02
 
 
 def with_share(layout: Layout, end: FittedHypothesis, windows: Windows, held: Holding) -> Holding:
@@ -44,17 +44,8 @@ def with_share(layout: Layout, end: FittedHypothesis, windows: Windows, held: Ho
         FitError: the fit has nowhere to begin.
         numpy.linalg.LinAlgError: free running with the fit grows without bound.
     """
-    for _ in range(MOST_TIMES):
-        if held.name not in LAWS:
-            return held
-        before, held = held, _asked_once(layout, end, windows, held)
-        if held.name == before.name and abs(held.share - before.share) < MOVED:
-            break
-    return held
-
-
-def _asked_once(layout: Layout, end: FittedHypothesis, windows: Windows, held: Holding) -> Holding:
-    """Return the law that is likeliest about a fit to commands that go by the one before."""
+    if held.name not in LAWS:
+        return held
     fit = fitted_to(layout, end, held.applied(windows))
     sums = fit.fitted.statistics
     factor = variance_inflation(sums.slope, sums.total, sums.run)

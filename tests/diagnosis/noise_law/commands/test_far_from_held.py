@@ -11,7 +11,8 @@ import torch
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.noise_law.commands.holding import FAR, cost_at_best, cost_with, holding
+from auvnn.diagnosis.noise_law.commands.holding import FAR, Holding, cost_at_best, cost_with, holding
+from auvnn.diagnosis.noise_law.commands.mean_thrust import MeanThrust
 from auvnn.diagnosis.noise_law.commands.paths import between
 from auvnn.diagnosis.noise_law.commands.share import with_share
 from auvnn.logs import Log, Run
@@ -72,6 +73,15 @@ def test_fins_that_change_between_samples_are_not_held(model):
     # About a fit to these the error is what it is by the law that was found.
     assert cost_with(found, first, windows, layout=layout) < cost_at_best(first, windows)
     assert cost_with(found, first, windows) > cost_with(found, first, windows, layout=layout)
+
+
+def test_a_share_that_is_far_off_is_left(model):
+    """From where the first order about held commands may end: the fit to the middle of the interval is likelier."""
+    layout, first, windows = first_fit(model, steered(model, TICKS))
+    for name, share in (("smooth", 0.1), ("ahead", 0.1)):
+        far = Holding(name, share, 9.0, 18.0, curves=MeanThrust.of(model))
+        found = with_share(layout, first, windows, far)
+        assert found.share == pytest.approx(0.5 - 0.5 / TICKS, abs=0.05) and found.odds > 9.0
 
 
 def test_fins_that_are_held_are_held(model):
