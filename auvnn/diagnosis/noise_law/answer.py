@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
+from auvnn.diagnosis.noise_law.commands.early import clearly_between_samples
 from auvnn.diagnosis.noise_law.commands.holding import (
     HELD,
     Holding,
@@ -56,8 +57,8 @@ UNDECIDED = (
 def ends_early(asked: Setting, state: State) -> bool:
     """Whether a search for names alone ends after a round, because it will be made again.
 
-    Beside a stochastic force, where names leave most of one; with another colour of the noise, where that is clear after
-    the first name.
+    Beside a stochastic force, where names leave most of one; with another colour of the noise or other commands between
+    samples, where that is clear after the first name: with held commands one false name after the other would be found.
 
     Args:
         asked: what is asked.
@@ -69,7 +70,10 @@ def ends_early(asked: Setting, state: State) -> bool:
         return (
             len(state.path) == 1
             and leaves_force(asked, state, state.current)
-            and clearly_coloured(state.current, state.windows, asked.floor)
+            and (
+                clearly_coloured(state.current, state.windows, asked.floor)
+                or clearly_between_samples(asked.layout, state.current, state.windows)
+            )
         )
     except UNSOLVED:
         return False

@@ -25,22 +25,24 @@ class Stage(SimpleNamespace):
 
 
 @pytest.mark.parametrize(
-    ("stays", "rounds", "force", "clear", "expected"),
+    ("stays", "rounds", "force", "colour", "commands", "expected"),
     [
-        (True, 3, False, False, True),
-        (False, 1, True, True, True),
-        # After further names, where nothing stays, or where the colour is not clear, the search goes on.
-        (False, 2, True, True, False),
-        (False, 1, False, True, False),
-        (False, 1, True, False, False),
+        (True, 3, False, False, False, True),
+        (False, 1, True, True, False, True),
+        (False, 1, True, False, True, True),
+        # After further names, where nothing stays, or where neither is clear, the search goes on.
+        (False, 2, True, True, True, False),
+        (False, 1, False, True, True, False),
+        (False, 1, True, False, False, False),
     ],
 )
-def test_a_search_ends_early_for_a_force_or_a_clear_colour(
-    monkeypatch, stays, rounds, force, clear, expected
+def test_a_search_ends_early_for_a_force_or_a_clear_colour_or_law_of_the_commands(
+    monkeypatch, stays, rounds, force, colour, commands, expected
 ):
     monkeypatch.setattr(answer, "a_force_stays", lambda *_: stays)
     monkeypatch.setattr(answer, "leaves_force", lambda *_: force)
-    monkeypatch.setattr(answer, "clearly_coloured", lambda *_: clear)
+    monkeypatch.setattr(answer, "clearly_coloured", lambda *_: colour)
+    monkeypatch.setattr(answer, "clearly_between_samples", lambda *_: commands)
     state: Any = SimpleNamespace(path=[None] * rounds, current=None, windows=None)
     assert answer.ends_early(NOTHING, state) is expected
 

@@ -11,6 +11,7 @@ import torch
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.noise_law.commands.early import clearly_between_samples
 from auvnn.diagnosis.noise_law.commands.holding import FAR, Holding, cost_at_best, cost_with, holding
 from auvnn.diagnosis.noise_law.commands.mean_thrust import MeanThrust
 from auvnn.diagnosis.noise_law.commands.paths import between
@@ -67,7 +68,7 @@ def test_fins_that_change_between_samples_are_not_held(model):
     straight = between(windows, 0.5, "linear")
     assert cost_at_best(first, straight) > FAR * cost_at_best(first, windows)
     held = holding(first, windows, layout)
-    assert held.odds > np.log(100.0)
+    assert held.odds > np.log(100.0) and clearly_between_samples(layout, first, windows)
     found = with_share(layout, first, windows, held)
     assert found.share == pytest.approx(0.5 - 0.5 / TICKS, abs=0.05)
     # About a fit to these the error is what it is by the law that was found.
@@ -87,6 +88,7 @@ def test_a_share_that_is_far_off_is_left(model):
 def test_fins_that_are_held_are_held(model):
     layout, first, windows = first_fit(model, steered(model, 1))
     assert holding(first, windows, layout).name == "held"
+    assert not clearly_between_samples(layout, first, windows)
 
 
 def test_where_no_fit_to_other_commands_is_found_the_first_one_is_asked(model, monkeypatch):
