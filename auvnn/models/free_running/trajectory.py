@@ -38,8 +38,8 @@ class Trajectory(Shown):
         nu: (..., T, 6), m/s and rad/s.
         thrust: (..., T, n), N, just after each row's command.
         divergences: empty where the run stayed sound; a diverged trajectory holds its last sound state.
-        fins: (..., T, m), rad, the actual fin angles just after each row's command, where an effect has them follow it;
-            else None.
+        fins: (..., T, m), rad, the actual fin angles just after each row's command, where an effect has them follow it or
+            they change within an interval; else None.
         notes: in words, steps that were cut because the model is stiff, and velocities beyond those that the damping
             was trained on, where what it says is extrapolated.
     """

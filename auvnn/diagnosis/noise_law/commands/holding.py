@@ -130,8 +130,7 @@ def holding(first: FittedHypothesis, windows: Windows, layout: Layout | None = N
     found = Holding("linear", LINEAR, 0.5 * (plain - straight), plain - straight, curves=curves)
     for name, through in laws_of(curves):
         of = partial(cost, along=name, curves=through)
-        # Held commands are those of the first fit, whatever the others are taken about.
-        wide = [of(share) if share or about is not first else plain for share in (0.0, LINEAR, 1.0)]
+        wide = [of(share) for share in (0.0, LINEAR, 1.0)]
         rivals = [(LINEAR, wide[1], 0.0)] if name == "smooth" else []
         for share, least, odds in [*rivals, *_best(of, wide)]:
             if 0.5 * (plain - least) + odds > found.odds + PLAINER:
