@@ -45,6 +45,7 @@ SAMPLES = {
     "rows-24.jsonl": 23,
     "rows-25.jsonl": 24,
     "rows-26.jsonl": 25,
+    "rows-27.jsonl": 26,
 }
 
 
