@@ -136,14 +136,15 @@ def test_each_interval_by_itself_leads_to_the_next_row_with_fins_that_change_wit
     torch.testing.assert_close(found, states[:, 1:], rtol=1e-11, atol=1e-12)
 
 
-def test_fins_go_by_parts_only_where_steps_match(given, finned):
+@pytest.mark.parametrize("engine", ["torch", "firm"])
+def test_fins_go_by_parts_only_where_steps_match(given, finned, engine):
     eta, _, times, _, _ = given
     vehicle, nu, commands, fins = finned
     model, plain = GreyBox(vehicle), Inputs(commands.mean(-2), fins.mean(-2))
     inputs = Inputs(plain.command, plain.fins, within=commands, fins_within=fins)
     with torch.no_grad():
-        held = rollout(model, eta, nu, plain, times, max_step=STEP / 3)
-        found = rollout(model, eta, nu, inputs, times, max_step=STEP / 3)
-        parts = rollout(model, eta, nu, inputs, times, max_step=STEP / PARTS)
+        held = rollout(model, eta, nu, plain, times, max_step=STEP / 3, engine=engine)
+        found = rollout(model, eta, nu, inputs, times, max_step=STEP / 3, engine=engine)
+        parts = rollout(model, eta, nu, inputs, times, max_step=STEP / PARTS, engine=engine)
     assert torch.equal(found.nu, held.nu)
     assert not torch.allclose(parts.nu, held.nu, atol=1e-4)

@@ -16,6 +16,7 @@ from auvnn.diagnosis.noise_law.commands.holding import FAR, Holding, cost_at_bes
 from auvnn.diagnosis.noise_law.commands.mean_thrust import MeanThrust
 from auvnn.diagnosis.noise_law.commands.paths import between
 from auvnn.diagnosis.noise_law.commands.share import with_share
+from auvnn.estimation.window_parts import split
 from auvnn.logs import Log, Run
 from auvnn.models import GreyBox, Inputs
 from auvnn.vehicle import load_vehicle
@@ -100,3 +101,19 @@ def test_where_no_fit_to_other_commands_is_found_the_first_one_is_asked(model, m
     layout, first, windows = first_fit(model, steered(model, TICKS))
     monkeypatch.setattr(module, "fitted_to", nowhere)
     assert replace(holding(first, windows, layout)) == holding(first, windows)
+
+
+def test_fins_within_an_interval_stay_with_their_windows(model):
+    """What is picked of windows, or divided into shorter ones, runs as it does in all of them."""
+    log = steered(model, TICKS)
+    straight = between(windows_for(model, log), 0.5, "linear")
+    within = straight.inputs.fins_within
+    assert within is not None and straight.inputs.fins is not None
+    assert torch.allclose(within.mean(-2), straight.inputs.fins)
+    assert torch.equal(straight.pick(slice(2, 5)).inputs.fins_within, within[2:5])
+    parts, whole, begins = split(straight, 2.5)
+    assert len(whole) > len(straight)
+    for found, window, begin in zip(parts.inputs.fins_within, whole, begins, strict=True):
+        first = straight.warmup
+        expected = within[window, first + begin : first + begin + found.shape[0] - first]
+        assert torch.equal(found[first : first + expected.shape[0]], expected)
