@@ -19,6 +19,7 @@ from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.answer import answer_with_force, ends_early
 from auvnn.diagnosis.search import search
+from auvnn.diagnosis.stages.beyond_stated import beyond_stated
 from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.shorter_windows import search_over_shorter
 from auvnn.diagnosis.stages.state import Searched, Setting
@@ -191,7 +192,7 @@ def searched(
             asked, state = search_over_shorter(asked, state, search)
         if stochastic:
             state, told, words = answer_with_force(asked, state)
-        state = settled(asked, state)
+        state = beyond_stated(asked, settled(asked, state))
         found = answer(asked, state)
     except (np.linalg.LinAlgError, SINGULAR) as problem:
         raise InputError(

@@ -14,7 +14,7 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.plausible_sizes import departure, sizes_of
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, correlation_root
 from auvnn.diagnosis.noise_law.likelihood.estimate_law import Estimate, estimate
-from auvnn.diagnosis.noise_law.likelihood.law_likelihood import STEPS, Likelihood
+from auvnn.diagnosis.noise_law.likelihood.law_likelihood import ROUGHLY, STEPS, Likelihood
 from auvnn.diagnosis.noise_law.likelihood.sums import ForceSums
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.selection.model_comparison import ALPHA_REFUTED, ODDS, confused
@@ -134,7 +134,7 @@ def judged(
         most: steps of the search for the likeliest law; with none the law is the one given.
     """
     likelihood = Likelihood(sums)
-    found = estimate(likelihood, law, law.axes, most)
+    found = estimate(likelihood, law, law.axes, most, ROUGHLY)
     names, effects, priors = explanation.names, explanation.effects, explanation.fitted.priors
     sizes = sizes_of(layout, names, effects)
     root = correlation_root(layout, names, effects)

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 AXES = ("X", "Y", "Z", "K", "M", "N")
 # A degree of freedom that the actuators hardly drive is measured by this share of the one that they drive most.
 LEAST = 0.1
+# An effect acts most in the degrees of freedom in which it has so large a share of its largest share of the actuators'.
+MOST = 0.5
 
 
 def forces_of(found: FittedHypothesis, windows: Windows, names: Sequence[str]) -> dict[str, Array]:
@@ -75,6 +77,25 @@ def fins_of(model: GreyBox, windows: Windows) -> Tensor:
     )
     density = float(vehicle.water_density)
     return fin_force(windows.nu, angles[:, windows.warmup :], place, axis, area, slope, stall, density)
+
+
+def exerts_less(found: FittedHypothesis, windows: Windows, names: Sequence[str]) -> bool:
+    """Whether the effect that came last exerts less than others together, where it acts most.
+
+    What the form of an effect gets wrong is less than what the effect does itself, in the degrees of freedom in which it
+    acts: a thrust curve of another shape leaves a mean force that is a part of what the curve changes.
+
+    Args:
+        found: the fit.
+        windows: those it was fitted to.
+        names: effects in it, without the last one.
+    """
+    last = found.effects[-1]
+    forces = forces_of(found, windows, [last, *names])
+    own, others = forces[last], np.sqrt(sum(forces[name] ** 2 for name in names))
+    share = share_of(own, actuators_of(found.fitted.model, windows))
+    acts = share >= MOST * np.nanmax(share)
+    return bool(acts.any() and (own < others)[acts].all())
 
 
 def share_of(force: Array, actuators: Array) -> Array:

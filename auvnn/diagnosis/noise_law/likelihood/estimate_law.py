@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from auvnn.diagnosis.noise_law.likelihood.law_likelihood import STEPS, Likelihood
+from auvnn.diagnosis.noise_law.likelihood.law_likelihood import PROMISED, STEPS, Likelihood
 from auvnn.metrics.force_law import ForceLaw
 
 Array = NDArray[np.float64]
@@ -51,6 +51,7 @@ def estimate(
     start: ForceLaw | None = None,
     only: Sequence[int] | None = None,
     most: int = STEPS,
+    enough: float = PROMISED,
 ) -> Estimate:
     """Return the law that is most likely, without the degrees of freedom whose variance may be zero.
 
@@ -59,6 +60,7 @@ def estimate(
         start: a law from which to begin.
         only: degrees of freedom to look at, by default all that show; given, none of them is left out.
         most: steps of each search for the likeliest law; with none the law is that of the start.
+        enough: what a step of such a search must promise of minus twice the log likelihood.
     """
     axes = likelihood.shown() if only is None else list(only)
     p_values = np.ones(6)
@@ -66,7 +68,7 @@ def estimate(
         begin = None
         if start is not None and all(start.rms[i] > 0 for i in axes):
             begin = np.log(np.concatenate([start.rms[axes], start.time[axes]]))
-        x = begin if begin is not None and most == 0 else likelihood.best(axes, begin, most)[1]
+        x = begin if begin is not None and most == 0 else likelihood.best(axes, begin, most, enough)[1]
         count = len(axes)
         if only is not None:
             break

@@ -35,6 +35,8 @@ STARTS, FIRST_TIME = np.logspace(-3.0, 1.0, 5), 1.0
 VAGUE = 3.0
 # Steps of the search for the likeliest law, and what one must promise of minus twice the log likelihood.
 STEPS, PROMISED = 40, 0.01
+# The same where explanations are compared, a hundredth of what decides between them: laws are found again at each fit.
+ROUGHLY = 0.1
 
 
 class Likelihood:
@@ -157,13 +159,16 @@ class Likelihood:
     def _likely(self, axes: Sequence[int]) -> Array:
         return np.concatenate([np.log(self.sums.sizes[list(axes)]), np.full(len(axes), np.log(FIRST_TIME))])
 
-    def best(self, axes: Sequence[int], start: Array | None = None, most: int = STEPS) -> tuple[float, Array]:
+    def best(
+        self, axes: Sequence[int], start: Array | None = None, most: int = STEPS, enough: float = PROMISED
+    ) -> tuple[float, Array]:
         """Return the smallest value with forces in some degrees of freedom, and where: log rms and log time.
 
         Args:
             axes: degrees of freedom.
             start: to begin from, by default the best of a few sizes.
             most: steps of the search.
+            enough: what a step must promise.
         """
         axes = list(axes)
         low = np.concatenate(
@@ -180,9 +185,7 @@ class Likelihood:
             known = law_information(shown, self.sums.cell, np.exp(x[:count]), np.exp(x[count:]))
             return known + 2.0 / VAGUE**2 * np.eye(len(x))
 
-        return bounded_minimum(
-            partial(self.sloped, axes), curved, start, low, high, most=most, enough=PROMISED
-        )
+        return bounded_minimum(partial(self.sloped, axes), curved, start, low, high, most=most, enough=enough)
 
     def _seen(self, axes: Sequence[int]) -> Array:
         """Return what windows say of the forces in some degrees of freedom, states integrated out, (B, A K, A K)."""

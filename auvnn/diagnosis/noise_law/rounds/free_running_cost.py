@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
@@ -78,7 +79,9 @@ def cost_of_name(
     """
     with_name = model_of(after)
     if after.name in before.explanation.names:
-        costs = [free_running_cost(with_name, model, log, scale) for model in _as_stated(layout, after)]
+        costs = [
+            free_running_cost(with_name, model, log, scale) for model in as_stated(layout, after.weighed)
+        ]
         return min(costs, key=lambda cost: cost.error)
     cost = free_running_cost(with_name, model_of(before), log, scale)
     if not others_stay:
@@ -104,23 +107,27 @@ def model_of(found: Hypothesis) -> GreyBox:
     return found.explanation.fitted.model.without_absent(found.explanation.effects)
 
 
-def _as_stated(layout: Layout, after: Hypothesis) -> tuple[GreyBox, GreyBox]:
-    """Return the model with what its last effect varies as stated, the others refitted, and left where they are."""
-    fitted = after.weighed.fitted
-    names, theta = after.explanation.names, fitted.theta
-    own = layout.places(names)[after.name]
-    others = np.setdiff1d(np.arange(len(theta)), own)
-    stated = theta.copy()
-    stated[own] = layout.means[after.name]
-    whole = NormalEquations(fitted.statistics.total + fitted.priors.square, np.zeros(len(theta)))
+def as_stated(layout: Layout, found: FittedHypothesis) -> tuple[GreyBox, GreyBox]:
+    """Return the model with what its last effect varies as stated, the others refitted, and left where they are.
+
+    Args:
+        layout: stated values.
+        found: the fit, with sums by which the others follow.
+    """
+    fitted, names = found.fitted, found.names
+    own = layout.places(names)[found.effects[-1]]
+    others = np.setdiff1d(np.arange(len(fitted.theta)), own)
+    stated = fitted.theta.copy()
+    stated[own] = layout.means[found.effects[-1]]
+    whole = NormalEquations(fitted.statistics.total + fitted.priors.square, np.zeros(len(stated)))
     followed = stated.copy()
-    followed[others] -= whole.eliminate(own, others, rcond=1e-12).carry.T @ (stated - theta)[own]
+    followed[others] -= whole.eliminate(own, others, rcond=1e-12).carry.T @ (stated - fitted.theta)[own]
     low, high = limits(fitted.model, names, fitted.priors)
     models = []
     for values in (np.clip(followed, low, high), stated):
         model = fitted.model.rebuilt(fitted.model.copied_effects())
         set_parameters(model, names, values)
-        models.append(model.without_absent(after.explanation.effects))
+        models.append(model.without_absent(found.effects))
     return models[0], models[1]
 
 

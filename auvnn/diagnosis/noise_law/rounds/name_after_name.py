@@ -29,6 +29,7 @@ from auvnn.diagnosis.noise_law.rounds.names_given import ALPHA_NAME, FIRST_COST,
 from auvnn.diagnosis.noise_law.rounds.one_step_leaders import fitted_one_step
 from auvnn.diagnosis.noise_law.rounds.path import Path
 from auvnn.diagnosis.noise_law.under_law import NULL_STEPS, UnderLaw
+from auvnn.diagnosis.residuals.forces import exerts_less
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.selection.choose import ALPHA, LITTLE
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused, left_by
@@ -264,8 +265,8 @@ class NameAfterName(UnderLaw):
 
         Where thrust ahead and astern follow curves of another shape, a mean force is left beside the asymmetry that is
         named: an effect that the catalogue knows to be confused with an earlier one, that explains little beside it, and
-        beside which measured inputs still predict the force, is no further cause. Nor is one that explains little and is
-        known to look like what the form of an earlier one gets wrong (`leaves`).
+        beside which measured inputs still predict the force, is no further cause. Nor is one that is known to look like
+        what the form of an earlier one gets wrong (`leaves`), and that explains little or exerts less than that one does.
 
         Args:
             further: the explanation with it.
@@ -277,4 +278,7 @@ class NameAfterName(UnderLaw):
             return False
         one_of_them = (path.current.evidence - null.evidence) / len(path.chosen)
         little = further.evidence - path.current.evidence < LITTLE * one_of_them
+        if left and not little:
+            explained = [name for name in path.chosen if left_by(further.name, [name])]
+            return exerts_less(further.explanation, self.about(further.explanation), explained)
         return little and (left or self.predicted(further) is not None)
