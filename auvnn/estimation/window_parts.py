@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.metrics.windows import Windows
-from auvnn.models.inputs import Inputs
+from auvnn.models.inputs import joined
 
 # The least samples of a part.
 SAMPLES = 8
@@ -41,8 +41,7 @@ def split(windows: Windows, span: float) -> tuple[Windows, NDArray[np.int64], ND
     # In the order of time within each window.
     order = np.lexsort((begins, whole))
     order = order[long[order]]
-    joined = _joined(parts).pick(order)
-    return joined, whole[order], begins[order]
+    return _joined(parts).pick(order), whole[order], begins[order]
 
 
 def _part(windows: Windows, begin: int, rows: int) -> Windows:
@@ -51,10 +50,6 @@ def _part(windows: Windows, begin: int, rows: int) -> Windows:
     index = torch.as_tensor(np.minimum(np.arange(begin, begin + rows), last))
     beyond = torch.as_tensor((np.arange(begin, begin + rows) <= last).astype(float))
     both = torch.cat([torch.arange(begin, begin + windows.warmup), index + windows.warmup])
-    given = windows.inputs
-
-    def of(x: Tensor | None, chosen: Tensor) -> Tensor | None:
-        return None if x is None else x[:, chosen]
 
     return replace(
         windows,
@@ -62,39 +57,29 @@ def _part(windows: Windows, begin: int, rows: int) -> Windows:
         times=windows.times[:, both],
         eta=windows.eta[:, index],
         nu=windows.nu[:, index],
-        nu_dot=of(windows.nu_dot, index),
-        inputs=Inputs(
-            given.command[:, both],
-            *(
-                of(x, both)
-                for x in (given.fins, given.voltage, given.altitude, given.within, given.fins_within)
-            ),
-        ),
+        nu_dot=None if windows.nu_dot is None else windows.nu_dot[:, index],
+        inputs=windows.inputs.mapped(lambda x: x[:, both]),
         mask=windows.mask[:, index] * beyond[:, None],
         length=np.clip(windows.length - begin, 0, rows),
     )
 
 
 def _joined(parts: list[Windows]) -> Windows:
-    def of(name: str) -> Tensor | None:
-        found = [getattr(p, name) if hasattr(p, name) else getattr(p.inputs, name) for p in parts]
-        return None if found[0] is None else torch.cat(found)
+    def cat(name: str) -> Tensor:
+        return torch.cat([getattr(p, name) for p in parts])
 
     def rows(name: str) -> NDArray[np.int64]:
         return np.concatenate([getattr(p, name) for p in parts])
 
-    command, times, eta, nu, mask = (of(n) for n in ("command", "times", "eta", "nu", "mask"))
-    assert command is not None and times is not None and eta is not None and nu is not None
-    assert mask is not None
     return replace(
         parts[0],
         run=rows("run"),
         first=rows("first"),
-        times=times,
-        eta=eta,
-        nu=nu,
-        nu_dot=of("nu_dot"),
-        inputs=Inputs(command, *(of(n) for n in ("fins", "voltage", "altitude", "within", "fins_within"))),
-        mask=mask,
+        times=cat("times"),
+        eta=cat("eta"),
+        nu=cat("nu"),
+        nu_dot=None if parts[0].nu_dot is None else cat("nu_dot"),
+        inputs=joined([p.inputs for p in parts]),
+        mask=cat("mask"),
         length=rows("length"),
     )

@@ -83,14 +83,6 @@ class Windows:
     def pick(self, chosen: slice | np.ndarray) -> Windows:
         """Return some of the windows."""
         index = chosen if isinstance(chosen, slice) else torch.as_tensor(chosen)
-        i = self.inputs
-        inputs = Inputs(
-            i.command[index],
-            *(
-                None if x is None else x[index]
-                for x in (i.fins, i.voltage, i.altitude, i.within, i.fins_within)
-            ),
-        )
         return replace(
             self,
             run=self.run[chosen],
@@ -99,7 +91,7 @@ class Windows:
             eta=self.eta[index],
             nu=self.nu[index],
             nu_dot=None if self.nu_dot is None else self.nu_dot[index],
-            inputs=inputs,
+            inputs=self.inputs.mapped(lambda x: x[index]),
             mask=self.mask[index],
             length=self.length[chosen],
             around=None if self.around is None else self.around[index],

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 
 import torch
 from torch import Tensor
@@ -43,6 +43,15 @@ class Inputs:
             None if self.fins_within is None else self.fins_within[..., part, :, :],
         )
 
+    def mapped(self, work: Callable[[Tensor], Tensor]) -> Inputs:
+        """Return what some work makes of each input that there is.
+
+        Args:
+            work: from (..., T, size) to what takes its place.
+        """
+        there = {f.name: getattr(self, f.name) for f in fields(self)}
+        return Inputs(**{name: None if x is None else work(x) for name, x in there.items()})  # type: ignore[arg-type]
+
     def by_steps(self, substeps: int) -> Inputs:
         """Return these without what goes by parts of an interval, where a part is no whole number of steps.
 
@@ -78,21 +87,14 @@ class Inputs:
 
 
 def joined(parts: Sequence[Inputs]) -> Inputs:
-    """Return the rows of stretches one after the other.
+    """Return stretches one after the other: their rows (T, size), or windows (B, T, size).
 
     Args:
-        parts: stretches (T, size) of which the same is given.
+        parts: stretches of which the same is given.
     """
 
-    def rows(tensors: Iterable[Tensor | None]) -> Tensor | None:
-        there = [t for t in tensors if t is not None]
-        return torch.cat(there) if there else None
+    def cat(name: str) -> Tensor | None:
+        there = [getattr(p, name) for p in parts]
+        return torch.cat([x for x in there if x is not None]) if any(x is not None for x in there) else None
 
-    return Inputs(
-        torch.cat([p.command for p in parts]),
-        rows(p.fins for p in parts),
-        rows(p.voltage for p in parts),
-        rows(p.altitude for p in parts),
-        rows(p.within for p in parts),
-        rows(p.fins_within for p in parts),
-    )
+    return Inputs(**{f.name: cat(f.name) for f in fields(Inputs)})  # type: ignore[arg-type]
