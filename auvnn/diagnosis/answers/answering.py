@@ -80,11 +80,14 @@ def answer(asked: Setting, state: State) -> Diagnosis:
 
 
 def _fits_without(asked: Setting, state: State) -> dict[str, FittedHypothesis]:
-    """Return the fit without each name of the answer, everything else refitted."""
+    """Return the fit without each name of the answer, everything else refitted.
+
+    A coefficient group that is uncertain anyway stays as it was stated: following the log, it would take up its own name.
+    """
     found = {}
     for name in state.current.effects:
         try:
-            found[name] = without(asked, state, state.current, name)
+            found[name] = without(asked, state, state.current, name, as_stated=True)
         except FitError:
             continue
     return found

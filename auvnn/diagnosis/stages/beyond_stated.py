@@ -63,6 +63,8 @@ def beyond_stated(asked: Setting, state: State) -> State:
         table=fill_candidate(asked.layout, state.table, found, state.first),
         tried=(*state.tried, found),
         steps=(step, *state.steps),
+        # What explained a part of it before the group was free is not nearest to a cause any more.
+        nearest=(),
     )
 
 

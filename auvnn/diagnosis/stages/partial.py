@@ -64,7 +64,9 @@ def removed(first: FittedHypothesis, found: FittedHypothesis) -> float:
     return 1.0 - excess_variance(found, first) / before if before > 0 else 0.0
 
 
-def without(asked: Setting, state: State, found: FittedHypothesis, name: str) -> FittedHypothesis:
+def without(
+    asked: Setting, state: State, found: FittedHypothesis, name: str, *, as_stated: bool = False
+) -> FittedHypothesis:
     """Return a fit again without one of its names, everything else refitted.
 
     Args:
@@ -72,6 +74,7 @@ def without(asked: Setting, state: State, found: FittedHypothesis, name: str) ->
         state: of the search.
         found: the fit with all names.
         name: of the effect to do without.
+        as_stated: whether a coefficient group that is uncertain anyway stays as it was stated; else it follows the log.
     """
     if name not in asked.base:
         # The search has passed there where the name came last.
@@ -79,7 +82,8 @@ def without(asked: Setting, state: State, found: FittedHypothesis, name: str) ->
         for known in (state.first, *reversed(state.path)):
             if {*known.effects} == left and known.fitted.initial.shape == found.fitted.initial.shape:
                 return known
-    return asked.chooser(state.windows).without(found, asked.base, [name], steps=STEPS)
+    base = [n for n in asked.base if not (as_stated and n == name)]
+    return asked.chooser(state.windows).without(found, base, [name], steps=STEPS)
 
 
 def _errors(found: FittedHypothesis, other: FittedHypothesis) -> float:

@@ -16,6 +16,7 @@ from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.stages.beyond_stated import departures
 from auvnn.effects import effect_class
+from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
 
@@ -28,7 +29,7 @@ def model() -> GreyBox:
     return GreyBox(small_vehicle())
 
 
-def log_of(**factors: float):
+def truth(**factors: float) -> GreyBox:
     known = model()
     effects = []
     for name, value in factors.items():
@@ -36,7 +37,11 @@ def log_of(**factors: float):
         with torch.no_grad():
             effect.theta.fill_(value)
         effects.append(effect)
-    return make_log(known.rebuilt(effects), runs=3, duration=30.0, noise=0.5)
+    return known.rebuilt(effects)
+
+
+def log_of(**factors: float):
+    return make_log(truth(**factors), runs=3, duration=30.0, noise=0.5)
 
 
 @pytest.fixture(autouse=True)
@@ -50,7 +55,7 @@ def nothing_found(monkeypatch):
 
 
 def answer(log, **more):
-    return diagnose(model(), log, NAMES, advice=False, whiteness=False, costs=False, **more)
+    return diagnose(model(), log, NAMES, advice=False, whiteness=False, **{"costs": False, **more})
 
 
 @pytest.fixture(scope="module")
@@ -90,3 +95,13 @@ def test_departures_are_those_of_independent_normal_variables(far):
     assert set(departures(layout, found)) == {"added_mass", "linear_damping", "quadratic_damping", "inertia"}
     free = fit_hypothesis(layout, windows, layout.names, ("quadratic_damping",))
     assert "quadratic_damping" not in departures(layout, free)
+
+
+def test_it_costs_what_the_stated_values_do(far):
+    """Followed by the fit, the group would take up its own name, and cost nothing."""
+    found = answer(far, costs=True)
+    assert found.nearest == []
+    stated = roll(model(), far, "5", scale_of(far)).total(scale_of(far))
+    right = roll(truth(quadratic_damping=FAR), far, "5", scale_of(far)).total(scale_of(far))
+    # Less than with nothing refitted, for the other coefficients make up for a part within their own stated amounts.
+    assert 1.0 < found.matters["quadratic_damping"]["cost"] < stated / right - 1.0
