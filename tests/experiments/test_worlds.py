@@ -46,6 +46,7 @@ SAMPLES = {
     "rows-25.jsonl": 24,
     "rows-26.jsonl": 25,
     "rows-27.jsonl": 26,
+    "rows-28.jsonl": 27,
 }
 
 
