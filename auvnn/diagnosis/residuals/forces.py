@@ -93,8 +93,8 @@ def exerts_less(found: FittedHypothesis, windows: Windows, names: Sequence[str])
     last = found.effects[-1]
     forces = forces_of(found, windows, [last, *names])
     own, others = forces[last], np.sqrt(sum(forces[name] ** 2 for name in names))
-    share = share_of(own, actuators_of(found.fitted.model, windows))
-    acts = share >= MOST * np.nanmax(share)
+    share = np.nan_to_num(share_of(own, actuators_of(found.fitted.model, windows)))
+    acts = (share > 0.0) & (share >= MOST * share.max())
     return bool(acts.any() and (own < others)[acts].all())
 
 

@@ -20,10 +20,10 @@ from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
-from auvnn.diagnosis.noise_law.rounds.free_running_cost import as_stated, free_running_cost
+from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
+from auvnn.diagnosis.noise_law.rounds.free_running_cost import HORIZON, as_stated, free_running_cost
 from auvnn.diagnosis.stages.state import Setting, State
-from auvnn.estimation.prediction_error import FitError
-from auvnn.metrics.rollouts import scale_of
+from auvnn.metrics.rollouts import roll, scale_of
 
 # Levels at which chance is rejected: for the group that is named, and for others that then have moved as well.
 ALPHA_GROUP, ALPHA_OTHERS = 1e-4, 1e-2
@@ -49,7 +49,8 @@ def beyond_stated(asked: Setting, state: State) -> State:
             asked.layout, state.windows, asked.base, (name,), start=state.current.fitted,
             guess=replace(asked.layout, model=state.current.fitted.model), sigma=state.current.fitted.sigma,
         )  # fmt: skip
-    except FitError:
+    except UNSOLVED:
+        # The answer stands as it was: it did not need what could not be solved here.
         return state
     others = [p for other, p in departures(asked.layout, found).items() if other != name]
     if others and len(others) * min(others) < ALPHA_OTHERS:
@@ -94,6 +95,9 @@ def _matters(asked: Setting, found: FittedHypothesis) -> bool:
         return True
     scale = scale_of(asked.log)
     model = found.fitted.model.without_absent(found.effects)
+    if roll(model, asked.log, HORIZON, scale) is None:
+        # What no model of these can predict tells nothing of its coefficients.
+        return False
     costs = [
         free_running_cost(model, other, asked.log, scale).error for other in as_stated(asked.layout, found)
     ]

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import minimize
 
 from auvnn.diagnosis.noise_law.likelihood.estimate_law import boundary_p_value, estimate
-from auvnn.diagnosis.noise_law.likelihood.law_likelihood import Likelihood
+from auvnn.diagnosis.noise_law.likelihood.law_likelihood import ROUGHLY, Likelihood
 from auvnn.diagnosis.noise_law.likelihood.sums import ForceSums
 from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.force_law import correlation
@@ -97,6 +97,17 @@ def test_the_likeliest_law_is_where_another_search_ends_too():
     assert value == pytest.approx(other.fun, abs=0.02)
     assert value == pytest.approx(sloped(axes, x)[0], abs=1e-9)
     assert steps < 40
+
+
+def test_a_law_that_is_found_roughly_is_short_by_less_than_a_step_must_promise():
+    rms, time = np.array([2.0, 0.1, 1.0, 3.0, 1.0, 1.5]), np.array([0.2, 5.0, 1.0, 2.0, 1.0, 1.2])
+    likelihood = Likelihood(linear_windows(rms, time, windows=30, cells=4))
+    asked, sloped = [], likelihood.sloped
+    likelihood.sloped = lambda *given: asked.append(1) or sloped(*given)  # type: ignore[method-assign]
+    value = likelihood.best([0, 3], np.zeros(4))[0]
+    many = len(asked)
+    rough = likelihood.best([0, 3], np.zeros(4), enough=ROUGHLY)[0]
+    assert value < rough < value + ROUGHLY and len(asked) - many < many
 
 
 def test_the_likelihood_is_that_of_the_full_covariance():

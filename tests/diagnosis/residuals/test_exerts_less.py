@@ -10,7 +10,7 @@ import pytest
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.residuals.forces import exerts_less, forces_of
+from auvnn.diagnosis.residuals.forces import actuators_of, exerts_less, forces_of
 from auvnn.estimation.priors import set_parameters
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
@@ -64,3 +64,11 @@ def test_a_small_part_where_the_earlier_one_does_not_act_does_not_count_and_a_la
     small, large = [surge, 0.0, 0.01, 0.0, 0.0, 0.0], [surge, 0.0, 60.0, 0.0, 0.0, 0.0]
     assert exerts_less(*with_force(fit, small), ["thrust_asymmetry"])
     assert not exerts_less(*with_force(fit, large), ["thrust_asymmetry"])
+
+
+def test_it_must_exert_less_in_every_degree_of_freedom_in_which_it_acts_most(fit):
+    """As large a share of the actuators' in heave as in surge, where the asymmetry exerts nothing."""
+    surge = 0.5 * of_asymmetry(fit[1])
+    drive = actuators_of(fit[0].fitted.model, fit[1])
+    both = [surge, 0.0, surge * drive[2] / drive[0], 0.0, 0.0, 0.0]
+    assert not exerts_less(*with_force(fit, both), ["thrust_asymmetry"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,8 @@ from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.stages.beyond_stated import departures
+from auvnn.diagnosis.stages.beyond_stated import beyond_stated, departures
+from auvnn.diagnosis.stages.state import State
 from auvnn.effects import effect_class
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
@@ -75,6 +77,33 @@ def test_a_group_beyond_what_is_stated_of_it_is_named_with_its_values(far):
 
 def test_within_what_is_stated_nothing_is_missing():
     assert answer(log_of(quadratic_damping=NEAR)).missing == []
+
+
+def test_what_chance_does_is_no_name_however_little_is_tolerated():
+    """One and a half standard deviations in each of six degrees of freedom: one log in thirty has so much."""
+    assert answer(log_of(quadratic_damping=1.15), tolerance={"cost": 1e-3}).missing == []
+
+
+def test_names_that_were_found_and_what_is_unknown_stay():
+    unasked: Any = None
+    for change in ({"chosen": ("tether",)}, {"steps": ({"verdict": "unknown"},)}, {"steps": ()}):
+        given: Any = {"windows": None, "first": None, "current": None, "steps": ({"verdict": "adequate"},)}
+        state = State(**{**given, **change})
+        assert beyond_stated(unasked, state) is state
+
+
+@pytest.mark.parametrize("how", ["no fit", "no free running"])
+def test_the_answer_stands_where_the_group_cannot_be_asked_for(far, monkeypatch, how):
+    def unsolved(*_, **__):
+        raise np.linalg.LinAlgError("singular")
+
+    module = importlib.import_module("auvnn.diagnosis.stages.beyond_stated")
+    if how == "no fit":
+        monkeypatch.setattr(module, "fit_hypothesis", unsolved)
+    else:
+        monkeypatch.setattr(module, "roll", lambda *_: None)
+    found = answer(far)
+    assert found.verdict == "adequate" and found.missing == []
 
 
 def test_it_is_not_named_where_it_hardly_changes_predictions(far):
