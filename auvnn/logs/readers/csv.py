@@ -7,10 +7,10 @@ from pathlib import Path
 
 import polars as pl
 
-from auvnn.errors import InputError, one_line
+from auvnn.errors import InputError
 from auvnn.logs.readers.base import Reader, Table, Text
 from auvnn.logs.readers.dialect import Plain, settle
-from auvnn.logs.readers.frame import numbers_from_text, to_table
+from auvnn.logs.readers.frame import damage_told, numbers_from_text, to_table
 from auvnn.logs.readers.memory import refuse_more_than_memory
 
 _NULLS = ["", "-", "NaN", "nan", "null"]
@@ -48,11 +48,7 @@ class CsvReader(Reader):
             plain = settle(_beginning(path, size) if share < 1.0 else path.read_bytes(), where)
         except OSError as problem:
             raise InputError(f"{where}: cannot be read: {problem}") from None
-        try:
-            frame, text = _parse(plain, where)
-        except pl.exceptions.PolarsError as problem:
-            words = one_line(str(problem).split("\n")[0], 200)
-            raise InputError(f"{where}: is no table of numbers: {words}") from None
+        frame, text = _parse(plain, where)
         table = to_table(frame, where, text)
         table.repairs[:0] = plain.repairs
         return table
@@ -72,16 +68,21 @@ def _parse(plain: Plain, where: str) -> tuple[pl.DataFrame, dict[str, Text]]:
     # Columns without a name need one while they are read; no file can hold this one.
     names = [name or f"\x01{i}" for i, name in enumerate(plain.names)]
     unwanted = [name for name in names if name.startswith("\x01")]
+    what = "is no table of numbers"
+    if plain.body.count(b'"') % 2:
+        what += " (a quotation mark is opened and not closed)"
     try:
-        frame = _numbers(plain, names).drop(unwanted)
+        with damage_told(where, what):
+            frame = _numbers(plain, names).drop(unwanted)
         infinite = [s.name for s in frame if s.dtype == pl.Float64 and s.is_infinite().any()]
         if not infinite:
             return frame, {}
-    except pl.exceptions.PolarsError:
+    except InputError:
         pass
-    frame = pl.read_csv(
-        plain.body, has_header=False, new_columns=names, separator=plain.separator, infer_schema=False
-    ).drop(unwanted)
+    with damage_told(where, what):
+        frame = pl.read_csv(
+            plain.body, has_header=False, new_columns=names, separator=plain.separator, infer_schema=False
+        ).drop(unwanted)
     columns: list[pl.Series] = []
     text: dict[str, Text] = {}
     for series in frame:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections import Counter
+from collections.abc import Iterator
 
 import numpy as np
 import polars as pl
 
-from auvnn.errors import InputError
+from auvnn.errors import InputError, one_line
 from auvnn.logs.readers.base import Table, Text
 from auvnn.logs.reading.repairs.repair import Repair
 
@@ -19,6 +21,31 @@ _MAX_LABELS = 10_000
 MOST_COLUMNS = 20_000
 _EXACT = 2**53  # integers beyond it do not fit a float64
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
+
+
+@contextlib.contextmanager
+def damage_told(where: str, what: str) -> Iterator[None]:
+    """Turn what polars raises on a damaged file into one line.
+
+    Args:
+        where: the file.
+        what: what is wrong with it, such as "is a damaged Parquet file".
+
+    Raises:
+        InputError: polars could not read the file.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except (pl.exceptions.PolarsError, OSError, ValueError, OverflowError, MemoryError) as problem:
+        words = one_line(str(problem).split("\n")[0], 200)
+        raise InputError(f"{where}: {what}: {words}") from None
+    except BaseException as problem:
+        # On some damage polars' Rust core panics, which is no Exception and must not end the program.
+        if type(problem).__name__ != "PanicException":
+            raise
+        raise InputError(f"{where}: {what}: {one_line(problem, 200)}") from None
 
 
 def clean_names(names: list[str], where: str) -> tuple[list[str], list[Repair]]:

@@ -11,16 +11,17 @@ from pathlib import Path
 
 import polars as pl
 
-from auvnn.errors import InputError, one_line
+from auvnn.errors import InputError
 from auvnn.logs.readers import parquet_pages
 from auvnn.logs.readers.base import Reader, Table, Text
 from auvnn.logs.readers.file_bytes import excerpt
-from auvnn.logs.readers.frame import clean_names, to_table
+from auvnn.logs.readers.frame import clean_names, damage_told, to_table
 from auvnn.logs.readers.memory import refuse_more_than_memory
 from auvnn.logs.reading.repairs.repair import Repair
 from auvnn.logs.writing import HASH_KEY, frame_bytes, frame_hash
 
 _DAMAGED = "{}: the numbers differ from those that were written: damaged; copy it again"
+_UNREADABLE = "is a damaged Parquet file"
 _AT_ONCE = 4_000_000  # rows of one column in memory at a time
 
 
@@ -53,7 +54,7 @@ class ParquetReader(Reader):
         names, notes = clean_names(contents.flat, where)
         rows = max(1, int(share * contents.rows))
         refuse_more_than_memory(int(share * contents.bytes) + 8 * rows * len(contents.flat), where)
-        with _damage_told(where):
+        with damage_told(where, _UNREADABLE):
             if whole:
                 frame = pl.read_parquet(data, columns=contents.flat)
                 digest = hashlib.sha256(data).hexdigest()
@@ -86,7 +87,7 @@ class ParquetReader(Reader):
         if stored is None:
             return
         digest = hashlib.sha256()
-        with _damage_told(str(path)):
+        with damage_told(str(path), _UNREADABLE):
             for name in contents.flat:
                 digest.update(name.encode())
                 for first in range(0, contents.rows, _AT_ONCE):
@@ -125,7 +126,7 @@ class ParquetReader(Reader):
         """
         where = str(path)
         contents = _contents(path)
-        with _damage_told(where), self._rows(path, contents, first, count) as lazy:
+        with damage_told(where, _UNREADABLE), self._rows(path, contents, first, count) as lazy:
             schema = lazy.collect_schema()
             nested = [n for n, kind in schema.items() if kind.is_nested()]
             flat = [n for n in schema.names() if n not in nested]
@@ -157,7 +158,7 @@ class ParquetReader(Reader):
         Raises:
             InputError: it is damaged.
         """
-        with _damage_told(str(path)), self._rows(path, _contents(path), 0, 1) as lazy:
+        with damage_told(str(path), _UNREADABLE), self._rows(path, _contents(path), 0, 1) as lazy:
             kind = lazy.collect_schema().get(column)
             if kind is None or kind not in (pl.Date, pl.Datetime):
                 return None
@@ -185,19 +186,3 @@ def _contents(path: Path) -> parquet_pages.Contents:
 @lru_cache(maxsize=8)
 def _checked(path: str, size: int, changed: int) -> parquet_pages.Contents:
     return parquet_pages.check(Path(path))
-
-
-@contextlib.contextmanager
-def _damage_told(where: str) -> Iterator[None]:
-    """Turn what a decoder raises on a damaged file into one line."""
-    try:
-        yield
-    except InputError:
-        raise
-    except (pl.exceptions.PolarsError, OSError, ValueError, OverflowError, MemoryError) as problem:
-        raise InputError(f"{where}: is a damaged Parquet file: {one_line(problem, 200)}") from None
-    except BaseException as problem:
-        # On some damage polars' Rust core panics, which is no Exception and must not end the program.
-        if type(problem).__name__ != "PanicException":
-            raise
-        raise InputError(f"{where}: is a damaged Parquet file: {one_line(problem, 200)}") from None

@@ -185,6 +185,8 @@ def test_many_broken_rows_are_refused(tmp_path: Path) -> None:
         (b"just words", "separated by blanks"),
         (b"t,u\n" + b"1,2\n" * 500 + b"\0\n", "zero bytes"),
         (b"t,,u\n1,2,3\n", "column 2 has no name"),
+        (b't,u\n1,2\n2,"', "quotation mark is opened and not closed"),
+        (b't,u\n1,2\n2,"3\n4,5\n6,7\n', "quotation mark is opened and not closed"),
         (b"\x1f\x8b\x08\x00abcdefgh", "gzip"),
         (b"PK\x03\x04" + b"abcdefgh" * 3, "spreadsheet"),
         (b"\x89MCAP0\r\n" + b"\0" * 40, "mcap recording and holds no messages"),
