@@ -97,39 +97,58 @@ def correlation(count: int, cell: float, time: float) -> Array:
     return covariance_of_means(count, cell, torch.tensor(float(time), dtype=torch.float64)).numpy()
 
 
-def covariance_with_end(count: int, cell: float, time: Tensor) -> Tensor:
-    """Return the covariance of a unit process's means over cells and, last, its value at their end, (count + 1,) * 2.
-
-    With a = cell / time the mean of the cell that is k before the last one has exp(-k a) (1 - exp(-a)) / a with that
-    value. What follows depends on what was before by that value alone: the process is Markov, its means are not.
+def given_the_first(count: int, cell: float, time: Tensor) -> tuple[Tensor, Tensor]:
+    """Return what a unit process's means over cells and its value at their end are by the value with which they begin.
 
     Args:
         count: of cells.
         cell: their length, s.
-        time: correlation time, s, a scalar.
+        time: correlation times, s, (...).
+
+    Returns:
+        what they are expected to be after a value of one, (..., count + 1); root of their covariance, given that value,
+        (..., count + 1, count + 1).
     """
-    end = after(count, cell, time).flip(0)
+    on = torch.cat([after(count, cell, time), torch.exp(-count * cell / time)[..., None]], dim=-1)
+    return on, torch.linalg.cholesky(
+        covariance_with_end(count, cell, time) - on[..., None] * on[..., None, :]
+    )
+
+
+def covariance_with_end(count: int, cell: float, time: Tensor) -> Tensor:
+    """Return the covariance of a unit process's means over cells and, last, its value at their end.
+
+    It is (..., count + 1, count + 1). With a = cell / time the mean of the cell that is k before the last one has
+    exp(-k a) (1 - exp(-a)) / a with that value. What follows depends on what was before by that value alone: the process
+    is Markov, its means are not.
+
+    Args:
+        count: of cells.
+        cell: their length, s.
+        time: correlation times, s, (...).
+    """
+    end = after(count, cell, time).flip(-1)
     means = covariance_of_means(count, cell, time)
-    corner = torch.ones(1, dtype=torch.float64)
+    last = torch.cat([end, torch.ones_like(end[..., :1])], dim=-1)
     return torch.cat(
-        [torch.cat([means, end[:, None]], dim=1), torch.cat([end, corner])[None]], dim=0
+        [torch.cat([means, end[..., None]], dim=-1), last[..., None, :]], dim=-2
     ) + 1e-9 * torch.eye(count + 1, dtype=torch.float64)
 
 
 def after(count: int, cell: float, time: Tensor) -> Tensor:
-    """Return what means over cells (count,) are expected to be after a value of one, as shares of it.
+    """Return what means over cells (..., count) are expected to be after a value of one, as shares of it.
 
     Args:
         count: of cells.
         cell: their length, s.
-        time: correlation time, s, a scalar.
+        time: correlation times, s, (...).
     """
-    a = cell / time
+    a = (cell / time)[..., None]
     return torch.exp(-a * torch.arange(count, dtype=torch.float64)) * -torch.expm1(-a) / a
 
 
 def covariance_of_means(count: int, cell: float, time: Tensor) -> Tensor:
-    """Return the same, differentiable in the correlation time.
+    """Return the same without the value at the end, (..., count, count), differentiable in the correlation time.
 
     With a = cell / time it is 2 (a - 1 + exp(-a)) / a^2 within a cell, and between cells that are k apart
     exp(-k a) (exp(a) - 2 + exp(-a)) / a^2, the integral of exp(-|t - s| / time) over both, divided by cell^2.
@@ -137,13 +156,16 @@ def covariance_of_means(count: int, cell: float, time: Tensor) -> Tensor:
     Args:
         count: of cells.
         cell: their length, s.
-        time: correlation time, s, a scalar.
+        time: correlation times, s, (...).
     """
-    a = cell / time
+    a = (cell / time)[..., None, None]
     apart = (torch.arange(count)[:, None] - torch.arange(count)).abs().to(torch.float64)
-    if float(a.detach()) < 1e-4:
-        return torch.exp(-a * apart) + 1e-9 * torch.eye(count, dtype=torch.float64)
-    own = 2.0 * (a + torch.expm1(-a)) / a**2
+    # Of cells that are this short the means are values, and differences of numbers close to one mean nothing.
+    short = a < 1e-4
+    size = torch.where(short, torch.ones_like(a), a)
+    own = 2.0 * (size + torch.expm1(-size)) / size**2
     # exp(-k a) (exp(a) - 2 + exp(-a)) = exp(-(k - 1) a) (1 - exp(-a))^2.
-    across = torch.exp(-torch.clamp(apart - 1.0, min=0.0) * a) * torch.expm1(-a) ** 2 / a**2
-    return torch.where(apart == 0, own * (1.0 + 1e-9), across)
+    across = torch.exp(-torch.clamp(apart - 1.0, min=0.0) * size) * torch.expm1(-size) ** 2 / size**2
+    values = torch.exp(-torch.where(short, a, torch.zeros_like(a)) * apart)
+    values = values + 1e-9 * torch.eye(count, dtype=torch.float64)
+    return torch.where(short, values, torch.where(apart == 0, own * (1.0 + 1e-9), across))

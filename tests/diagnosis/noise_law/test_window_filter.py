@@ -123,9 +123,13 @@ def test_without_a_force_states_still_go_from_window_to_window():
     assert value == pytest.approx(linear.joint(nothing, theta), abs=1e-4)
 
 
-def test_the_slope_in_the_law_is_that_of_its_likelihood():
-    likelihood, axes = Likelihood(Linear((True, True)).sums()), [0, 2, 5]
-    x = np.log([1.0, 0.5, 2.0, 0.7, 0.7, 0.7])
+@pytest.mark.parametrize("before", [(-1, 0, 1), (-1, 0, -1), (-1, -1, -1)])
+@pytest.mark.parametrize("gap", [(0.0, 0.0), (0.4, 1.1)])
+@pytest.mark.parametrize("follows", [(True, True), (False, True)])
+def test_the_slope_in_the_law_is_that_of_its_likelihood(follows, gap, before):
+    sums = replace(Linear(follows, gap=gap).sums(), before=np.array(before))
+    likelihood, axes = Likelihood(sums), [0, 2, 5]
+    x = np.log([1.0, 0.5, 2.0, 0.7, 0.2, 3.0])
     _, slope = likelihood.sloped(axes, x)
     for k, unit in enumerate(1e-5 * np.eye(6)):
         ends = [likelihood.sloped(axes, x + way * unit)[0] for way in (1.0, -1.0)]

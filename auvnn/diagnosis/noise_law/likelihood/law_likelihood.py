@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.diagnosis.noise_law.likelihood.bounded_minimum import bounded_minimum
+from auvnn.diagnosis.noise_law.likelihood.force_smoother import Wave, moments, slope
 from auvnn.diagnosis.noise_law.likelihood.law_information import law_information
 from auvnn.diagnosis.noise_law.likelihood.sums import ForceSums
 from auvnn.diagnosis.noise_law.likelihood.window_filter import WindowFilter
@@ -137,24 +138,18 @@ class Likelihood:
 
         At the parameters that follow a law the slope in them is zero: they are held while the law's is taken.
         """
-        count = len(axes)
-        free = torch.tensor(x, requires_grad=True)
-        whole, volume = torch.zeros_like(self.filter.plain[0]), torch.zeros((), dtype=torch.float64)
-        for _, square, own in self.filter.windows(axes, free[:count].exp(), free[count:].exp()):
-            whole, volume = whole + square.sum(0), volume + own.sum()
-        plain = whole.detach().numpy()
+        rms, time = np.exp(x[: len(axes)]), np.exp(x[len(axes) :])
+        whole, volume, kept = torch.zeros_like(self.filter.plain[0]), 0.0, list[Wave]()
+        for _, square, own in self.filter.windows(axes, torch.as_tensor(rms), torch.as_tensor(time), kept):
+            whole, volume = whole + square.sum(0), volume + float(own.sum())
+        plain = whole.numpy()
         step, square, pull = self._followed(plain)
         follow = torch.as_tensor(np.concatenate([[1.0], -step]))
-        total = follow @ whole @ follow + volume
-        (slope,) = torch.autograd.grad(total, free)
+        forces = moments(kept, follow, self.sums.cells)
+        law = slope(forces, rms, time, self.sums.cells, self.sums.cell)
         away = x - self._likely(axes)
-        value = (
-            float(volume.detach())
-            + float(plain[0, 0])
-            + self.prior
-            - _gain(step, square + self.precision, pull)
-        )
-        return value + float(away @ away) / VAGUE**2, slope.numpy() + 2.0 * away / VAGUE**2
+        value = volume + float(plain[0, 0]) + self.prior - _gain(step, square + self.precision, pull)
+        return value + float(away @ away) / VAGUE**2, law + 2.0 * away / VAGUE**2
 
     def _likely(self, axes: Sequence[int]) -> Array:
         return np.concatenate([np.log(self.sums.sizes[list(axes)]), np.full(len(axes), np.log(FIRST_TIME))])

@@ -33,9 +33,10 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn.functional import pad
 
+from auvnn.diagnosis.noise_law.likelihood.force_smoother import Wave
 from auvnn.diagnosis.noise_law.likelihood.sums import ForceSums
 from auvnn.estimation.force_marginalisation.sums import LOOSE
-from auvnn.metrics.force_law import after, covariance_with_end
+from auvnn.metrics.force_law import given_the_first
 
 Index = NDArray[np.int64]
 # What a state that goes on to the next window has of uncertainty at least, as a share of a loose one's.
@@ -86,7 +87,7 @@ class WindowFilter:
             self.follows = torch.as_tensor(states.follows.astype(float))
 
     def windows(
-        self, axes: Sequence[int], rms: Tensor, time: Tensor
+        self, axes: Sequence[int], rms: Tensor, time: Tensor, kept: list[Wave] | None = None
     ) -> Iterator[tuple[Index, Tensor, Tensor]]:
         """Yield windows, their squares (n, 1 + P, 1 + P), forces and states integrated out, and log determinants (n,).
 
@@ -94,6 +95,7 @@ class WindowFilter:
             axes: degrees of freedom with a force.
             rms: of each of them, (A,).
             time: of each of them, (A,), s.
+            kept: to which what a pass backward needs is appended.
         """
         size, count, free = self.sums.cells, len(axes), self.free
         if self._asked is None or self._asked[0] != tuple(axes):
@@ -122,6 +124,7 @@ class WindowFilter:
             inner = torch.linalg.cholesky(prior.precision(root) + pad(h, (count, 0, count, 0)))
             half = torch.linalg.solve_triangular(inner, pad(g, (0, 0, count, 0)), upper=False)
             yield where, square - half.mT @ half, prior.volume + _volume(root) + _volume(inner)
+            on = None
             if len(self.waves) > 1:
                 on = pad(torch.cat([last.expand(len(where), -1, -1), ends[here]], dim=1), (count, 0))
                 known = torch.linalg.solve_triangular(inner, on.mT, upper=False)
@@ -130,6 +133,10 @@ class WindowFilter:
                     mean = mean + on @ begins
                 if free:
                     mean = torch.cat([mean[:, :count], mean[:, count:] + self.led[here]], dim=1)
+            if kept is not None:
+                since = torch.exp(-self.gap[here, None] / time)
+                follows = self.follows[here] if free else None
+                kept.append(Wave(before, begins, root, inner, half, on, since, follows, self.gap[here]))
 
     def _of_axes(self, axes: Sequence[int]) -> tuple[Tensor, Tensor, Tensor]:
         """Return which variables are the states and the force's of some degrees of freedom, their squares, and ends.
@@ -153,14 +160,10 @@ class WindowFilter:
             time: of each of them, (A,), s.
         """
         size, cell = self.sums.cells, self.sums.cell
-        onto, inverse, volume = list[Tensor](), list[Tensor](), torch.zeros((), dtype=torch.float64)
-        for k in range(len(rms)):
-            on = torch.cat([after(size, cell, time[k]), torch.exp(-size * cell / time[k])[None]])[:, None]
-            root = torch.linalg.cholesky(covariance_with_end(size, cell, time[k]) - on @ on.mT)
-            onto.append(on)
-            inverse.append(torch.cholesky_inverse(root) / rms[k] ** 2)
-            volume = volume + _volume(root) + 2.0 * (size + 1) * torch.log(rms[k])
-        return Within(_blocks(onto), _blocks(inverse), volume)
+        on, root = given_the_first(size, cell, time)
+        inverse = torch.cholesky_inverse(root) / rms[:, None, None] ** 2
+        volume = _volume(root).sum() + 2.0 * (size + 1) * torch.log(rms).sum()
+        return Within(_blocks([*on[..., None]]), _blocks([*inverse]), volume)
 
     def _begins(
         self, here: Tensor, mean: Tensor, spread: Tensor, rms: Tensor, time: Tensor
