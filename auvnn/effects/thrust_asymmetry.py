@@ -30,7 +30,7 @@ class ThrustAsymmetry(Effect):
     manoeuvre = "pulses"
     told_apart_by = "short pushes from rest with each thruster, ahead and astern, weak and hard"
     plainer = ("thruster_gain",)
-    leaves = ("constant_force",)
+    leaves = ("constant_force", "net_buoyancy")
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -35,7 +35,7 @@ class ThrustCurve(Effect):
     manoeuvre = "pulses"
     told_apart_by = "short pushes from rest with each thruster, weak, of half strength and hard"
     plainer = ("thruster_gain",)
-    leaves = ("constant_force",)
+    leaves = ("constant_force", "net_buoyancy")
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from auvnn.diagnosis.selection.model_comparison import left_by
 from auvnn.models import GreyBox
 from auvnn.testing import plain_vehicle
 
@@ -40,6 +41,25 @@ def test_a_swinging_command_leaves_a_mean_force():
     phases = 2.0 * np.pi * (np.arange(64) + 0.5) / 64
     mean = np.mean([thrust(float(np.sin(p))) for p in phases])
     assert mean == pytest.approx(1.2 * 25.0 - 0.8 * 15.0, rel=1e-7)
+
+
+@pytest.mark.parametrize("form", ["thrust_asymmetry", "thrust_curve"])
+def test_up_and_down_a_mean_force_of_the_form_is_a_weight(form):
+    """Over a period of a vertical thruster the change of the thrust has the mean of a net buoyancy, on a level vehicle."""
+    vehicle = plain_vehicle(thrusters=[{**THRUSTER, "direction": [0.0, 0.0, 1.0]}])
+    own = {"thruster_1": 0.2} if form == "thrust_asymmetry" else {"thruster_1_positive": 0.8}
+    eta, nu = torch.tensor([0.0, 0, 5, 1, 0, 0, 0]).double(), torch.zeros(6).double()
+    phases = torch.arange(64).double() / 64 * 2.0 * np.pi
+    command = torch.sin(phases)[:, None]
+    plain, curved = GreyBox(vehicle), GreyBox(vehicle).with_effects({form: own})
+    with torch.no_grad():
+        change = (curved(eta, nu, command) - plain(eta, nu, command)).mean(0)
+        lighter = GreyBox(vehicle).with_effects({"net_buoyancy": {"force": 10.0}})
+        weight = lighter(eta, nu, command[:1])[0] - plain(eta, nu, command[:1])[0]
+    along = change @ weight / (weight @ weight)
+    assert abs(float(along)) > 0.1
+    assert torch.allclose(change, along * weight, atol=1e-12)
+    assert left_by("net_buoyancy", ["payload", form]) and not left_by("net_buoyancy", ["payload"])
 
 
 def test_with_a_gain_it_gives_each_direction_its_own_factor():

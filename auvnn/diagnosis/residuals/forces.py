@@ -79,8 +79,8 @@ def fins_of(model: GreyBox, windows: Windows) -> Tensor:
     return fin_force(windows.nu, angles[:, windows.warmup :], place, axis, area, slope, stall, density)
 
 
-def exerts_less(found: FittedHypothesis, windows: Windows, names: Sequence[str]) -> bool:
-    """Whether the effect that came last exerts less than others together, where it acts most.
+def exerts_less(found: FittedHypothesis, windows: Windows, further: str, names: Sequence[str]) -> bool:
+    """Whether an effect exerts less than others together, where it acts most.
 
     What the form of an effect gets wrong is less than what the effect does itself, in the degrees of freedom in which it
     acts: a thrust curve of another shape leaves a mean force that is a part of what the curve changes.
@@ -88,11 +88,11 @@ def exerts_less(found: FittedHypothesis, windows: Windows, names: Sequence[str])
     Args:
         found: the fit.
         windows: those it was fitted to.
-        names: effects in it, without the last one.
+        further: the effect.
+        names: the others; all are in the fit.
     """
-    last = found.effects[-1]
-    forces = forces_of(found, windows, [last, *names])
-    own, others = forces[last], np.sqrt(sum(forces[name] ** 2 for name in names))
+    forces = forces_of(found, windows, [further, *names])
+    own, others = forces[further], np.sqrt(sum(forces[name] ** 2 for name in names))
     share = np.nan_to_num(share_of(own, actuators_of(found.fitted.model, windows)))
     acts = (share > 0.0) & (share >= MOST * share.max())
     return bool(acts.any() and (own < others)[acts].all())

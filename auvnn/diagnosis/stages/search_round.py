@@ -12,6 +12,7 @@ from auvnn.diagnosis.answers.table import candidate_table, fill_candidate
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.refine_step import refine_step
 from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
+from auvnn.diagnosis.residuals.forces import exerts_less
 from auvnn.diagnosis.selection.choose import ALPHA, LITTLE
 from auvnn.diagnosis.selection.model_comparison import left_by
 from auvnn.diagnosis.stages.state import Setting, State
@@ -54,9 +55,9 @@ def search_round(asked: Setting, state: State) -> State:
         return state.step(rest(asked, state.current), [], p_value).but(ended=True)
     chooser = asked.chooser(state.windows)
     choice = chooser.choose(tested.scores, tested.at, base, chosen, state.current)
-    passed = _what_others_leave(state, choice.best)
-    if passed:
-        others = {n: s for n, s in tested.scores.items() if n not in passed}
+    others = tested.scores
+    while passed := _what_others_leave(state, choice.best):
+        others = {n: s for n, s in others.items() if n not in passed}
         choice = chooser.choose(others, tested.at, base, chosen, state.current)
     state = state.but(failed={**state.failed, **choice.failed}, tried=(*state.tried, *choice.tried))
     if not chosen:
@@ -94,7 +95,9 @@ def search_round(asked: Setting, state: State) -> State:
 
 
 def _what_others_leave(state: State, further: FittedHypothesis | None) -> list[str]:
-    """Return further effects that explain little, and are known to look like what the form of an earlier one gets wrong.
+    """Return further effects that are known to look like what the form of an earlier one gets wrong, and are no more.
+
+    Such an effect explains little beside the earlier ones, or exerts less than those do whose form is in question.
 
     Args:
         state: with the names before them.
@@ -106,7 +109,10 @@ def _what_others_leave(state: State, further: FittedHypothesis | None) -> list[s
         return []
     explanations = state.first, state.current, further
     first, current, after = (e.squared_error(state.first.fitted.sigma) for e in explanations)
-    return left if current - after < LITTLE * (first - current) / len(state.chosen) else []
+    if current - after < LITTLE * (first - current) / len(state.chosen):
+        return left
+    forms = {n: [c for c in state.chosen if left_by(n, [c])] for n in left}
+    return [n for n, of in forms.items() if exerts_less(further, state.windows, n, of)]
 
 
 def regroup(asked: Setting, state: State) -> State:

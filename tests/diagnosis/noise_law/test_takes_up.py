@@ -41,7 +41,7 @@ def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_is_no_name(
     asked.in_closed_loop = True
     monkeypatch.setattr(under_law, "predicted_by_inputs", lambda *_, **__: told)
     compared = []
-    monkeypatch.setattr(name_after_name, "exerts_less", lambda *given: compared.append(given[2]) or less)
+    monkeypatch.setattr(name_after_name, "exerts_less", lambda *given: compared.append(given[3]) or less)
     monkeypatch.setattr(asked, "say", lambda _: None, raising=False)
     monkeypatch.setattr(asked, "about", lambda _: None)
     monkeypatch.setattr(asked, "_sums", lambda _: None)

@@ -56,14 +56,15 @@ def test_forces_are_those_of_the_effects_own_equations(fit):
 @pytest.mark.parametrize(("times", "less"), [(0.5, True), (0.9, True), (1.1, False), (3.0, False)])
 def test_it_is_compared_where_it_acts_most(fit, times, less):
     surge = times * of_asymmetry(fit[1])
-    assert exerts_less(*with_force(fit, [surge, 0.0, 0.0, 0.0, 0.0, 0.0]), ["thrust_asymmetry"]) is less
+    found = with_force(fit, [surge, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert exerts_less(*found, "constant_force", ["thrust_asymmetry"]) is less
 
 
 def test_a_small_part_where_the_earlier_one_does_not_act_does_not_count_and_a_large_one_does(fit):
     surge = 0.5 * of_asymmetry(fit[1])
     small, large = [surge, 0.0, 0.01, 0.0, 0.0, 0.0], [surge, 0.0, 60.0, 0.0, 0.0, 0.0]
-    assert exerts_less(*with_force(fit, small), ["thrust_asymmetry"])
-    assert not exerts_less(*with_force(fit, large), ["thrust_asymmetry"])
+    assert exerts_less(*with_force(fit, small), "constant_force", ["thrust_asymmetry"])
+    assert not exerts_less(*with_force(fit, large), "constant_force", ["thrust_asymmetry"])
 
 
 def test_it_must_exert_less_in_every_degree_of_freedom_in_which_it_acts_most(fit):
@@ -71,4 +72,4 @@ def test_it_must_exert_less_in_every_degree_of_freedom_in_which_it_acts_most(fit
     surge = 0.5 * of_asymmetry(fit[1])
     drive = actuators_of(fit[0].fitted.model, fit[1])
     both = [surge, 0.0, surge * drive[2] / drive[0], 0.0, 0.0, 0.0]
-    assert not exerts_less(*with_force(fit, both), ["thrust_asymmetry"])
+    assert not exerts_less(*with_force(fit, both), "constant_force", ["thrust_asymmetry"])

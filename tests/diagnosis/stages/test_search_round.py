@@ -60,6 +60,7 @@ def named(best: Any, *rivals: Any) -> Choice:
 @pytest.fixture(autouse=True)
 def whole_steps(monkeypatch):
     monkeypatch.setattr(module, "_finer", lambda asked, found, windows: (found, windows))
+    monkeypatch.setattr(module, "exerts_less", lambda *_: False)
 
 
 TIED = (fit(60.0, "payload"), fit(60.0, "waves"), fit(60.0, "tether"))
@@ -152,3 +153,29 @@ def test_a_small_constant_force_beside_an_asymmetry_of_the_thrust_is_passed_over
     assert state.chosen[-1] == ("tether" if passed else "constant_force")
     assert len(asked.offered) == (2 if passed else 1) and "constant_force" in asked.offered[0]
     assert not passed or "constant_force" not in asked.offered[1]
+
+
+def test_so_is_one_that_explains_much_and_exerts_less_than_the_form_that_leaves_it(monkeypatch):
+    asked_of = []
+
+    def less(found, windows, further, names):
+        asked_of.append((further, names))
+        return further == "constant_force"
+
+    monkeypatch.setattr(module, "exerts_less", less)
+    chosen = ("payload", "thrust_asymmetry")
+    bias, other = fit(20.0, *chosen, "constant_force"), fit(25.0, *chosen, "tether")
+    asked: Any = Asked([named(bias), named(other)])
+    assert search_round(asked, begun(*chosen)).chosen[-1] == "tether"
+    # With the one that leaves such a thing, not with what else was named.
+    assert asked_of == [("constant_force", ["thrust_asymmetry"])]
+
+
+def test_what_comes_in_the_place_of_one_that_is_passed_over_may_be_passed_over_too(monkeypatch):
+    monkeypatch.setattr(module, "exerts_less", lambda *_: True)
+    monkeypatch.setattr(module, "left_by", lambda name, chosen: name in ("constant_force", "waves"))
+    chosen = ("thrust_asymmetry",)
+    fits = [fit(20.0, *chosen, "constant_force"), fit(21.0, *chosen, "waves"), fit(25.0, *chosen, "tether")]
+    asked: Any = Asked([named(e) for e in fits])
+    assert search_round(asked, begun(*chosen)).chosen[-1] == "tether"
+    assert asked.offered[1:] == [["payload", "waves", "tether"], ["payload", "tether"]]

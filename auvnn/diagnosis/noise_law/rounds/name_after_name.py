@@ -280,5 +280,6 @@ class NameAfterName(UnderLaw):
         little = further.evidence - path.current.evidence < LITTLE * one_of_them
         if left and not little:
             explained = [name for name in path.chosen if left_by(further.name, [name])]
-            return exerts_less(further.explanation, self.about(further.explanation), explained)
+            about = self.about(further.explanation)
+            return exerts_less(further.explanation, about, further.name, explained)
         return little and (left or self.predicted(further) is not None)
