@@ -45,7 +45,7 @@ def test_a_swinging_command_leaves_a_mean_force():
 
 @pytest.mark.parametrize("form", ["thrust_asymmetry", "thrust_curve"])
 def test_up_and_down_a_mean_force_of_the_form_is_a_weight(form):
-    """Over a period of a vertical thruster the change of the thrust has the mean of a net buoyancy, on a level vehicle."""
+    """Over a period of a vertical thruster the thrust changes, in the mean, by what a net buoyancy is."""
     vehicle = plain_vehicle(thrusters=[{**THRUSTER, "direction": [0.0, 0.0, 1.0]}])
     own = {"thruster_1": 0.2} if form == "thrust_asymmetry" else {"thruster_1_positive": 0.8}
     eta, nu = torch.tensor([0.0, 0, 5, 1, 0, 0, 0]).double(), torch.zeros(6).double()
