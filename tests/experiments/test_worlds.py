@@ -131,3 +131,5 @@ def test_the_tables_are_those_of_the_rows():
     for lines in (module.table(), module.table(3)):
         begin = text.index(lines[0])
         assert text[begin : begin + len(lines)] == lines
+    right, of = module.forces(module.SINCE)
+    assert f"{right} of {of} degrees of freedom" in " ".join(text)

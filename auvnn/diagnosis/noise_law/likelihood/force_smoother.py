@@ -100,9 +100,8 @@ def moments(waves: Sequence[Wave], follow: Tensor, cells: int) -> Moments:
     first, after_it = torch.zeros(count, dtype=torch.float64), None
     for wave in reversed(waves):
         spread = torch.cholesky_inverse(wave.inner)
-        mean = torch.linalg.solve_triangular(wave.inner.mT, (wave.half @ follow)[..., None], upper=True)[
-            ..., 0
-        ]
+        half = (wave.half @ follow)[..., None]
+        mean = torch.linalg.solve_triangular(wave.inner.mT, half, upper=True).squeeze(-1)
         if wave.begins is not None:
             mean = mean + wave.begins @ follow
         if after_it is not None:
@@ -115,7 +114,7 @@ def moments(waves: Sequence[Wave], follow: Tensor, cells: int) -> Moments:
             surprise = later.mean[:, :begin] - (later.wave.begins @ follow)[:, :begin]
             known = later.spread[:, :begin, :begin]
             expected = later.wave.root @ later.wave.root.mT
-            mean[place] += (lever @ surprise[..., None])[..., 0]
+            mean[place] += (lever @ surprise[..., None]).squeeze(-1)
             spread[place] = there + lever @ (known - expected) @ lever.mT
             # The value at the end of each, with the one as the next begins.
             ends = places[:, -1]
@@ -169,10 +168,8 @@ def slope(found: Moments, rms: Array, time: Array, cells: int, cell: float) -> A
     variance, memory = (2.0 * free[: len(rms)]).exp(), free[len(rms) :].exp()
     on, root = given_the_first(cells, cell, memory)
     # From the value with which a window begins, the means and the value at the end to what is new in these.
-    new_of = torch.cat(
-        [-on[..., None], torch.eye(cells + 1, dtype=torch.float64).expand(len(rms), -1, -1)], dim=-1
-    )
-    new = torch.linalg.solve_triangular(root, new_of, upper=False)
+    same = torch.eye(cells + 1, dtype=torch.float64).expand(len(rms), -1, -1)
+    new = torch.linalg.solve_triangular(root, torch.cat([-on[..., None], same], dim=-1), upper=False)
     squares = ((new @ found.within) * new).sum((1, 2)) + found.first
     log_size = 2.0 * torch.log(torch.diagonal(root, dim1=1, dim2=2)).sum(1)
     number = found.count * (cells + 1) + found.runs
