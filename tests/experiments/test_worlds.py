@@ -47,6 +47,7 @@ SAMPLES = {
     "rows-26.jsonl": 25,
     "rows-27.jsonl": 26,
     "rows-28.jsonl": 27,
+    "rows-29.jsonl": 28,
 }
 
 
