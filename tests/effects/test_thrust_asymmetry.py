@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from auvnn.diagnosis.selection.model_comparison import left_by
+from auvnn.diagnosis.selection.model_comparison import forms_that_leave
 from auvnn.models import GreyBox
 from auvnn.testing import plain_vehicle
 
@@ -59,7 +59,7 @@ def test_up_and_down_a_mean_force_of_the_form_is_a_weight(form):
     along = change @ weight / (weight @ weight)
     assert abs(float(along)) > 0.1
     assert torch.allclose(change, along * weight, atol=1e-12)
-    assert left_by("net_buoyancy", ["payload", form]) and not left_by("net_buoyancy", ["payload"])
+    assert forms_that_leave("net_buoyancy", ["payload", form]) == [form]
 
 
 def test_with_a_gain_it_gives_each_direction_its_own_factor():

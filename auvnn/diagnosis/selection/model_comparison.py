@@ -125,11 +125,11 @@ def confused(one: str, other: str) -> bool:
     return other in effect_class(one).confused_with or one in effect_class(other).confused_with
 
 
-def left_by(name: str, earlier: Iterable[str]) -> bool:
-    """Whether the catalogue knows that an effect looks like what the form of an earlier one gets wrong.
+def forms_that_leave(name: str, earlier: Iterable[str]) -> list[str]:
+    """Return those earlier effects of which the catalogue knows that what their form gets wrong looks like an effect.
 
     Args:
         name: the effect.
         earlier: effects found before.
     """
-    return any(name in effect_class(n).leaves for n in earlier)
+    return [n for n in earlier if name in effect_class(n).leaves]

@@ -14,7 +14,7 @@ from auvnn.diagnosis.hypotheses.refine_step import refine_step
 from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
 from auvnn.diagnosis.residuals.forces import exerts_less
 from auvnn.diagnosis.selection.choose import ALPHA, LITTLE
-from auvnn.diagnosis.selection.model_comparison import left_by
+from auvnn.diagnosis.selection.model_comparison import forms_that_leave
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.estimation.prediction_error import FitError
 from auvnn.metrics.windows import Windows
@@ -104,14 +104,13 @@ def _what_others_leave(state: State, further: FittedHypothesis | None) -> list[s
         further: the explanation with them; None where there is none.
     """
     new = [] if further is None else [n for n in further.effects if n not in state.chosen]
-    left = [n for n in new if left_by(n, state.chosen)]
-    if further is None or not left:
+    forms = {n: of for n in new if (of := forms_that_leave(n, state.chosen))}
+    if further is None or not forms:
         return []
     explanations = state.first, state.current, further
     first, current, after = (e.squared_error(state.first.fitted.sigma) for e in explanations)
     if current - after < LITTLE * (first - current) / len(state.chosen):
-        return left
-    forms = {n: [c for c in state.chosen if left_by(n, [c])] for n in left}
+        return [*forms]
     return [n for n, of in forms.items() if exerts_less(further, state.windows, n, of)]
 
 

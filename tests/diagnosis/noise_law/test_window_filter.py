@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 from scipy.optimize import minimize
 
-from auvnn.diagnosis.noise_law.likelihood.law_likelihood import Likelihood
+from auvnn.diagnosis.noise_law.likelihood.law_likelihood import FIRST_TIME, VAGUE, Likelihood
 from auvnn.diagnosis.noise_law.likelihood.sums import ForceSums, States
 from auvnn.diagnosis.noise_law.likelihood.window_filter import LEAST
 from auvnn.estimation.force_marginalisation.sums import LOOSE
@@ -134,6 +135,24 @@ def test_the_slope_in_the_law_is_that_of_its_likelihood(follows, gap, before):
     for k, unit in enumerate(1e-5 * np.eye(6)):
         ends = [likelihood.sloped(axes, x + way * unit)[0] for way in (1.0, -1.0)]
         assert slope[k] == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-4, abs=1e-4)
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e2])
+@pytest.mark.parametrize("time", [0.1, 10.0])
+def test_so_it_is_at_the_ends_of_what_a_law_may_be(size, time):
+    """Against the filter, differentiated by reverse mode."""
+    likelihood, axes = Likelihood(Linear((True, False), gap=(0.0, 0.3)).sums()), [0, 2, 5]
+    x = np.log(np.array([size] * 3 + [time] * 3))
+    value, slope = likelihood.sloped(axes, x)
+    step = likelihood.of(likelihood.law(axes, np.full(3, size), np.full(3, time)))[1]
+    free = torch.tensor(x, requires_grad=True)
+    follow, total = torch.as_tensor(np.concatenate([[1.0], -step])), torch.zeros(())
+    for _, square, volume in likelihood.filter.windows(axes, free[:3].exp(), free[3:].exp()):
+        total = total + follow @ square.sum(0) @ follow + volume.sum()
+    (expected,) = torch.autograd.grad(total, free)
+    prior = 2.0 * (x - np.concatenate([np.zeros(3), np.full(3, np.log(FIRST_TIME))])) / VAGUE**2
+    assert slope == pytest.approx(expected.numpy() + prior, rel=1e-6, abs=1e-6)
+    assert np.isfinite(value)
 
 
 def test_a_parameter_that_would_pass_a_bound_ends_there_and_the_others_follow():

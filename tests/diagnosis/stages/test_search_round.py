@@ -173,7 +173,8 @@ def test_so_is_one_that_explains_much_and_exerts_less_than_the_form_that_leaves_
 
 def test_what_comes_in_the_place_of_one_that_is_passed_over_may_be_passed_over_too(monkeypatch):
     monkeypatch.setattr(module, "exerts_less", lambda *_: True)
-    monkeypatch.setattr(module, "left_by", lambda name, chosen: name in ("constant_force", "waves"))
+    leaves = lambda name, chosen: [*chosen] if name in ("constant_force", "waves") else []  # noqa: E731
+    monkeypatch.setattr(module, "forms_that_leave", leaves)
     chosen = ("thrust_asymmetry",)
     fits = [fit(20.0, *chosen, "constant_force"), fit(21.0, *chosen, "waves"), fit(25.0, *chosen, "tether")]
     asked: Any = Asked([named(e) for e in fits])

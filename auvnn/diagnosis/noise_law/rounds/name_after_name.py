@@ -32,7 +32,7 @@ from auvnn.diagnosis.noise_law.under_law import NULL_STEPS, UnderLaw
 from auvnn.diagnosis.residuals.forces import exerts_less
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.selection.choose import ALPHA, LITTLE
-from auvnn.diagnosis.selection.model_comparison import ODDS, confused, left_by
+from auvnn.diagnosis.selection.model_comparison import ODDS, confused, forms_that_leave
 from auvnn.diagnosis.stages.state import Setting
 from auvnn.effects import effect_class
 from auvnn.estimation.priors import parameters_of
@@ -273,13 +273,12 @@ class NameAfterName(UnderLaw):
             path: with the names before it.
             null: the explanation without any.
         """
-        left = left_by(further.name, path.chosen)
-        if not left and not any(confused(further.name, name) for name in path.chosen):
+        forms = forms_that_leave(further.name, path.chosen)
+        if not forms and not any(confused(further.name, name) for name in path.chosen):
             return False
         one_of_them = (path.current.evidence - null.evidence) / len(path.chosen)
         little = further.evidence - path.current.evidence < LITTLE * one_of_them
-        if left and not little:
-            explained = [name for name in path.chosen if left_by(further.name, [name])]
+        if forms and not little:
             about = self.about(further.explanation)
-            return exerts_less(further.explanation, about, further.name, explained)
-        return little and (left or self.predicted(further) is not None)
+            return exerts_less(further.explanation, about, further.name, forms)
+        return little and (bool(forms) or self.predicted(further) is not None)
