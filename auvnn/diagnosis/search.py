@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.measured_start import GROSS, above_noise, noise_share
 from auvnn.diagnosis.residuals.variance_component_test import variance_component_test, white
+from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.stages.rivals_again import compared_again
 from auvnn.diagnosis.stages.search_round import ALPHA_UNKNOWN, fit_null, regroup, search_round
 from auvnn.diagnosis.stages.state import Setting, State
@@ -26,6 +27,7 @@ def search(
     windows: Windows,
     worthwhile: Callable[[State], bool] | None = None,
     until: Callable[[Setting, State], bool] | None = None,
+    promising: Callable[[State, Mapping[str, Score]], bool] | None = None,
 ) -> State:
     """Search for what is missing.
 
@@ -34,6 +36,8 @@ def search(
         windows: of the log.
         worthwhile: asked after every round; where it is not, the search is given up as it stands.
         until: asked after every round; where it holds, the search ends there, and what is left is unknown.
+        promising: asked of the tests of every round, see `search_round`; where they are not, the search is given up as
+            it stands.
 
     Returns:
         where the search ended; whether names that are no cause predict is still open then (`stages.what_is_left`).
@@ -43,7 +47,9 @@ def search(
     """
     state = fit_null(asked, windows)
     while not state.ended:
-        state = search_round(asked, state)
+        before, state = state, search_round(asked, state, promising)
+        if state is before:
+            return state
         if worthwhile is not None and not worthwhile(state):
             return state
         if until is not None and not state.ended and until(asked, state):

@@ -25,7 +25,7 @@ RMS = np.array([4.0, 4.0, 4.0, 0.4, 0.4, 0.5])
 @pytest.fixture(scope="module")
 def world() -> tuple[GreyBox, Any]:
     model = GreyBox(small_vehicle())
-    plant = model.with_effects({"net_buoyancy": {"force": 8.0}})
+    plant = model.with_effects({"net_buoyancy": {"force": 3.0}})
     return model, wandering_log(plant, RMS, 1.0, runs=2, duration=40.0, seed=1)
 
 
@@ -46,6 +46,7 @@ def test_the_answer_of_two_workers_is_that_of_one(world, monkeypatch):
     assert alone.to_dict() == both.to_dict() and told == said
     # Effects were fitted by the workers both without the force and together with it, more than one at a time.
     assert asked.count("refit_leaders") > 1 and asked.count("leader_fits") > 1
+    assert asked.count("one_step_leaders") == len(NAMES)
     assert alone.missing == ["net_buoyancy"]
 
 

@@ -118,17 +118,22 @@ class LawFits:
             law = found.estimate.law
             if found.evidence <= least or law is None or turn == ROUNDS - 1:
                 break
-            smoothed = self._smoothed(found)
+            smoothed = None if found.explanation.around is not None else self._smoothed(found)
+            if smoothed is None:
+                again = self.judge(found.explanation, law, False)
+                # The likeliest law is that of what a step promises, and worth what is left of that once it was taken.
+                # Where no share of the step brought anything, it must promise more by the new law than by the old one.
+                better = again.evidence - (found.evidence if stuck else _here(found)) >= SETTLED
+                found = again if better else found
+                if better and turn < ROUNDS - 2:
+                    continue
+                # Trajectories hardly change while the law does: they are looked at where nothing else changes any more.
+                smoothed = self._smoothed(found)
+                if smoothed is None and not better:
+                    break
             if smoothed is not None:
                 # What is linear about other trajectories is the nearer to the truth, and not to be compared.
-                best = found = self.judge(smoothed, law, True)
-                stuck = False
-            again = self.judge(found.explanation, law, False)
-            # The likeliest law is that of what a step promises, and worth what is left of that once it was taken. Where
-            # no share of the step brought anything, it must promise more by the new law than by the old one.
-            if again.evidence - (found.evidence if stuck else _here(found)) < SETTLED:
-                break
-            found = again
+                best = found = self.judge(smoothed, found.estimate.law or law, True)
         return best if 0.5 * best.promised < SETTLED else best.here
 
     def _step(self, found: Hypothesis) -> Hypothesis | None:

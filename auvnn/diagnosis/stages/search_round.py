@@ -6,6 +6,7 @@ best and pays on what is left out, and pruning of what is then no longer needed.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from auvnn.diagnosis.answers.table import candidate_table, fill_candidate
@@ -13,6 +14,7 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.refine_step import refine_step
 from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
 from auvnn.diagnosis.residuals.forces import exerts_less
+from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.choose import ALPHA, LITTLE
 from auvnn.diagnosis.selection.model_comparison import forms_that_leave
 from auvnn.diagnosis.stages.state import Setting, State
@@ -34,8 +36,17 @@ def fit_null(asked: Setting, windows: Windows) -> State:
     return State(windows, first, first)
 
 
-def search_round(asked: Setting, state: State) -> State:
-    """Test all effects that remain, refit the leaders, take the one that explains best; see the module's text."""
+def search_round(
+    asked: Setting, state: State, promising: Callable[[State, Mapping[str, Score]], bool] | None = None
+) -> State:
+    """Test all effects that remain, refit the leaders, take the one that explains best; see the module's text.
+
+    Args:
+        asked: what is asked.
+        state: where the search stands.
+        promising: from this and the tests, whether fits may be worth their time; where they are not, the state comes
+            back as it is.
+    """
     chosen, first = list(state.chosen), state.first
     # What could not be told from a name may be missing beside it: then it is no rival.
     remaining = [n for n in asked.usable if n not in {*chosen, *state.withdrawn}]
@@ -43,6 +54,8 @@ def search_round(asked: Setting, state: State) -> State:
     base = [*asked.base, *[c for c in chosen if c not in asked.base]]
     tested = asked.tests(state.windows)(state.current, remaining, base, chosen, alike=not state.table)
     p_value = tested.p_value
+    if promising is not None and not promising(state, tested.scores):
+        return state
     if not state.table:
         similar = (remaining, tested.alike)
         state = state.but(

@@ -9,18 +9,18 @@ more than the sensors' noise. Reference: Bock and Plitt (1984), multiple shootin
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from auvnn.diagnosis.hypotheses.measured_start import GROSS, noise_share
+from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.errors import InputError
 from auvnn.estimation.prediction_error import SINGULAR, FitError
 from auvnn.estimation.window_normal_equations import TRUST, motion
-from auvnn.metrics.windows import Windows
 
 # Length of the shorter windows, s, and samples that they must have.
 SHORTER, SAMPLES = 2.0, 8
@@ -28,6 +28,8 @@ SHORTER, SAMPLES = 2.0, 8
 EXPLAINED = 0.8
 # Share of what is left that a name must take away for another one to be looked for.
 EACH = 0.25
+# By how much more than its test promises a fit may lower the squared error: over shorter windows slopes reach far.
+BEYOND = 1.5
 
 
 class Progress:
@@ -35,11 +37,32 @@ class Progress:
 
     Names that leave most of the error here too are no reason to go on, nor is one that takes little of it away: beside a
     stochastic force every name does.
+
+    Args:
+        stated: effects whose uncertainty is stated. One that is set free takes what was stated of it away too, so that
+            what its test promises is another matter.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, stated: Collection[str] = ()) -> None:
         """Begin before any name."""
+        self.stated = stated
         self.before: float | None = None
+
+    def promising(self, state: State, tested: Mapping[str, Score]) -> bool:
+        """Return whether a name could take away as much as `__call__` asks for, as far as tests can tell.
+
+        Beside a stochastic force none can, and fits of the names that lead would take most of the time.
+
+        Args:
+            state: where the search stands before a round.
+            tested: the round's tests by effect.
+        """
+        fitted = state.current.fitted
+        noise, error = noise_share(fitted), float(fitted.statistics.cost.sum())
+        wanted = 1.0 - noise / max(GROSS, noise + EACH * (1.0 - noise))
+        gains = [s.gain for n, s in tested.items() if s.degrees and n not in self.stated]
+        most = BEYOND * max(gains, default=0.0)
+        return noise >= EXPLAINED or most >= wanted * error
 
     def __call__(self, state: State) -> bool:
         """Return it for a search after a round.
@@ -53,15 +76,14 @@ class Progress:
         return self.before >= EXPLAINED or (self.before >= GROSS and taken >= EACH)
 
 
-def search_over_shorter(
-    asked: Setting, state: State, search: Callable[[Setting, Windows, Callable[[State], bool]], State]
-) -> tuple[Setting, State]:
+def search_over_shorter(asked: Setting, state: State, search: Callable[..., State]) -> tuple[Setting, State]:
     """Return what is asked and where the search stands, over shorter windows where these explain what the others do not.
 
     Args:
         asked: what is asked, the windows' length not having been stated.
         state: where the search over the usual windows has ended.
-        search: from what is asked, windows and whether it is worth going on to the end of a search.
+        search: from what is asked, windows, and whether it is worth going on after a round and (`promising`) with one, to
+            the end of a search.
     """
     step = float(np.median([run.dt for run in asked.log.runs]))
     length = step * state.windows.mask.shape[1]
@@ -73,7 +95,8 @@ def search_over_shorter(
     try:
         windows, notes = windows_that_hold(asked.layout.model, asked.log, SHORTER)
         shorter = replace(asked, floor=TRUST * motion(windows) + 1e-9)
-        other = search(shorter, windows, Progress())
+        progress = Progress(asked.layout.nuisance)
+        other = search(shorter, windows, progress, promising=progress.promising)
     except (InputError, FitError, np.linalg.LinAlgError, SINGULAR):
         return asked, state
     if not other.chosen or noise_share(other.current.fitted) < EXPLAINED:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 _CLEAR = 0.7  # correlation from which the slope is believed
 _NONE = 0.4  # correlation below which two moving signals have nothing to do with each other
 _SCALE_TOLERANCE = 0.2
+_UNIT = 0.1  # share by which a scale may miss a unit's beyond what noise takes of it
 _SIGN = (0.6, 1.6)  # scales, apart from the sign, up to which a turned sign is the plain reading
 _MOVES = 3.0  # standard deviations of its noise by which a channel must move to count
 _SHARE = 0.2  # of the liveliest run's motion: quieter runs say nothing about signs
@@ -191,7 +192,7 @@ def _judge(
     if abs(correlation) >= _CLEAR:
         sign = " with the opposite sign" if scale < 0.0 else ""
         for factor, unit in units:
-            if abs(abs(scale) / factor - 1.0) < _SCALE_TOLERANCE:
+            if _may_be(factor, abs(scale), correlation):
                 cure = f"correct with scale: {np.sign(scale) / factor:.6g} in the mapping"
                 if source == "attitude":
                     turned = ("deg", "rad") if factor > 1.0 else ("rad", "deg")
@@ -265,6 +266,23 @@ def fit(x: Array, y: Array) -> tuple[float, float]:
             break
         weight = 1.0 / np.maximum(1.0, residual / (2.0 * spread))
     return slope, correlation
+
+
+def _may_be(factor: float, scale: float, correlation: float) -> bool:
+    """Whether a slope of measured on derived is that of a unit.
+
+    Noise of the derived motion takes a share of the slope, at most the square of the correlation if all noise is there: a
+    slope that is well known and lies between two units is a sensor's scale.
+
+    Args:
+        factor: of the unit.
+        scale: the slope's size.
+        correlation: of the two.
+
+    Reference: Fuller (1987), Measurement Error Models, section 1.1, for the attenuation.
+    """
+    near = abs(scale / factor - 1.0) < _SCALE_TOLERANCE
+    return near and scale * (1.0 - _UNIT) < factor < scale / correlation**2 * (1.0 + _UNIT)
 
 
 def _other_axis(pairs: list[Pair], axis: int, y: Array) -> tuple[int, float] | None:

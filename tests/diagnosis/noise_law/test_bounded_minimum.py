@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize, rosen, rosen_der
 
-from auvnn.diagnosis.noise_law.likelihood.bounded_minimum import bounded_minimum
+from auvnn.diagnosis.noise_law.likelihood.bounded_minimum import FAILURES, bounded_minimum
 
 SIZE = 4
 
@@ -54,6 +54,46 @@ def test_a_step_that_does_not_bring_enough_is_shortened():
     wide = np.full(1, 100.0)
     _, x = bounded_minimum(sloped, lambda x: np.eye(1), np.ones(1), -wide, wide, most=20, enough=1e-9)
     assert x == pytest.approx([0.0], abs=1e-4)
+
+
+def test_a_step_that_failed_shows_how_much_more_the_value_is_curved():
+    """Where the curvature is far too small, the secant of the first step is that of the quadratic: two more end it."""
+    asked = []
+
+    def sloped(x):
+        asked.append(x)
+        return float(0.5 * 300.0 * (x - 0.2) @ (x - 0.2)), 300.0 * (x - 0.2)
+
+    wide = np.full(1, 100.0)
+    _, x = bounded_minimum(sloped, lambda x: np.eye(1), np.ones(1), -wide, wide, most=20, enough=1e-9)
+    assert x == pytest.approx([0.2], abs=1e-6)
+    assert len(asked) == 3
+
+
+def test_a_value_that_is_not_finite_beyond_a_wall_is_walked_around():
+    def sloped(x):
+        if x[0] > 1.0:
+            return np.inf, np.full(2, np.nan)
+        return float((x[0] - 0.9) ** 2 + (x[1] + 0.5) ** 2), 2.0 * (x - np.array([0.9, -0.5]))
+
+    wide = np.full(2, 10.0)
+    value, x = bounded_minimum(
+        sloped, lambda x: 0.1 * np.eye(2), np.zeros(2), -wide, wide, most=60, enough=1e-9
+    )
+    assert x == pytest.approx([0.9, -0.5], abs=1e-4) and value < 1e-8
+
+
+def test_where_every_step_fails_the_search_ends():
+    # A slope that points the wrong way.
+    asked = []
+
+    def sloped(x):
+        asked.append(x)
+        return float(x @ x), -2.0 * x
+
+    wide = np.full(1, 100.0)
+    value, x = bounded_minimum(sloped, lambda x: np.eye(1), np.ones(1), -wide, wide, most=200, enough=1e-30)
+    assert value == 1.0 and x == 1.0 and len(asked) == 1 + FAILURES
 
 
 def test_nothing_is_asked_where_no_step_promises_anything():

@@ -51,9 +51,8 @@ class Climb:
             raise np.linalg.LinAlgError("grows without bound")
         step, promised = self.step(value)
         estimate: Any = SimpleNamespace(law="law", step=np.array([step]), gain=2.0 * promised)
-        explanation: Any = SimpleNamespace(
-            names=[NAME], fitted=SimpleNamespace(**{**vars(self.fitted), "theta": np.array([value])})
-        )
+        fitted = SimpleNamespace(**{**vars(self.fitted), "theta": np.array([value])})
+        explanation: Any = SimpleNamespace(names=[NAME], fitted=fitted, around=None)
         here = self.of(value)
         return Hypothesis(explanation, estimate, -2.0 * (here + promised), here + promised, 2.0 * promised)
 
@@ -107,7 +106,7 @@ def test_a_likelier_law_is_followed_though_its_worth_shows_only_after_a_step():
         promised = (value - top) ** 2 / width
         estimate: Any = SimpleNamespace(law=law, step=np.array([top - value]), gain=2.0 * promised)
         fitted = SimpleNamespace(theta=np.array([value]), model=model, priors=None)
-        explanation: Any = SimpleNamespace(names=[NAME], fitted=fitted)
+        explanation: Any = SimpleNamespace(names=[NAME], fitted=fitted, around=None)
         return Hypothesis(explanation, estimate, -2.0 * (here + promised), here + promised, 2.0 * promised)
 
     nothing: Any = None
@@ -117,6 +116,46 @@ def test_a_likelier_law_is_followed_though_its_worth_shows_only_after_a_step():
         patched.setattr(LawFits, "_smoothed", lambda fits, found: None)
         found = LawFits(nothing, np.ones(18), judge).settled(judge(0.0))  # type: ignore[arg-type]
     assert found.evidence == pytest.approx(40.0) and found.explanation.fitted.theta[0] == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(
+    ("begun", "gains", "moves", "expected"),
+    [
+        # The law gains twice, then nothing: trajectories are looked at then, and not before.
+        ("known", [50.0, 50.0], [], ["law", "law", "law", "look"]),
+        # Free running is left at once, whatever the law would gain.
+        (None, [50.0], ["their own"], ["look", "law", "law", "look"]),
+        # New trajectories: the law is asked about them, and they are looked at again.
+        ("known", [], ["their own"], ["law", "look", "law", "look"]),
+        # A law that gains each time does not keep trajectories from being looked at.
+        ("known", [50.0] * 9, [], ["law", "law", "law", "look"]),
+        ("known", [50.0] * 9, ["their own"], ["law", "law", "law", "look"]),
+    ],
+)
+def test_trajectories_are_looked_at_where_nothing_else_changes_any_more(
+    monkeypatch, begun, gains, moves, expected
+):
+    asked, around, law_gains = [], list(moves), list(gains)
+
+    def judge(explanation, law="law", held=True):
+        gained = 0.0
+        if not held:
+            asked.append("law")
+            gained = law_gains.pop(0) if law_gains else 0.0
+        level = explanation.level + gained
+        found: Any = SimpleNamespace(around=explanation.around, level=level)
+        return Hypothesis(found, SimpleNamespace(law=law), -2.0 * level, level)  # type: ignore[arg-type]
+
+    def smoothed(fits, found):
+        asked.append("look")
+        return SimpleNamespace(around=around.pop(0), level=found.explanation.level) if around else None
+
+    monkeypatch.setattr(LawFits, "_smoothed", smoothed)
+    nothing: Any = None
+    found = LawFits(nothing, np.ones(18), judge).settled(judge(SimpleNamespace(around=begun, level=0.0)))  # type: ignore[arg-type]
+    assert asked == expected
+    assert found.explanation.around == (moves[-1] if moves else begun)
+    assert found.evidence == sum(gains[: asked.count("law")])
 
 
 RMS, TIME, HIDDEN = np.array([15.0, 15.0, 15.0, 1.5, 1.5, 2.0]), 1.0, 12.0

@@ -15,7 +15,9 @@ from auvnn.diagnosis.noise_law.rounds.leader_fits import LEADERS_ONE_STEP, Leade
 from auvnn.diagnosis.noise_law.rounds.name_after_name import NameAfterName
 from auvnn.diagnosis.noise_law.rounds.one_step_leaders import fitted_one_step, thinned
 from auvnn.errors import InputError
+from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of
+from auvnn.executors.serial import SERIAL
 from auvnn.models import GreyBox
 from tests.diagnosis.noise_law.wandering import wandering_log
 from tests.small_logs import make_log, small_vehicle
@@ -24,7 +26,7 @@ OFFSET = {"fin_1": -0.03, "fin_2": -0.16, "fin_3": -0.03, "fin_4": 0.2}
 
 
 def asked_of(model: GreyBox, log: Any, usable: list[str]) -> Any:
-    return SimpleNamespace(model=model, log=log, usable=tuple(usable), say=lambda words: None)
+    return SimpleNamespace(model=model, log=log, usable=tuple(usable), say=lambda words: None, pool=SERIAL)
 
 
 def test_a_large_effect_comes_first_with_values_near_the_truth():
@@ -52,6 +54,27 @@ def test_without_accelerations_nothing_leads(monkeypatch):
     monkeypatch.setattr(one_step_leaders, "OneStepRefit", none)
     model = GreyBox(small_vehicle())
     assert fitted_one_step(asked_of(model, make_log(model, runs=1, duration=5.0), ["waves"])) == {}
+
+
+def test_one_that_cannot_be_fitted_holds_up_no_other(monkeypatch):
+    class Beside:
+        def __init__(self, *_: Any) -> None:
+            pass
+
+        def alone(self, name: str, *, judged: bool) -> Any:
+            if name == "waves":
+                raise FitError("waves has nowhere to begin")
+            fell = {"tether": 0.0, "gyro_bias": 3.0, "net_buoyancy": 8.0}[name]
+            return SimpleNamespace(fell=fell, values={"force": fell})
+
+    monkeypatch.setattr(one_step_leaders, "OneStepRefit", Beside)
+    model = GreyBox(small_vehicle())
+    asked = asked_of(
+        model, make_log(model, runs=1, duration=5.0), ["gyro_bias", "waves", "net_buoyancy", "tether"]
+    )
+    # What explains nothing leads nowhere.
+    assert {n: [*v] for n, v in fitted_one_step(asked).items()} == {"net_buoyancy": [8.0], "gyro_bias": [3.0]}
+    assert [*fitted_one_step(asked)] == ["net_buoyancy", "gyro_bias"]
 
 
 def test_of_a_long_log_stretches_are_looked_at(monkeypatch):

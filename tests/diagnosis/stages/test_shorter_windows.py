@@ -11,7 +11,7 @@ import pytest
 
 from auvnn.diagnosis.hypotheses.measured_start import noise_share
 from auvnn.diagnosis.stages import shorter_windows
-from auvnn.diagnosis.stages.shorter_windows import Progress, search_over_shorter
+from auvnn.diagnosis.stages.shorter_windows import BEYOND, Progress, search_over_shorter
 from auvnn.errors import InputError
 from auvnn.models import load
 from auvnn.simulation import simulate
@@ -56,7 +56,7 @@ def state(ratio, chosen=(), length=5.0, leaves=True):
 def asked():
     model = load("rov95")
     made = simulate(model, "multisine", "realistic", runs=1, duration=20.0, rate=1.0 / STEP, max_step=0.05)
-    return Asked(made.log, SimpleNamespace(model=model))
+    return Asked(made.log, SimpleNamespace(model=model, nuisance=("inertia",)))
 
 
 def test_the_share_of_the_noise_is_the_ratio_of_the_squares():
@@ -69,7 +69,7 @@ def test_the_share_of_the_noise_is_the_ratio_of_the_squares():
 def test_names_that_leave_the_noise_alone_are_taken_and_said(asked):
     seen = []
 
-    def search(what, windows, worthwhile):
+    def search(what, windows, worthwhile, promising):
         seen.append(windows.mask.shape[1] * STEP)
         assert worthwhile(state(1.5)) and not worthwhile(state(5.0))
         return state(1.1, ("body_lift",))
@@ -91,6 +91,47 @@ def test_a_name_that_takes_little_away_ends_the_search():
     assert go_on(state(1.0 / 0.9))
 
 
+def before_a_round(ratio, gains):
+    """Return where a search stands before a round, and its tests: gains are shares of the squared error."""
+    at = state(ratio)
+    at.current.fitted.statistics.cost = np.array([30.0, 70.0])
+    tested = {f"effect {k}": SimpleNamespace(gain=100.0 * g, degrees=1) for k, g in enumerate(gains)}
+    # What is stated, or does not show, promises nothing.
+    return at, {
+        "stated": SimpleNamespace(gain=1e3, degrees=1), "unseen": SimpleNamespace(gain=1e3, degrees=0), **tested,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("ratio", "gains", "expected"),
+    [
+        # The noise is a fifth: it must become a half of what is left, so that 0.6 of the squared error has to go.
+        (5.0, [0.1, 0.41], True),
+        (5.0, [0.1, 0.39], False),
+        # It is 0.6 of it: 0.7 is a quarter of the rest, so that a seventh has to go.
+        (1.0 / 0.6, [0.0953], True),
+        (1.0 / 0.6, [0.0951], False),
+        (5.0, [], False),
+        # Where no more than the noise is left, the search comes to its end.
+        (1.0 / 0.81, [], True),
+    ],
+)
+def test_fits_are_made_only_where_a_test_promises_what_a_name_must_take(ratio, gains, expected):
+    assert Progress(["stated"]).promising(*before_a_round(ratio, gains)) is expected
+
+
+def test_what_is_promised_is_what_progress_asks_for():
+    """A name that takes exactly what its test must promise, all of it beyond the noise, is progress."""
+    for noise in (0.1, 0.3, 0.6, 0.75):
+        go_on, shares = Progress(["stated"]), np.linspace(0.0, 1.0 - noise, 2001)
+        enough = next(g for g in shares if go_on.promising(*before_a_round(1.0 / noise, [g / BEYOND])))
+        at = state((1.0 - enough) / noise, ("body_lift",))
+        at.first = explanation(1.0 / noise)
+        assert go_on(at) and not Progress()(SimpleNamespace(
+            first=at.first, current=explanation((1.0 - enough) / noise + 0.02)
+        ))  # fmt: skip
+
+
 @pytest.mark.parametrize(
     "found",
     [state(1.1), state(2.0, ("body_lift",))],
@@ -98,7 +139,7 @@ def test_a_name_that_takes_little_away_ends_the_search():
 )
 def test_else_the_answer_stays(asked, found):
     before = state(5.0)
-    assert search_over_shorter(asked, before, lambda *_: found) == (asked, before)
+    assert search_over_shorter(asked, before, lambda *_, **__: found) == (asked, before)
 
 
 @pytest.mark.parametrize(
@@ -107,14 +148,14 @@ def test_else_the_answer_stays(asked, found):
     ids=["the noise is most of it", "nothing is left", "the windows are short"],
 )
 def test_nothing_is_searched_where_the_usual_windows_do(asked, before):
-    def search(*_):
+    def search(*_, **__):
         raise AssertionError("searched")
 
     assert search_over_shorter(asked, before, search) == (asked, before)
 
 
 def test_too_few_samples_or_a_model_that_runs_away_keep_the_answer(asked, monkeypatch):
-    def refuse(*_):
+    def refuse(*_, **__):
         raise InputError("runs away")
 
     monkeypatch.setattr(shorter_windows, "windows_that_hold", refuse)
@@ -133,3 +174,13 @@ def test_a_search_is_given_up_after_the_first_round_that_is_not_worth_it(monkeyp
     )
     left = module.search(None, None, lambda found: noise_share(found.current.fitted) >= 0.5)
     assert noise_share(left.current.fitted) == pytest.approx(0.2) and next(rounds) == 1.0
+
+
+def test_a_search_whose_tests_promise_nothing_is_given_up_before_its_fits(monkeypatch):
+    module = importlib.import_module("auvnn.diagnosis.search")
+    begun = SimpleNamespace(ended=False)
+    monkeypatch.setattr(module, "fit_null", lambda *_: begun)
+    monkeypatch.setattr(
+        module, "search_round", lambda asked, state, promising: state if not promising(state, {}) else None
+    )
+    assert module.search(None, None, lambda _: True, promising=lambda *_: False) is begun

@@ -67,6 +67,35 @@ def test_an_odd_scale_is_a_warning() -> None:
     assert "1.5" in agreement.verdict
 
 
+@pytest.mark.parametrize("scale", [1.57, 1.7, 2.25])
+def test_a_scale_that_is_clearly_no_unit_is_a_warning_too(scale: float) -> None:
+    """In knots a speed is 1.94 times as large: 1.7 is near that, and yet no knots where the slope is so well known."""
+    agreement = kinematics.check_kinematics(changed(make_log(1), {"w": scale}))["w"]
+    assert agreement.level == "warning" and "knots" not in agreement.verdict
+    assert agreement.scale == pytest.approx(scale, rel=0.02) and abs(agreement.correlation) > 0.99
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_knots_are_recognised_where_noise_of_the_position_takes_of_the_slope(seed: int) -> None:
+    """Errors in what a slope is taken on bring it towards zero: here from 1.94 to between 1.75 and 1.9."""
+    rng = np.random.default_rng(seed)
+    run = changed(make_log(1), {"v": 1.943844}).runs[0]
+    noisy = with_nu(run, run.nu, position=run.position + 0.1 * rng.normal(size=run.position.shape))
+    found = kinematics.check_kinematics(Log.from_runs([noisy]))["v"]
+    assert 1.75 < found.scale < 1.9 and found.correlation < 0.985
+    assert "in knots" in found.verdict
+
+
+@pytest.mark.parametrize(
+    ("scale", "correlation", "expected"),
+    [(1.94, 1.0, True), (1.75, 1.0, False), (1.75, 0.9, True), (1.5, 0.8, False), (2.2, 0.8, False)],
+)
+def test_a_slope_is_that_of_a_unit_only_within_what_noise_takes_of_it(
+    scale: float, correlation: float, expected: bool
+) -> None:
+    assert kinematics._may_be(1.943844, scale, correlation) is expected
+
+
 def test_exchanged_axes_are_named() -> None:
     log = make_log(1)
     run = log.runs[0]

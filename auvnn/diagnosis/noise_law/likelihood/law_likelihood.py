@@ -35,7 +35,7 @@ STARTS, FIRST_TIME = np.logspace(-3.0, 1.0, 5), 1.0
 # Standard deviations of the law's parameters as they are likely to be, in logarithms: a proper, weak prior.
 VAGUE = 3.0
 # Steps of the search for the likeliest law, and what one must promise of minus twice the log likelihood.
-STEPS, PROMISED = 40, 0.01
+STEPS, PROMISED = 80, 0.01
 # The same where explanations are compared, a hundredth of what decides between them: laws are found again at each fit.
 ROUGHLY = 0.1
 

@@ -17,16 +17,18 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.diagnosis.one_step.refit import OneStepRefit
+from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
+from auvnn.diagnosis.one_step.refit import OneStepRefit, RefittedEffect
 from auvnn.diagnosis.stages.state import Setting
 from auvnn.errors import InputError
-from auvnn.estimation.prediction_error import SINGULAR, FitError
 from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
 
 Array = NDArray[np.float64]
 # Samples that are looked at, roughly, at most, and length of the stretches that are left out of a longer log, s.
 SAMPLES, STRETCH = 6000, 15.0
+# What is raised where accelerations or slopes are missing, or sums of them cannot be solved.
+UNFITTED = (InputError, *UNSOLVED)
 
 
 def fitted_one_step(asked: Setting) -> dict[str, Array]:
@@ -38,15 +40,21 @@ def fitted_one_step(asked: Setting) -> dict[str, Array]:
         asked: model, log and effects.
     """
     asked.say("fitting effects one step ahead")
-    fell: dict[str, tuple[float, Array]] = {}
-    with suppress(InputError, FitError, np.linalg.LinAlgError, SINGULAR):
+    try:
         log = thinned(asked.log)
         beside = OneStepRefit(asked.model, log, choose_derivative(log, None))
-        for name in asked.usable:
-            found = beside.alone(name, judged=False)
-            if found is not None and found.fell > 0.0:
-                fell[name] = found.fell, np.array(list(found.values.values()))
-    return {name: fell[name][1] for name in sorted(fell, key=lambda n: -fell[n][0])}
+    except UNFITTED:
+        return {}
+    found = dict(zip(asked.usable, asked.pool.run(_alone, beside, asked.usable), strict=True))
+    fell = {name: one for name, one in found.items() if one is not None and one.fell > 0.0}
+    return {n: np.array([*fell[n].values.values()]) for n in sorted(fell, key=lambda n: -fell[n].fell)}
+
+
+def _alone(beside: OneStepRefit, name: str) -> RefittedEffect | None:
+    """Return an effect fitted one step ahead, None where it cannot be: a task of an executor."""
+    with suppress(*UNFITTED):
+        return beside.alone(name, judged=False)
+    return None
 
 
 def thinned(log: Log) -> Log:
