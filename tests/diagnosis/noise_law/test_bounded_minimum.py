@@ -70,6 +70,36 @@ def test_a_step_that_failed_shows_how_much_more_the_value_is_curved():
     assert len(asked) == 3
 
 
+def test_after_a_step_that_brought_little_steps_become_long_again():
+    """Behind a bend that the curvature did not foretell, a long way of one slope is gone by steps of the full length."""
+    asked = []
+
+    def sloped(x):
+        asked.append(x)
+        bend = 400.0 * min(float(x[0]) - 0.5, 0.0)
+        return 200.0 * min(float(x[0]) - 0.5, 0.0) ** 2 - float(x[0]), np.array([bend - 1.0])
+
+    low, high = np.zeros(1), np.full(1, 60.0)
+    _, x = bounded_minimum(sloped, lambda x: np.full((1, 1), 1e-3), low, low, high, most=60, enough=1e-9)
+    assert x == pytest.approx([60.0]) and len(asked) < 36
+
+
+@pytest.mark.parametrize(("start", "asked_at_most"), [(3.1, 12), (5.1, 13), (7.2, 15)])
+def test_after_a_step_that_brought_little_the_next_is_shorter(start, asked_at_most):
+    """A quartic promises what it does not bring: with steps that stay as long, one or two more fail on the way."""
+    asked = []
+
+    def sloped(x):
+        asked.append(x)
+        return float(x[0] ** 4), 4.0 * x**3
+
+    wide = np.full(1, 50.0)
+    value, _ = bounded_minimum(
+        sloped, lambda x: np.full((1, 1), 1e-3), np.full(1, start), -wide, wide, most=60, enough=1e-6
+    )
+    assert value < 1e-5 and len(asked) <= asked_at_most
+
+
 def test_a_value_that_is_not_finite_beyond_a_wall_is_walked_around():
     def sloped(x):
         if x[0] > 1.0:

@@ -86,6 +86,20 @@ def test_a_member_of_a_group_that_is_needed_beside_the_one_that_leads_is_no_riva
     assert state.groups == () and state.chosen == ("payload", "waves")
 
 
+@pytest.mark.parametrize("promised", [True, False])
+def test_where_the_tests_promise_too_little_nothing_is_fitted(promised):
+    asked: Any = Asked([named(fit(30.0, "payload", "waves"))])
+    state, seen = begun("payload"), []
+
+    def promising(at: Any, tested: Any) -> bool:
+        seen.append((at, [*tested]))
+        return promised
+
+    after = search_round(asked, state, promising)
+    assert seen == [(state, ["waves", "tether", "thrust_asymmetry", "constant_force"])]
+    assert (after is state) is not promised and len(asked.offered) == promised
+
+
 def test_a_member_beside_which_the_one_that_leads_is_needless_takes_its_place():
     asked: Any = Asked([named(fit(30.0, "payload", "tether", "waves"))])
     asked.gone = ["payload"]

@@ -72,6 +72,11 @@ def test_names_that_leave_the_noise_alone_are_taken_and_said(asked):
     def search(what, windows, worthwhile, promising):
         seen.append(windows.mask.shape[1] * STEP)
         assert worthwhile(state(1.5)) and not worthwhile(state(5.0))
+        at, tested = before_a_round(5.0, [0.1, 0.41])
+        # What is stated of this model is its inertia.
+        assert promising(at, {"body_lift": tested["effect 1"]}) and not promising(
+            at, {"inertia": tested["effect 1"]}
+        )
         return state(1.1, ("body_lift",))
 
     given, found = search_over_shorter(asked, state(5.0), search)
