@@ -48,6 +48,7 @@ SAMPLES = {
     "rows-27.jsonl": 26,
     "rows-28.jsonl": 27,
     "rows-29.jsonl": 28,
+    "rows-30.jsonl": 29,
 }
 
 
