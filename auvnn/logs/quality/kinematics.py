@@ -271,8 +271,8 @@ def fit(x: Array, y: Array) -> tuple[float, float]:
 def _may_be(factor: float, scale: float, correlation: float) -> bool:
     """Whether a slope of measured on derived is that of a unit.
 
-    Noise of the derived motion takes a share of the slope, at most the square of the correlation if all noise is there: a
-    slope that is well known and lies between two units is a sensor's scale.
+    Noise of the derived motion makes a slope smaller, and leaves of it at least the square of the correlation: that much
+    where all noise is there. A slope that is well known and lies between two units is a sensor's scale.
 
     Args:
         factor: of the unit.
