@@ -43,8 +43,8 @@ def bounded_minimum(
         low: least values, (P,).
         high: largest values, (P,).
         most: steps, those that fail too.
-        enough: what a step promises at least. The search ends where the next one promises less within the distance that it
-            may go: after steps that failed this may be a little above the minimum.
+        enough: what a step promises at least. The search ends where the next one promises less, within the distance that
+            it may go: after steps that failed this may be a little above the minimum.
 
     Reference: Nocedal and Wright (2006), Numerical Optimization, 2nd ed., chapters 4 (trust regions), 6 and 18.
     """
