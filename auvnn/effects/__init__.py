@@ -38,6 +38,7 @@ EFFECTS = Catalogue(
         "thruster_gain": "auvnn.effects.thruster_gain:ThrusterGain",
         "thrust_asymmetry": "auvnn.effects.thrust_asymmetry:ThrustAsymmetry",
         "thrust_curve": "auvnn.effects.thrust_curve:ThrustCurve",
+        "thrust_polynomial": "auvnn.effects.thrust_polynomial:ThrustPolynomial",
         "thruster_deadband": "auvnn.effects.thruster_deadband:ThrusterDeadband",
         "thruster_lag": "auvnn.effects.thruster_lag:ThrusterLag",
         "thrust_overshoot": "auvnn.effects.thrust_overshoot:ThrustOvershoot",

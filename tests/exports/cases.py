@@ -38,7 +38,11 @@ def model(name):
     if name == "networks":
         return GreyBox(load("rov95").vehicle, (), trained_like())
     if name == "actuators":
-        more = {"thruster_deadband": {"width": 0.05}, "thrust_curve": {"thruster_1_positive": 0.8}}
+        more = {
+            "thruster_deadband": {"width": 0.05},
+            "thrust_curve": {"thruster_1_positive": 0.8},
+            "thrust_polynomial": {"thruster_2_degree_2": 0.1, "thruster_3_degree_3": -0.1},
+        }
         return load("bluerov2").with_effects({**LAG, **LATE, **OVER, **more})
     if name == "payload":
         held = {"time": 10.0, "mass": 2.0, "x": 0.2, "buoyancy": 5.0, "X": 1.3}

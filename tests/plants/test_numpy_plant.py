@@ -62,6 +62,7 @@ def nominal(vehicle):
         ("bluerov2", ("thruster_deadband", "thruster_lag", "actuation_delay", "thruster_gain", "thrust_inflow_loss",
                       "voltage_droop", "propeller_torque")),
         ("bluerov2", ("thrust_curve", "thruster_deadband", "thruster_lag", "voltage_droop")),
+        ("bluerov2", ("thruster_gain", "thrust_polynomial", "thruster_deadband", "thruster_lag")),
         ("rov95", ("ocean_current", "current_shear", "waves", "tether", "added_mass", "munk_moment")),
         ("rov95", ("bottom_proximity", "surface_proximity", "biofouling", "ocean_current", "quadratic_damping")),
         ("remus100", ("cg_offset", "payload", "net_buoyancy", "compressibility", "coupled_damping", "ocean_current")),
@@ -78,8 +79,8 @@ def test_effects_together_do_the_same(vehicle, names):
     assert apart(move("own", what), move("numpy", what)) < CLOSE
 
 
-@pytest.mark.parametrize("name", ["thruster_gain", "thruster_deadband", "thrust_curve", "thrust_inflow_loss",
-                                  "propeller_torque", "thruster_lag"])  # fmt: skip
+@pytest.mark.parametrize("name", ["thruster_gain", "thruster_deadband", "thrust_curve", "thrust_polynomial",
+                                  "thrust_inflow_loss", "propeller_torque", "thruster_lag"])  # fmt: skip
 def test_effects_on_a_commanded_wrench_do_the_same(name):
     known = load_vehicle("remus100")
     values = {p.name: p.null + 0.7 * p.scale for p in EFFECTS.get(name).describe(known, "wrench")}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
+from numpy.polynomial.legendre import legval
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
@@ -85,6 +86,8 @@ class Actuators:
                 wanted = self._deadband(wanted, values["width"])
             elif name == "thrust_curve":
                 wanted = self._powers(wanted, values)
+            elif name == "thrust_polynomial":
+                wanted = self._polynomial(wanted, values)
             elif name == "thrust_overshoot":
                 wanted, constant = self._overshoot(wanted, values, begin, end), False
 
@@ -117,6 +120,17 @@ class Actuators:
         def out(t: float) -> Array:
             share = wanted(t) / self.full
             return self.full * np.where(share > 0.0, np.abs(share) ** ahead, -(np.abs(share) ** astern))
+
+        return out
+
+    def _polynomial(self, wanted: Signal, values: Values) -> Signal:
+        series = [[0.0, *(values[f"{n}_degree_{k}"] for k in range(1, 5))] for n in self.names()]
+
+        def out(t: float) -> Array:
+            command = wanted(t)
+            share = np.clip(command / self.full, -1.0, 1.0)
+            errors = [legval(share[:, i], series[i]) for i in range(len(series))]
+            return command * (1.0 + np.stack(errors, axis=1))
 
         return out
 

@@ -15,7 +15,9 @@ from tests.small_logs import small_vehicle
 
 DOUBLE = torch.float64
 PARTS, ROWS, STEP = 4, 12, 0.2
-ACTING = ["thruster_lag", "thrust_overshoot", "actuation_delay", "thrust_curve", "thruster_deadband"]
+ACTING = [
+    "thruster_lag", "thrust_overshoot", "actuation_delay", "thrust_curve", "thrust_polynomial", "thruster_deadband",
+]  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -29,6 +29,7 @@ MODELS = {
     "overshoot": OVER,
     "dead band": {"thruster_deadband": {"width": 0.1}},
     "curve": {"thrust_curve": {"thruster_1_positive": 0.8, "thruster_2_negative": 1.3}},
+    "polynomial": {"thrust_polynomial": {"thruster_1_degree_2": 0.1, "thruster_2_degree_3": -0.2}},
     "all, in a current": {
         **LAG,
         **LATE,
