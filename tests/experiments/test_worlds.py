@@ -49,6 +49,7 @@ SAMPLES = {
     "rows-28.jsonl": 27,
     "rows-29.jsonl": 28,
     "rows-30.jsonl": 29,
+    "rows-31.jsonl": 30,
 }
 
 
