@@ -20,7 +20,6 @@ def log():
     return simulate(load("bluerov2"), "multisine", "realistic", world=world, **how).log
 
 
-@pytest.mark.long
 def test_what_two_other_forms_describe_in_part_is_one_polynomial(log):
     """Without it thrust_curve and thrust_asymmetry are named, one after the other."""
     found = diagnose(load("bluerov2"), log, effects=[*FORMS, *OTHERS])
