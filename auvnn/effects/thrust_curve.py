@@ -7,16 +7,15 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect
 from auvnn.effects.factors import actuators
+from auvnn.effects.full_command import FullCommandEffect
 from auvnn.effects.hooks import Parameter
-from auvnn.effects.sizes import full_wrench
 
 # Below this share of full command the two curves differ by a factor, so that the slope at zero is finite.
 LEAST = 1e-3
 
 
-class ThrustCurve(Effect):
+class ThrustCurve(FullCommandEffect):
     """Two exponents per thruster: c_i <- sign(c_i) |c_i|^m_i, m_i by the sign of c_i, before the thruster's own curve.
 
     A quadratic curve becomes T = T_full |c|^(2 m). Full command stays full command, which is what tells it from
@@ -46,13 +45,9 @@ class ThrustCurve(Effect):
             for i, name in enumerate(actuators(vehicle, actuation))
         )
 
-    def settle(self, vehicle: Any, actuation: str) -> None:
-        """Keep what a full command is."""
-        self.keep("full", full_wrench(vehicle) if actuation == "wrench" else 1.0)
-
     def command(self, command: Tensor, times: Tensor) -> Tensor:
         """Take each command to its power; unchanged, exactly, at exponents of one."""
-        size = torch.clamp(command.abs() / self.kept("full").to(command), min=LEAST)
+        size = torch.clamp(self.share(command).abs(), min=LEAST)
         positive, negative = (self.theta.to(command) - 1.0).chunk(2)
         more = torch.where(command > 0.0, positive, negative)
         return command + command * torch.expm1(more * torch.log(size))

@@ -7,16 +7,15 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect
 from auvnn.effects.factors import actuators
+from auvnn.effects.full_command import FullCommandEffect
 from auvnn.effects.hooks import Parameter
-from auvnn.effects.sizes import full_wrench
 
 # Of the highest Legendre polynomial.
 DEGREE = 4
 
 
-class ThrustPolynomial(Effect):
+class ThrustPolynomial(FullCommandEffect):
     """Four coefficients per thruster: c_i <- c_i (1 + sum_k a_ik P_k(c_i)), k = 1 to 4, before the thruster's own curve.
 
     P_k are the Legendre polynomials; the one of degree 0 is missing, a command that is off by the same share
@@ -54,13 +53,9 @@ class ThrustPolynomial(Effect):
             for i, name in enumerate(actuators(vehicle, actuation))
         )
 
-    def settle(self, vehicle: Any, actuation: str) -> None:
-        """Keep what a full command is."""
-        self.keep("full", full_wrench(vehicle) if actuation == "wrench" else 1.0)
-
     def command(self, command: Tensor, times: Tensor) -> Tensor:
         """Change each command by its polynomial; unchanged, exactly, at coefficients of zero."""
-        c = torch.clamp(command / self.kept("full").to(command), min=-1.0, max=1.0)
+        c = torch.clamp(self.share(command), min=-1.0, max=1.0)
         square = c * c
         first, second, third, fourth = self.theta.to(command).chunk(DEGREE)
         odd = c * (first + third * (2.5 * square - 1.5))

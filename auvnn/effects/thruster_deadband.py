@@ -7,12 +7,11 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from auvnn.effects.base import Effect
+from auvnn.effects.full_command import FullCommandEffect
 from auvnn.effects.hooks import EACH, Parameter
-from auvnn.effects.sizes import full_wrench
 
 
-class ThrusterDeadband(Effect):
+class ThrusterDeadband(FullCommandEffect):
     """No thrust for commands within the dead band; beyond it the command counts from the band's edge.
 
     c <- sign(c) (|c| - width)+ / (1 - width), so that full command stays full command; beyond it c stays as
@@ -34,13 +33,9 @@ class ThrusterDeadband(Effect):
         """Return half the width of the band, as a share of full command."""
         return (Parameter("width", "1", 0.0, 0.07, 0.0, 0.6, actuator=EACH),)
 
-    def settle(self, vehicle: Any, actuation: str) -> None:
-        """Keep what a full command is."""
-        self.keep("full", full_wrench(vehicle) if actuation == "wrench" else 1.0)
-
     def command(self, command: Tensor, times: Tensor) -> Tensor:
         """Take the band out of the commands."""
         full, width = self.kept("full").to(command), self.theta[0].to(command)
-        size = command.abs() / full
+        size = self.share(command).abs()
         inside = torch.clamp(size - width, min=0.0) / (1.0 - width)
         return command.sign() * full * torch.where(size < 1.0, inside, size)

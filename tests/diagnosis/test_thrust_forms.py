@@ -1,4 +1,4 @@
-"""Thrust curves that are off by a form of no catalogue: what is left of them is no force and no displaced weight."""
+"""Thrust curves that are off by no form of the catalogue: they are named as one polynomial, and nothing else is."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ def log():
     return simulate(load("bluerov2"), "multisine", "realistic", world=world, **how).log
 
 
-def test_what_two_other_forms_describe_in_part_is_one_polynomial(log):
-    """Without it thrust_curve and thrust_asymmetry are named, one after the other."""
+def test_curves_off_as_a_wave_are_one_polynomial_and_leave_nothing(log):
     found = diagnose(load("bluerov2"), log, effects=[*FORMS, *OTHERS])
     assert found.missing == ["thrust_polynomial"]
     assert [step["verdict"] for step in found.steps] == ["named", "adequate"]
