@@ -18,12 +18,16 @@ Z95 = 1.96
 
 
 def z_of(row: Row) -> list[float]:
-    """Return the errors in standard errors of the parameters of hidden effects that were named."""
-    kept = []
+    """Return the errors in standard errors of the parameters of hidden effects that were named.
+
+    What the row's world has of the effect by itself is part of the truth.
+    """
+    kept, own = [], worlds.own_amounts(row)
     for name, error in (row.get("errors") or {}).items():
         z = error["z"]
         if z is None or not np.isfinite(z):
             continue
+        z -= own[name] / row["parameters"][name]["std"] if name in own else 0.0
         if kind_of(row) == "several":
             # Called by effect and parameter; what was not named was never fitted in earnest.
             if name.partition(".")[0] in counting.given_names(row):

@@ -144,6 +144,18 @@ def force_right(row: Row) -> list[bool]:
     return out
 
 
+def own_amounts(row: Row) -> dict[str, float]:
+    """Return how much of the hidden effect its world has by itself, by parameter, where parameters of it say that.
+
+    A vertical that is off in a world and a hidden tilt are one rotation after the other: of small angles the
+    rotation vectors add up, and what a log can tell is their sum.
+    """
+    tilt = ((row.get("world_law") or {}).get("drawn") or {}).get("tilt")
+    if not tilt or effects_of(row) != ["tilted_vertical"]:
+        return {}
+    return dict(zip(("north", "east"), map(float, tilt), strict=True))
+
+
 def _asked(rows: Sequence[Row], kind: str) -> list[Row]:
     return [r for r in rows if kind_of(r) == kind and counting.was_made(r) and r.get("world")]
 

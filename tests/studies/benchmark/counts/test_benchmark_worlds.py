@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from auvnn.errors import ConfigError
 from auvnn.models import load
@@ -16,7 +17,7 @@ from auvnn.studies.benchmark import cases, run_case
 from auvnn.studies.benchmark.case import Case
 from auvnn.studies.benchmark.cases import targets
 from auvnn.studies.benchmark.costs import cost_of, costly
-from auvnn.studies.benchmark.counts.rates import NUMBERS, RATES
+from auvnn.studies.benchmark.counts.rates import NUMBERS, RATES, z_of
 from tests.studies.benchmark.plans import OPTIONS, of_plan
 
 WORLDS = ("between", "disturbed", "shaped", "sensors", "conventions", "everything")
@@ -86,3 +87,25 @@ def test_one_log_of_a_world_goes_the_whole_way():
     # By what a row says its case is found again, and the log is not made twice.
     assert {Case.of_row(json.loads(json.dumps(row, default=float))): 1} == {case: 1}
     assert np.shape(row["world_law"]["drawn"]["force"]["rms"]) == (6,)
+
+
+def test_a_hidden_tilt_and_that_of_the_world_are_one():
+    # Two rotations, one after the other, against scipy's composition; what is about the vertical is no tilt.
+    hidden, world, std = np.array([0.17, -0.08]), np.array([0.004, 0.003]), 0.001
+    both = (Rotation.from_rotvec([*world, 0.0]) * Rotation.from_rotvec([*hidden, 0.0])).as_rotvec()[:2]
+    errors = {n: {"relative": 0.0, "z": (both[i] - hidden[i]) / std} for i, n in enumerate(("north", "east"))}
+    row = {"kind": "effect", "hidden": "tilted_vertical", "effects": ["tilted_vertical"], "verdict": "named",
+           "missing": ["tilted_vertical"], "found": [{"verdict": "named", "effects": ["tilted_vertical"]}],
+           "parameters": {n: {"value": both[i], "std": std} for i, n in enumerate(("north", "east"))}, "errors": errors,
+           "world_law": {"drawn": {"tilt": world.tolist()}}}  # fmt: skip
+    assert np.abs(z_of(row)).max() < 0.1 < 2.0 < np.abs([e["z"] for e in errors.values()]).min()
+    # Of another effect nothing is taken off.
+    name = ["gyro_bias"]
+    other = {
+        **row,
+        "hidden": name[0],
+        "effects": name,
+        "missing": name,
+        "found": [{"verdict": "named", "effects": name}],
+    }
+    assert z_of(other) == [e["z"] for e in errors.values()]
