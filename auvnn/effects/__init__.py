@@ -17,6 +17,7 @@ EFFECTS = Catalogue(
         "ocean_current": "auvnn.effects.ocean_current:OceanCurrent",
         "current_shear": "auvnn.effects.current_shear:CurrentShear",
         "waves": "auvnn.effects.waves:Waves",
+        "drag_only_current": "auvnn.effects.drag_only_current:DragOnlyCurrent",
         "bottom_proximity": "auvnn.effects.bottom_proximity:BottomProximity",
         "surface_proximity": "auvnn.effects.surface_proximity:SurfaceProximity",
         "compressibility": "auvnn.effects.compressibility:Compressibility",

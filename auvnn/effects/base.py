@@ -29,6 +29,7 @@ class Effect(nn.Module):
         `delay`, `respond`, `steer`: how late thrust comes, its lag, that of fin angles; at most one effect each.
         `thrust`: the thrust of each actuator (gain, voltage, loss by inflow).
         `water`: velocity and acceleration of the water, NED.
+        `flow`: how much of the water's motion all but the drag feels.
         `body`: mass, centres, inertia, added mass, buoyancy, damping coefficients.
         `wrench`: any further force and moment on the body.
         `sense`: what the sensors make of the state.
@@ -37,7 +38,8 @@ class Effect(nn.Module):
     them apart: a current that is the same at all depths, where the depth hardly changes. The effect is then given as one
     of a group, never alone. `contains`: plainer effects that it is at some values, each with the parameters they share.
     `leaves`: effects that look like what its own form gets wrong. `remembers`: what `command` returns depends on earlier
-    commands by one state per command: `follow`, `advance`.
+    commands by one state per command: `follow`, `advance`. `acts_with`: effects without any of which it does nothing, so
+    that it can neither be missing nor be hidden alone.
     """
 
     name: ClassVar[str]
@@ -59,6 +61,7 @@ class Effect(nn.Module):
     time_varying: ClassVar[bool] = False
     remembers: ClassVar[bool] = False
     leaves: ClassVar[tuple[str, ...]] = ()
+    acts_with: ClassVar[tuple[str, ...]] = ()
 
     theta: nn.Parameter
     # Standard deviations by parameter, as they were stated or fitted; of what is not in it the default holds.
@@ -78,18 +81,8 @@ class Effect(nn.Module):
         for key, value in (values or {}).items():
             if key not in self._index:
                 raise ConfigError(unknown_name(f"parameter of {self.name}", key, self._index))
-            start[self._index[key]] = self._checked(parameters[self._index[key]], value)
+            start[self._index[key]] = parameters[self._index[key]].checked(self.name, value)
         self.theta = nn.Parameter(torch.tensor(start, dtype=torch.float64))
-
-    def _checked(self, parameter: Parameter, value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ConfigError(f"{self.name}.{parameter.name} must be a number, not {value!r}")
-        if not parameter.low <= value <= parameter.high:
-            raise ConfigError(
-                f"{self.name}.{parameter.name} = {value:g} {parameter.unit} is out of bounds: "
-                f"choose from {parameter.low:g} to {parameter.high:g}"
-            )
-        return float(value)
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
@@ -280,6 +273,10 @@ class Effect(nn.Module):
         zero = torch.zeros_like(moment.position)
         return zero, zero
 
+    def flow(self, moment: Moment) -> Moment:
+        """Return the moment with the water's motion as all but the drag feels it; asked where the water moves."""
+        return moment
+
     def body(self, body: Body, moment: Moment | None) -> Body:
         """Change the body; `moment` is None unless the class is `time_varying`."""
         return body
@@ -297,4 +294,4 @@ class Effect(nn.Module):
         return sensed
 
 
-HOOKS = ("command", "delay", "respond", "steer", "thrust", "water", "body", "wrench", "sense")
+HOOKS = ("command", "delay", "respond", "steer", "thrust", "water", "flow", "body", "wrench", "sense")

@@ -48,7 +48,7 @@ class CrossFlowDrag(Effect):
 
     def wrench(self, moment: Moment, body: Body) -> Tensor:
         """Return strips less centre."""
-        nu = moment.nu_r
+        nu = moment.drag_flow
         _, v, w, _, q, r = nu.unbind(-1)
         x, weight, drag = (self.kept(n).to(nu) for n in ("strips", "weights", "drag"))
         side = v.unsqueeze(-1) + x * r.unsqueeze(-1)

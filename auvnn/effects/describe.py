@@ -17,6 +17,7 @@ HOOK_WORDS = {
     "steer": "how fin angles follow their commands",
     "thrust": "the thrust",
     "water": "the motion of the water",
+    "flow": "how much of the water's motion all but the drag feels",
     "body": "mass, buoyancy, centres and damping",
     "wrench": "a further force and moment",
     "sense": "what the sensors report",
@@ -40,6 +41,8 @@ def describe_effect(kind: type[Effect], vehicle: Vehicle | None = None) -> str:
     lines += ["", f"*Changes*: {', '.join(HOOK_WORDS[h] for h in HOOKS if h in kind.hooks())}."]
     if kind.channels:
         lines.append(f"*Needs in the log*: {_names(kind.channels)}.")
+    if kind.acts_with:
+        lines.append(f"*Acts only beside one of*: {_names(kind.acts_with)}.")
     if kind.excludes:
         lines.append(f"*Not together with*: {_names(kind.excludes)}.")
     if kind.confused_with:

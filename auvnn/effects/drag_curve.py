@@ -62,10 +62,10 @@ class DragCurve(Effect):
         """Return the drag by the other power less that by the square."""
         out = torch.zeros_like(moment.nu)
         if body.quadratic is not None:
-            out = out - matvec(body.quadratic, self._more(moment.nu_r))
+            out = out - matvec(body.quadratic, self._more(moment.drag_flow))
         if self.parts and body.element_quadratic is not None:
             to_parts = self.kept("to_parts").to(moment.nu)
-            own = matvec(to_parts.flatten(0, 1), moment.nu_r).unflatten(-1, (self.parts, 6))
+            own = matvec(to_parts.flatten(0, 1), moment.drag_flow).unflatten(-1, (self.parts, 6))
             force = body.element_quadratic * self._more(own)
             out = out - matvec(to_parts.flatten(0, 1).mT, force.flatten(-2))
         return out

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 from torch import Tensor
+
+from auvnn.errors import ConfigError
 
 # Stands for every actuator, each by itself.
 EACH = -1
@@ -41,6 +44,21 @@ class Parameter:
     shape: bool = False
     timing: bool = False
     actuator: int | None = None
+
+    def checked(self, effect: str, value: Any) -> float:
+        """Return a value that was given for the parameter of an effect.
+
+        Raises:
+            ConfigError: it is no number, or out of bounds.
+        """
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise ConfigError(f"{effect}.{self.name} must be a number, not {value!r}")
+        if not self.low <= value <= self.high:
+            raise ConfigError(
+                f"{effect}.{self.name} = {value:g} {self.unit} is out of bounds: "
+                f"choose from {self.low:g} to {self.high:g}"
+            )
+        return float(value)
 
 
 @dataclass(frozen=True)
@@ -168,6 +186,7 @@ class Moment:
         rotation: body to NED, (..., 3, 3).
         nu: velocity of the body origin over ground, (..., 6).
         nu_r: velocity through the water, (..., 6); equal to `nu` inside `water`.
+        dragged: the same as the drag feels it, (..., 6), where an effect sets it apart; None is `nu_r`.
         nu_c_dot: acceleration of the water in body axes, (..., 6); zero inside `water`.
         command: what was commanded over this interval, (..., n).
         fins: fin angles, rad, (..., m), or None; where an effect has the fins follow their commands, the actual ones.
@@ -192,6 +211,12 @@ class Moment:
     thrust: Tensor | None = None
     drag: Tensor | None = None
     fin_lift: FinLift | None = None
+    dragged: Tensor | None = None
+
+    @property
+    def drag_flow(self) -> Tensor:
+        """Velocity through the water as the drag feels it, (..., 6)."""
+        return self.nu_r if self.dragged is None else self.dragged
 
 
 @dataclass(frozen=True)

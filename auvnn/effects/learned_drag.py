@@ -42,7 +42,7 @@ class LearnedDrag(Effect):
 
     def wrench(self, moment: Moment, body: Body) -> Tensor:
         """Return the force and moment of the corrections."""
-        return -matvec(self.theta.to(moment.nu_r).unflatten(-1, (6, 42)), products(moment.nu_r))
+        return -matvec(self.theta.to(moment.nu_r).unflatten(-1, (6, 42)), products(moment.drag_flow))
 
 
 def products(nu: Tensor) -> Tensor:

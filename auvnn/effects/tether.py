@@ -73,7 +73,7 @@ class Tether(Effect):
         length = torch.sqrt((away * away).sum(-1, keepdim=True) + tiny)
         pull = -stiffness * torch.clamp(1 - slack / length, min=0.0) * away
         pull = pull + torch.nn.functional.pad(0.5 * weight * length, (2, 0))
-        v = moment.nu_r[..., :3] + cross(moment.nu_r[..., 3:], arm)
+        v = moment.drag_flow[..., :3] + cross(moment.drag_flow[..., 3:], arm)
         speed = torch.sqrt((v * v).sum(-1, keepdim=True) + 1e-30)
         force = matvec(moment.rotation.mT, pull) - drag * length * speed * v
         return torch.cat([force, cross(arm, force)], dim=-1)

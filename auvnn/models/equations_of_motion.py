@@ -13,10 +13,10 @@ from auvnn.errors import ConfigError
 from auvnn.models.actuation.actuators import Actuators
 from auvnn.models.input_conversion import as_tensor, own
 from auvnn.models.inputs import Inputs
+from auvnn.models.moving_water import in_moving_water
 from auvnn.models.sensors import Sensors
 from auvnn.physics.attitude import quat_to_matrix
 from auvnn.physics.coriolis import coriolis_force
-from auvnn.physics.current import water_velocity
 from auvnn.physics.fins import fin_wrench
 from auvnn.physics.inertia import rigid_body_inertia
 from auvnn.physics.kinematics import eta6_to_eta7
@@ -236,15 +236,10 @@ class EquationsOfMotion(Sensors):
             inputs.voltage,
             altitude,
         )
-        nu_r, moving = nu, self.using("water")
+        moving = self.using("water")
         if moving:
-            velocity, acceleration = moving[0].water(moment)
-            for effect in moving[1:]:
-                more, faster = effect.water(moment)
-                velocity, acceleration = velocity + more, acceleration + faster
-            nu_c, nu_c_dot = water_velocity(rotation, nu[..., 3:], velocity, acceleration)
-            nu_r = nu - nu_c
-            moment = replace(moment, nu_r=nu_r, nu_c_dot=nu_c_dot)
+            moment = in_moving_water(moment, moving, self.using("flow"))
+        nu_r, through = moment.nu_r, moment.drag_flow
         if prepared is None or self.time_varying:
             prepared = self.prepare(moment)
         body, terms = prepared.body, {}
@@ -257,20 +252,20 @@ class EquationsOfMotion(Sensors):
         else:
             terms["Coriolis"] = -coriolis_force(prepared.total, nu)
         if body.linear is not None:
-            terms["linear damping"] = -matvec(body.linear, nu_r)
+            terms["linear damping"] = -matvec(body.linear, through)
         if body.quadratic is not None:
-            terms["quadratic damping"] = -matvec(body.quadratic, nu_r.abs() * nu_r)
+            terms["quadratic damping"] = -matvec(body.quadratic, through.abs() * through)
         if body.element_linear is not None and body.element_quadratic is not None:
             to_parts = self._known("element_transform").flatten(0, 1)
-            own = matvec(to_parts, nu_r)
+            own = matvec(to_parts, through)
             law = body.element_linear.flatten(-2) + body.element_quadratic.flatten(-2) * own.abs()
             terms["damping elements"] = -matvec(to_parts.mT, law * own)
         if self.damping is not None:
             if self.passive:
                 stated = [terms[name] for name in DRAG_TERMS if name in terms]
-                learned = self.damping(nu_r, -sum(stated, torch.zeros_like(nu_r)))
+                learned = self.damping(through, -sum(stated, torch.zeros_like(through)))
             else:
-                learned = self.damping(nu_r)
+                learned = self.damping(through)
             terms["damping subnetworks"] = -learned
         terms["restoring"] = -restoring_force(rotation, body.weight, body.buoyancy, body.hangs, body.cb)
         if self._known("fin_area") is not None:

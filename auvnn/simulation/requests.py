@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -33,8 +33,11 @@ def _told(world: World, task: PlantTask, sensing: Sensing, wandering: Mapping[st
     }
 
 
-def _can_be_hidden(model: GreyBox, name: str) -> None:
-    lacking = EFFECTS.get(name).lacks(model.vehicle, model.actuation)
+def _can_be_hidden(model: GreyBox, name: str, wanted: Iterable[str]) -> None:
+    kind = EFFECTS.get(name)
+    if kind.acts_with and not {*kind.acts_with} & {*wanted, *model.effect_names}:
+        raise ConfigError(f"{name} does nothing by itself: hide one of {', '.join(kind.acts_with)} with it")
+    lacking = kind.lacks(model.vehicle, model.actuation)
     if lacking:
         raise ConfigError(
             f"{name} cannot be hidden in a log of {model.vehicle.name}: its model file states no "

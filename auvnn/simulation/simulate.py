@@ -175,7 +175,7 @@ def simulate(
             generator = _generator(seed, "hidden", zlib.crc32(name.encode()))
             values = typical_values(EFFECTS.get(name).describe(model.vehicle, model.actuation), generator)
         truth_hidden[name] = values
-        _can_be_hidden(model, name)
+        _can_be_hidden(model, name, wanted)
         near = near or "altitude" in EFFECTS.get(name).channels
     if bottom is None and near:
         bottom = bottom_below(model, excitation, seed, runs=runs, duration=duration, rate=rate)

@@ -12,12 +12,12 @@ from auvnn.effects import Extent
 from auvnn.models import GreyBox
 from auvnn.testing.effect_derivatives import has_right_gradient, recovers, transforms
 from auvnn.testing.effect_texts import Kind, describes_itself, refuses
+from auvnn.testing.one_effect import built, company
 from auvnn.testing.scene import (
     EXAMPLE,
     THETA,
     Predictor,
     Scene,
-    built,
     make_scene,
     require,
     require_close,
@@ -38,12 +38,13 @@ def vanishes(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters
         vehicle: in which it is tried.
         actuation: "thrusters" or "wrench".
     """
-    scene, expected = _without(vehicle, actuation)
+    scene, expected = _without(kind.acts_with, vehicle, actuation)
     described = kind.describe(vehicle, actuation)
     shapes = [{}, *kind.starts(described, Extent(0.0, 1.0, 1.0, (3.0, 5.0)))[:5]]
     shapes.append({p.name: v for p in described if p.shape for v in (p.probes or (p.null + 0.3 * p.scale,))})
     for shape in shapes:
-        null = Predictor(GreyBox(vehicle, [kind.build(vehicle, actuation, shape)], actuation=actuation))
+        effects = [kind.build(vehicle, actuation, shape), *company(kind.acts_with, vehicle, actuation)]
+        null = Predictor(GreyBox(vehicle, effects, actuation=actuation))
         with torch.no_grad():
             found = null(scene)
         for output, value in expected.items():
@@ -52,11 +53,15 @@ def vanishes(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters
 
 
 @lru_cache(maxsize=2)
-def _without(vehicle: Vehicle, actuation: str) -> tuple[Scene, dict[str, torch.Tensor]]:
-    """Return a scene and what happens in it without any effect, which is the same for all of them."""
+def _without(
+    beside: tuple[str, ...], vehicle: Vehicle, actuation: str
+) -> tuple[Scene, dict[str, torch.Tensor]]:
+    """Return a scene and what happens in it without an effect, which is the same for all that act with the same ones."""
     scene = make_scene(vehicle, actuation)
     with torch.no_grad():
-        return scene, Predictor(GreyBox(vehicle, actuation=actuation))(scene)
+        return scene, Predictor(GreyBox(vehicle, company(beside, vehicle, actuation), actuation=actuation))(
+            scene
+        )
 
 
 def batches(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters") -> None:
@@ -143,7 +148,11 @@ def keeps_units(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrust
     units, model, scene = Units(), built(kind, vehicle, actuation), make_scene(vehicle, actuation)
     described = model.model.effect(kind.name).parameters_of
     other = units.vehicle(vehicle)
-    twin = Predictor(GreyBox(other, [kind.build(other, actuation)], actuation=actuation))
+    twins = [kind.build(other, actuation)]
+    for effect in company(kind.acts_with, vehicle, actuation):
+        values = {p.name: effect.values()[p.name] * units.factor(p.unit) for p in effect.parameters_of}
+        twins.append(type(effect).build(other, actuation, values))
+    twin = Predictor(GreyBox(other, twins, actuation=actuation))
     factors = torch.tensor([units.factor(p.unit) for p in described], dtype=torch.float64)
     with torch.no_grad():
         twin.get_parameter(THETA).copy_(model.get_parameter(THETA) * factors)
@@ -163,7 +172,8 @@ def restores(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters
         actuation: "thrusters" or "wrench".
     """
     model, scene = built(kind, vehicle, actuation), make_scene(vehicle, actuation)
-    fresh = Predictor(GreyBox(vehicle, [kind.build(vehicle, actuation)], actuation=actuation))
+    effects = [kind.build(vehicle, actuation), *company(kind.acts_with, vehicle, actuation)]
+    fresh = Predictor(GreyBox(vehicle, effects, actuation=actuation))
     with torch.no_grad():
         expected = together(model(scene))
         fresh.load_state_dict(model.state_dict())

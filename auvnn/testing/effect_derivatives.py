@@ -7,7 +7,8 @@ import torch
 from torch.func import jacfwd, jacrev, vmap
 
 from auvnn.effects import Effect
-from auvnn.testing.scene import EXAMPLE, as_function, built, make_scene, require, require_close
+from auvnn.testing.one_effect import built
+from auvnn.testing.scene import EXAMPLE, as_function, make_scene, require, require_close
 from auvnn.vehicle import Vehicle
 
 Kind = type[Effect]

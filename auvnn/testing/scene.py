@@ -265,19 +265,6 @@ def typical_values(
     return values
 
 
-def built(kind: type[Effect], vehicle: Vehicle, actuation: str, share: float = 0.4) -> Predictor:
-    """Return a predictor of the vehicle with the effect away from its null, and nothing else.
-
-    Args:
-        kind: class of the effect.
-        vehicle: in which it is tried.
-        actuation: "thrusters" or "wrench".
-        share: of each parameter's scale by which it is away from its null.
-    """
-    values = typical_values(kind, vehicle, actuation, share)
-    return Predictor(GreyBox(vehicle, [kind.build(vehicle, actuation, values)], actuation=actuation))
-
-
 def as_function(model: Predictor, scene: Scene) -> tuple[Callable[[Tensor], Tensor], Tensor]:
     """Return all outputs as a function of the effect's parameters, and the parameters."""
 

@@ -96,6 +96,22 @@ def test_the_current_pushes_by_drag_alone():
     assert move("numpy", what).nu_dot[0, 0] == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.parametrize("share", [1.0, 0.5])
+def test_an_effect_says_what_a_simplifying_simulator_does(share):
+    # Two derivations of the current in the drag alone: the plant's own law, and the model's effect.
+    water = {
+        "ocean_current": {"v_north": 0.3, "v_east": -0.2, "v_down": 0.1},
+        "current_shear": {"north": 0.1},
+    }
+    rest = {"fin_gain": {"fin_1": 0.6}, "body_lift": {"Yuv": -20.0}, "tether": {"drag": 0.3}}
+    stated = {"added_mass_coriolis": {"factor": 0.3}, "drag_only_current": {"share": share}}
+    plain = task("remus100", water | rest)
+    law = dataclasses.replace(plain, laws=Laws(relative=1.0 - share, added_coriolis=0.3))
+    moved = move("numpy", law)
+    assert apart(move("own", task("remus100", water | rest | stated)), moved) < 2e-6
+    assert apart(move("own", plain), moved) > 1e-3
+
+
 def test_an_inflow_by_the_speed_over_ground_sees_no_current():
     loss = {"thrust_inflow_loss": {"coefficient": 20.0}}
     current = {"ocean_current": {"v_north": 0.4, "v_east": 0.0, "v_down": 0.0}}

@@ -42,18 +42,18 @@ def test_every_effect_of_the_catalogue_is_known():
 def test_every_effect_does_the_same(name):
     vehicle = NEEDS.get(name, "rov95")
     # The BlueROV2 is small and quick: half the step for the same error.
-    what = task(
-        vehicle, {name: plausible(name, vehicle)}, max_step=0.0025 if vehicle == "bluerov2" else 0.005
-    )
+    beside = EFFECTS.get(name).acts_with[:1]
+    effects = {n: plausible(n, vehicle) for n in (*beside, name)}
+    what = task(vehicle, effects, max_step=0.0025 if vehicle == "bluerov2" else 0.005)
     own, other = move("own", what), move("numpy", what)
     assert apart(own, other) < CLOSE
     # And it does something, so that the agreement means something.
-    assert apart(other, nominal(vehicle)) > 100 * CLOSE
+    assert apart(other, nominal(vehicle, beside)) > 100 * CLOSE
 
 
 @functools.cache
-def nominal(vehicle):
-    return move("numpy", task(vehicle))
+def nominal(vehicle, beside=()):
+    return move("numpy", task(vehicle, {n: plausible(n, vehicle) for n in beside}))
 
 
 @pytest.mark.parametrize(
@@ -64,6 +64,13 @@ def nominal(vehicle):
         ("bluerov2", ("thrust_curve", "thruster_deadband", "thruster_lag", "voltage_droop")),
         ("bluerov2", ("thruster_gain", "thrust_polynomial", "thruster_deadband", "thruster_lag")),
         ("rov95", ("ocean_current", "current_shear", "waves", "tether", "added_mass", "munk_moment")),
+        ("rov95", ("waves", "current_shear", "drag_only_current", "added_mass_coriolis", "munk_moment",
+                   "bottom_proximity")),
+        ("bluerov2", ("ocean_current", "drag_only_current", "drag_curve", "quadratic_damping")),
+        ("rov95", ("ocean_current", "drag_only_current", "drag_curve")),
+        ("remus100", ("ocean_current", "drag_only_current", "cross_flow_drag")),
+        ("remus100", ("drag_only_current", "ocean_current", "fin_stall", "fin_gain", "body_lift", "tether",
+                      "turning_forces", "thrust_inflow_loss")),
         ("rov95", ("bottom_proximity", "surface_proximity", "biofouling", "ocean_current", "quadratic_damping")),
         ("remus100", ("cg_offset", "payload", "net_buoyancy", "compressibility", "coupled_damping", "ocean_current")),
         ("remus100", ("fin_stall", "body_lift", "turning_forces", "flooding", "trapped_water", "linear_damping")),

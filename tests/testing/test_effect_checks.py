@@ -51,9 +51,18 @@ class NoHook(Effect):
     describe = Push.describe
 
 
-class AnythingGoes(Push):
-    def _checked(self, parameter, value):
+class Loose(Parameter):
+    def checked(self, effect, value):
         return float(value)
+
+
+class AnythingGoes(Push):
+    @classmethod
+    def describe(cls, vehicle, actuation):
+        return tuple(
+            Loose(p.name, p.unit, p.null, p.scale, p.low, p.high)
+            for p in super().describe(vehicle, actuation)
+        )
 
 
 class NeverQuiet(Push):

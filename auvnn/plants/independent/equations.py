@@ -75,6 +75,8 @@ class Equations(Forces):
         if vehicle.fins:
             self.fins = Fins(vehicle, laws.separation, effects)
         self.moves = any(n in effects for n in ("ocean_current", "current_shear", "waves"))
+        # Share of the water's motion that anything but the drag feels.
+        self.felt = laws.relative * (1.0 - effects.get("drag_only_current", {}).get("share", 0.0))
         # Share of the ideal forces of the water's inertia that acts on a body that moves steadily.
         self.gyration = laws.added_coriolis * effects.get("added_mass_coriolis", {}).get("factor", 1.0)
         self.held = grasp(effects["payload"]["time"], vehicle) if "payload" in effects else None
@@ -130,8 +132,8 @@ class Equations(Forces):
             stream, change = water(self.effects, self.vehicle, t, place, times(rotation, v))
             to_body = rotation.transpose(0, 2, 1)
             along = times(to_body, stream)
-            felt, dragged = self.laws.relative * along, v - along
-            flow, gain = v - felt, self.laws.relative * times(to_body, change) - cross(turn, felt)
+            felt, dragged = self.felt * along, v - along
+            flow, gain = v - felt, self.felt * times(to_body, change) - cross(turn, felt)
         walls = [self._wall(n, depth) for n in self.walls]
         grown = np.ones_like(depth)
         for f, _ in walls:
@@ -207,7 +209,7 @@ class Equations(Forces):
         if self.loads:
             a = (near.grown * np.diagonal(self.hull.added)[:3]).T
             instant = Instant(
-                self.vehicle, t, place, rotation, down, v, turn, flow, command,
+                self.vehicle, t, place, rotation, down, v, turn, flow, near.dragged, command,
                 self.hull.buoyancy, self.hull.cb, (a[2] - a[0], a[1] - a[0]), self.laws.separation,
             )  # fmt: skip
             for name, load, values in self.loads:

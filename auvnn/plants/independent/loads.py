@@ -33,6 +33,7 @@ class Instant:
         v: velocity over ground, (R, 3).
         turn: angular rate, (R, 3).
         flow: velocity through the water, (R, 3).
+        dragged: the same, as the drag feels it, (R, 3).
         command: (R, n).
         buoyancy: N, of the hull with what effects make of it.
         cb: its centre, m, (3,).
@@ -48,6 +49,7 @@ class Instant:
     v: Array
     turn: Array
     flow: Array
+    dragged: Array
     command: Array
     buoyancy: float
     cb: Array
@@ -113,11 +115,11 @@ def cross_flow(values: Values, at: Instant) -> Load:
     x, weight = 0.5 * at.vehicle.length * _STATIONS[0], _STATIONS[1]
     drag = own_drag(at.vehicle)[1:]
     # With the arm (x, 0, 0), w x r is (0, r x, -q x); across the hull it adds to v and w.
-    y, z = at.flow[:, 1:2] + at.turn[:, 2:] * x, at.flow[:, 2:] - at.turn[:, 1:2] * x
+    y, z = at.dragged[:, 1:2] + at.turn[:, 2:] * x, at.dragged[:, 2:] - at.turn[:, 1:2] * x
     speed = np.hypot(y, z) * weight
     y, z = -drag[0] * speed * y, -drag[1] * speed * z
     # What the diagonal drag at the origin did.
-    centre = -drag * np.abs(at.flow[:, 1:]) * at.flow[:, 1:]
+    centre = -drag * np.abs(at.dragged[:, 1:]) * at.dragged[:, 1:]
     share = values["share"]
     force = _columns(0.0, y.sum(-1) - centre[:, 0], z.sum(-1) - centre[:, 1])
     return share * force, share * _columns(0.0, -(z @ x), y @ x)
@@ -146,7 +148,7 @@ def tether(values: Values, at: Instant) -> Load:
     towards = -away / np.maximum(length, 1e-9)
     pull = values["stiffness"] * taut * towards
     pull[:, 2:] += 0.5 * values["weight"] * length
-    through = at.flow + cross(at.turn, arm)
+    through = at.dragged + cross(at.turn, arm)
     speed = np.linalg.norm(through, axis=-1, keepdims=True)
     force = at.to_body(pull) - values["drag"] * length * speed * through
     return force, cross(arm, force)

@@ -209,7 +209,7 @@ def _names(
 
 
 def can_be_hidden(vehicle: Vehicle, noise: Any, accelerations: bool | None, plant: str = "own") -> list[str]:
-    """Return the effects of the catalogue for which vehicle, plant and log have what they need.
+    """Return the effects of the catalogue for which vehicle, plant and log have what they need, and that act alone.
 
     Args:
         vehicle: for its fins and its reference voltage.
@@ -227,7 +227,10 @@ def can_be_hidden(vehicle: Vehicle, noise: Any, accelerations: bool | None, plan
     return [
         n
         for n, kind in kinds.items()
-        if not absent & set(kind.channels) and not kind.lacks(vehicle, actuation) and not refused(n)
+        if not kind.acts_with
+        and not absent & set(kind.channels)
+        and not kind.lacks(vehicle, actuation)
+        and not refused(n)
     ]
 
 

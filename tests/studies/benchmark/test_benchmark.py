@@ -96,8 +96,16 @@ def test_each_repeat_has_a_seed_of_its_own():
 
 
 def test_all_is_the_catalogue_without_what_such_a_log_says_nothing_of():
-    # No fins, no stated battery, and accelerations only where they are measured.
-    absent = {"fin_stall", "fin_gain", "fin_offset", "fin_drag", "fin_lag", "voltage_droop"}
+    # No fins, no stated battery, accelerations only where they are measured, and what does nothing by itself.
+    absent = {
+        "drag_only_current",
+        "fin_stall",
+        "fin_gain",
+        "fin_offset",
+        "fin_drag",
+        "fin_lag",
+        "voltage_droop",
+    }
     assert {c.hidden for c in cases({**OPTIONS, "noises": "none"})} == set(EFFECTS.names()) - absent
     for more in ({}, {"noises": "none", "accelerations": False}):
         found = {c.hidden for c in cases({**OPTIONS, **more})}
