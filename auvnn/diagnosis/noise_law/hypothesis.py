@@ -219,23 +219,21 @@ def stands_out(first: Hypothesis, found: Sequence[Hypothesis], before: Hypothesi
         before: the hypothesis without it.
     """
     gain = first.evidence - before.evidence
-    others = [
-        h.evidence - before.evidence
-        for h in found
-        if h.name != first.name and not confused(h.name, first.name)
-    ]
+    rest = [h for h in found if h.name != first.name and not confused(h.name, first.name)]
+    others = [h.evidence - before.evidence for h in rest]
     return gain > AHEAD and gain > TIMES * max(others, default=0.0)
 
 
 def p_value_of(layout: Layout, after: Hypothesis, before: Hypothesis) -> float:
-    """Return the p-value of the effect that came last, by the likelihood ratio at laws of their own.
+    """Return the p-value of the effects that came last, by the likelihood ratio at laws of their own.
 
     Args:
         layout: for the number of the effect's parameters.
         after: the fit with it.
         before: the fit without it.
     """
-    degrees = len(layout.columns[after.name])
+    names = {*after.explanation.effects} - {*before.explanation.effects} | {after.name}
+    degrees = sum(len(layout.columns[n]) for n in names)
     return float(chi2.sf(max(before.misfit - after.misfit, 0.0), degrees))
 
 

@@ -10,7 +10,8 @@ import pytest
 
 from auvnn.diagnosis.noise_law import search as module
 from auvnn.diagnosis.noise_law.rounds import name_after_name
-from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round
+from auvnn.diagnosis.noise_law.rounds.a_round import Round
+from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits
 from auvnn.diagnosis.noise_law.rounds.leaders import contained_in
 from tests.diagnosis.noise_law.scripted import found, scripted
 

@@ -9,8 +9,8 @@ import pytest
 
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.noise_law.rounds import names_given
+from auvnn.diagnosis.noise_law.rounds.a_round import Round
 from auvnn.diagnosis.noise_law.rounds.free_running_cost import Cost, free_running_cost
-from auvnn.diagnosis.noise_law.rounds.leader_fits import Round
 from auvnn.diagnosis.noise_law.rounds.names_given import NamesGiven
 from auvnn.metrics.rollouts import scale_of
 from auvnn.models import GreyBox

@@ -11,7 +11,8 @@ import pytest
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round
+from auvnn.diagnosis.noise_law.rounds.a_round import Round
+from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits
 from auvnn.diagnosis.noise_law.rounds.leaders import fitted_alone, rivals_of, sensing_alone
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle

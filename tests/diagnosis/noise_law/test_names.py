@@ -13,8 +13,8 @@ from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.noise_law.hypothesis import explains_an_axis, predicts_better, shares_left, tied
 from auvnn.diagnosis.noise_law.rounds import free_running_cost as free_running_cost_module
 from auvnn.diagnosis.noise_law.rounds import names_given
+from auvnn.diagnosis.noise_law.rounds.a_round import Round
 from auvnn.diagnosis.noise_law.rounds.free_running_cost import Cost, free_running_cost
-from auvnn.diagnosis.noise_law.rounds.leader_fits import Round
 from auvnn.diagnosis.noise_law.rounds.names_given import NamesGiven
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.metrics.rollouts import roll, scale_of

@@ -11,7 +11,8 @@ import pytest
 import auvnn
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.rounds import leader_fits, name_after_name, one_step_leaders
-from auvnn.diagnosis.noise_law.rounds.leader_fits import LEADERS_ONE_STEP, LeaderFits, Round
+from auvnn.diagnosis.noise_law.rounds.a_round import Round
+from auvnn.diagnosis.noise_law.rounds.leader_fits import LEADERS_ONE_STEP, LeaderFits
 from auvnn.diagnosis.noise_law.rounds.name_after_name import NameAfterName
 from auvnn.diagnosis.noise_law.rounds.one_step_leaders import fitted_one_step, thinned
 from auvnn.errors import InputError

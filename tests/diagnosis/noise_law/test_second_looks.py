@@ -14,7 +14,8 @@ from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law import search, under_law
 from auvnn.diagnosis.noise_law.rounds import leader_fits
-from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round
+from auvnn.diagnosis.noise_law.rounds.a_round import Round
+from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits
 from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of

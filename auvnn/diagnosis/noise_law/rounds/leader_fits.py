@@ -14,9 +14,10 @@ from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, shap
 from auvnn.diagnosis.hypotheses.within_record import within_record
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
+from auvnn.diagnosis.noise_law.rounds.a_round import Round
+from auvnn.diagnosis.noise_law.rounds.acting_together import begin_beside, comes_with, worth_fitting_together
 from auvnn.diagnosis.noise_law.rounds.leaders import contained_in, rivals_of
-from auvnn.diagnosis.score_tests.null_tests import Tested
-from auvnn.diagnosis.selection.model_comparison import confused
+from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.executors import Executor
 from auvnn.executors.serial import SERIAL
@@ -31,49 +32,6 @@ LEADERS_ONE_STEP, LEADERS_ALONE = 2, 2
 # Share of the odds that a further name needs, which its test must promise before it is fitted; of no more than these
 # odds, however large the gain of the names before it. A first name that is ahead by less is compared with more effects.
 WORTH_A_FIT, LARGE_ODDS = 0.3, 300.0
-
-
-@dataclass(frozen=True)
-class Round:
-    """Where one round of the search stands.
-
-    Attributes:
-        tested: tests of the effects that remain.
-        current: the explanation without any of them.
-        base: effects that are free whatever is chosen.
-        chosen: effects found before.
-        begins: values from which effects are fitted, too: while nothing is chosen those fitted one step ahead, the one
-            that explains most first (`one_step_leaders`); then those fitted when nothing was chosen.
-        null: the explanation without any name.
-        alone: logarithm of the odds that effects brought when nothing was chosen, the largest first.
-    """
-
-    tested: Tested
-    current: Hypothesis
-    base: list[str]
-    chosen: list[str]
-    begins: Mapping[str, Array] = field(default_factory=dict)
-    null: Hypothesis | None = None
-    alone: Mapping[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class RoundResult:
-    """What a round has found.
-
-    Attributes:
-        at: where it stood.
-        found: what was fitted, the most evident first.
-        good: what of it may be named.
-        sure: p-value of each.
-        among: how many effects were asked for.
-    """
-
-    at: Round
-    found: list[Hypothesis]
-    good: list[Hypothesis]
-    sure: dict[str, float]
-    among: int
 
 
 @dataclass(frozen=True)
@@ -157,7 +115,8 @@ class LeaderFits:
         """
         known = self._known(at, fitted)
         worth = self._worth(at, known, WORTH_A_FIT * min(odds, LARGE_ODDS))
-        found = self._each([*known, *worth, *_ahead(at, odds)], at, known)
+        beside = worth_fitting_together(self.layout, at.chosen, at.tested.scores)
+        found = self._each([*known, *worth, *_ahead(at, odds), *beside], at, known)
         # Beside what was found tests are weaker: a rival of a further name need not be clear among all effects.
         rivals = rivals_of(found, at.tested.scores, level, among_all=not at.chosen)
         found += self._each(rivals, at)
@@ -240,18 +199,37 @@ class LeaderFits:
         begins = [np.where(shape, initial_guess(self.layout, name, tested.scores[name].estimate), null)]
         begins += [] if known is None else [parameters_of(known.fitted.model, [name])]
         begins += [at.begins[name]] if name in at.begins else []
-        return self._from(begins, name, at)
+        alone = self._from(begins, name, at)
+        together = [
+            self._from([null], name, at, other) for other in comes_with(name, at.chosen, tested.scores)
+        ]
+        # Two names are given for one where they are likelier by as much as a name needs.
+        least = -np.inf if alone is None else alone.evidence + ODDS
+        found = [h for h in together if h is not None and h.evidence > least]
+        return max(found, key=lambda h: h.evidence, default=alone)
 
-    def _from(self, begins: Sequence[Array], name: str, at: Round) -> Hypothesis | None:
-        """Return the likeliest fit of an effect from several values of its parameters; None where there is none."""
+    def _from(
+        self, begins: Sequence[Array], name: str, at: Round, beside: str | None = None
+    ) -> Hypothesis | None:
+        """Return the likeliest fit of an effect from several values of its parameters; None where there is none.
+
+        Args:
+            begins: values of its parameters.
+            name: the effect.
+            at: the round.
+            beside: an effect that acts beside it only, and is fitted with it.
+        """
         tested, found = at.tested, list[Hypothesis]()
         for begin in begins:
             model = tested.at.model.rebuilt(tested.at.model.copied_effects())
             set_parameters(model, [name], begin)
+            with_it = [] if beside is None else [beside]
+            for other in with_it:
+                set_parameters(model, [other], begin_beside(self.layout, other))
             with suppress(*UNSOLVED):
                 # Another beginning is followed where it promises more than where an earlier one has led.
                 least = max([at.current.evidence, *(h.evidence for h in found)])
-                asked = [*at.chosen, name]
+                asked = [*at.chosen, *with_it, name]
                 found.append(self.fits.from_null(self.layout, model, at.current, at.base, asked, least))
         seen = [h for h in found if within_record(h.explanation, self.fits.windows)]
         return max(seen, key=lambda h: h.evidence, default=None)

@@ -86,7 +86,7 @@ def shared(branches: Sequence[Branch]) -> list[tuple[Branch, Hypothesis]]:
     for here in branches:
         for there in branches:
             for h in there.further:
-                if there is not here and h.name == here.first.name:
+                if there is not here and h.name == here.first.name and len(h.explanation.effects) == 2:
                     effects = (here.first.name, there.first.name)
                     out.append((here, replace(h, explanation=replace(h.explanation, effects=effects))))
     return out

@@ -17,7 +17,9 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     stands_out,
     tied,
 )
-from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits, Round, RoundResult
+from auvnn.diagnosis.noise_law.rounds.a_round import Round, RoundResult
+from auvnn.diagnosis.noise_law.rounds.acting_together import named_with
+from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import (
     RIVALS_SHARE,
     Branch,
@@ -138,6 +140,9 @@ class NameAfterName(UnderLaw):
             if len(group) > 1:
                 path.groups.append([current.explanation, *(h.explanation for h in group[1:])])
             path.chosen.append(group[0].name)
+            for name in named_with(group[0], path.chosen):
+                path.steps.append({**path.steps[-1], "verdict": "named", "effects": [name]})
+                path.chosen.append(name)
         return tried, whole
 
     def _with_simpler(

@@ -14,13 +14,13 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     p_value_of,
     predicts_better,
 )
+from auvnn.diagnosis.noise_law.rounds.a_round import Round
 from auvnn.diagnosis.noise_law.rounds.free_running_cost import (
     cost_of_name,
     free_running_cost,
     model_of,
     paying,
 )
-from auvnn.diagnosis.noise_law.rounds.leader_fits import Round
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import Scale

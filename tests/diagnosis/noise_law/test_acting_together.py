@@ -1,0 +1,113 @@
+"""What does nothing by itself is fitted, judged and named together with what it acts beside."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.noise_law.hypothesis import p_value_of
+from auvnn.diagnosis.noise_law.rounds import leader_fits
+from auvnn.diagnosis.noise_law.rounds.a_round import Round
+from auvnn.diagnosis.noise_law.rounds.acting_together import comes_with, worth_fitting_together
+from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits
+from auvnn.diagnosis.noise_law.rounds.looking_ahead import Branch, shared
+from auvnn.diagnosis.selection.model_comparison import ODDS
+from auvnn.estimation.priors import parameters_of
+from auvnn.models import GreyBox
+from tests.diagnosis.noise_law.scripted import found, scripted
+from tests.small_logs import small_vehicle
+
+WATER = ["ocean_current", "current_shear", "waves"]
+OPEN = [*WATER, "drag_only_current", "payload"]
+LEFT_OUT = ["added_mass_coriolis"]
+
+
+def test_where_a_simulators_simplification_was_found_the_other_one_is_asked_for():
+    assert [comes_with(n, LEFT_OUT, OPEN) for n in WATER] == [["drag_only_current"]] * 3
+    assert comes_with("payload", LEFT_OUT, OPEN) == []
+    # Without such a name, where water moves already, and where it may not be named, nothing is.
+    assert comes_with("ocean_current", [], OPEN) == comes_with("ocean_current", ["payload"], OPEN) == []
+    assert comes_with("current_shear", [*LEFT_OUT, "ocean_current"], OPEN) == []
+    assert comes_with("ocean_current", LEFT_OUT, WATER) == []
+
+
+def test_of_a_wave_only_a_test_says_where_its_fit_begins():
+    layout = lay_out(GreyBox(small_vehicle()), OPEN)
+    assert worth_fitting_together(layout, LEFT_OUT, OPEN) == ["ocean_current", "current_shear"]
+    assert worth_fitting_together(layout, ["payload"], OPEN) == []
+
+
+@pytest.mark.parametrize(
+    ("chosen", "expected"), [(LEFT_OUT, ["ocean_current", "current_shear"]), (["tether"], [])]
+)
+def test_they_are_fitted_whatever_their_tests_promise(monkeypatch, chosen, expected):
+    asked: list[str] = []
+    monkeypatch.setattr(LeaderFits, "_one", lambda self, name, at, known: asked.append(name))
+    layout = lay_out(GreyBox(small_vehicle()), [*LEFT_OUT, *OPEN])
+    scores = {n: SimpleNamespace(degrees=1, evidence=-9.0, gain=0.0, p_value=1.0) for n in OPEN}
+    at: Any = Round(SimpleNamespace(scores=scores), None, [], chosen)  # type: ignore[arg-type]
+    LeaderFits(layout, None, lambda _: None).leading(at, [], 100.0, 0.01)  # type: ignore[arg-type]
+    assert asked == expected
+
+
+@pytest.mark.parametrize(("more", "together"), [(ODDS + 1.0, True), (ODDS - 1.0, False)])
+def test_two_names_stand_where_they_are_likelier_by_what_a_name_needs(monkeypatch, more, together):
+    monkeypatch.setattr(leader_fits, "within_record", lambda *_: True)
+    layout, begun = lay_out(GreyBox(small_vehicle()), [*LEFT_OUT, *OPEN]), []
+
+    def from_null(layout, model, current, base, effects, least):
+        begun.append((effects, parameters_of(model, ["ocean_current", "drag_only_current"]).tolist()))
+        both = "drag_only_current" in effects
+        return SimpleNamespace(evidence=50.0 + (more if both else 0.0), explanation=tuple(effects))
+
+    fits: Any = SimpleNamespace(windows=None, from_null=from_null)
+    scores = {n: SimpleNamespace(estimate=np.zeros(3)) for n in OPEN}
+    tested: Any = SimpleNamespace(scores=scores, at=layout)
+    current: Any = SimpleNamespace(evidence=0.0)
+    best: Any = LeaderFits(layout, fits, lambda _: None)._one(
+        "ocean_current", Round(tested, current, [], LEFT_OUT), None
+    )
+    alone, pair = [*LEFT_OUT, "ocean_current"], [*LEFT_OUT, "drag_only_current", "ocean_current"]
+    assert begun == [(alone, [0.0, 0.0, 0.0, 0.0]), (pair, [0.0, 0.0, 0.0, 1.0])]
+    assert list(best.explanation) == (pair if together else alone)
+
+
+def test_both_are_names_each_in_a_step_of_its_own(monkeypatch):
+    three = ("payload", "thrust_asymmetry", "waves")
+    further = {
+        (): [found(10.0, "payload")],
+        ("payload",): [found(500.0, *three)],
+        ("payload", "waves", "thrust_asymmetry"): [],
+    }
+    asked, rounds = scripted(monkeypatch, further)
+    told = asked.run(found(-1000.0), [], 4).steps
+    assert [s["effects"] for s in told] == [["payload"], ["waves"], ["thrust_asymmetry"]]
+    assert {s["verdict"] for s in told} == {"named"}
+    # Neither is asked for again.
+    assert list(rounds[-1].chosen) == ["payload", "waves", "thrust_asymmetry"]
+
+
+def test_chance_has_the_parameters_of_both():
+    layout: Any = SimpleNamespace(columns={"a": range(1), "b": range(3), "c": range(2)})
+
+    def at(misfit: float, *effects: str) -> Any:
+        return SimpleNamespace(misfit=misfit, name=effects[-1], explanation=SimpleNamespace(effects=effects))
+
+    before = at(100.0, "a")
+    assert p_value_of(layout, at(80.0, "a", "b"), before) == pytest.approx(chi2.sf(20.0, 3))
+    assert p_value_of(layout, at(80.0, "a", "c", "b"), before) == pytest.approx(chi2.sf(20.0, 5))
+    # A rival in the place of a name counts by its own.
+    assert p_value_of(layout, at(80.0, "c"), before) == pytest.approx(chi2.sf(20.0, 2))
+
+
+def test_a_pair_with_a_third_effect_is_no_pair_of_the_other_branch():
+    one, other = found(10.0, "payload"), found(9.0, "waves")
+    two, three = found(30.0, "payload", "waves"), found(40.0, "payload", "thrust_asymmetry", "waves")
+    branches = [Branch(one, one, (two,)), Branch(other, other, ())]
+    assert [h.explanation.effects for _, h in shared(branches)] == [("waves", "payload")]
+    assert shared([Branch(one, one, (three,)), Branch(other, other, ())]) == []
