@@ -53,6 +53,7 @@ def model(name):
         # Full matrices, damping elements, a thrust table, fins, networks; effects by every hook.
         return GreyBox(example_vehicle(), (), trained_like()).with_effects({
             **LAG, "ocean_current": {"v_north": 0.2, "v_east": -0.1}, "waves": {"amplitude": 0.2},
+            "drag_only_current": {"share": 0.3},
             "voltage_droop": {"exponent": 1.2}, "bottom_proximity": {"strength": 0.4},
             "fin_stall": {"factor": 1.5, "separated": 0.6, "sharpness": 0.4, "crossflow": 0.5},
             "fin_gain": {"fin_1": 0.7},
