@@ -29,6 +29,7 @@ EFFECTS = Catalogue(
         "coupled_damping": "auvnn.effects.coupled_damping:CoupledDamping",
         "cross_flow_drag": "auvnn.effects.cross_flow_drag:CrossFlowDrag",
         "body_lift": "auvnn.effects.body_lift:BodyLift",
+        "body_lift_stall": "auvnn.effects.body_lift_stall:BodyLiftStall",
         "munk_moment": "auvnn.effects.munk_moment:MunkMoment",
         "added_mass_coriolis": "auvnn.effects.added_mass_coriolis:AddedMassCoriolis",
         "biofouling": "auvnn.effects.biofouling:Biofouling",

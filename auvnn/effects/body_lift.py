@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import torch
@@ -44,8 +45,17 @@ class BodyLift(Effect):
             )
         )
 
+    def onward(self, moment: Moment) -> Moment:
+        """Return the moment with the lift, for what says later that some of it is lost."""
+        return replace(moment, body_lift=self._attached(moment))
+
     def wrench(self, moment: Moment, body: Body) -> Tensor:
         """Return the lift."""
+        lift = self._attached(moment)
+        return lift if moment.lift_lost is None else (1.0 - moment.lift_lost).unsqueeze(-1) * lift
+
+    def _attached(self, moment: Moment) -> Tensor:
+        """Return the lift of a flow that stays attached, (..., 6)."""
         u, v, w = moment.nu_r[..., :3].unbind(-1)
         side, up = u * v, u * w
         a, b, c, d = self.theta.to(moment.nu).unbind(-1)

@@ -185,7 +185,7 @@ class Moment:
         position: NED, m, (..., 3).
         rotation: body to NED, (..., 3, 3).
         nu: velocity of the body origin over ground, (..., 6).
-        nu_r: velocity through the water, (..., 6); equal to `nu` inside `water`.
+        nu_r: velocity through the water, as everything except the drag feels it, (..., 6); equal to `nu` inside `water`.
         dragged: the same as the drag feels it, (..., 6), where an effect sets it apart; None is `nu_r`.
         nu_c_dot: acceleration of the water in body axes, (..., 6); zero inside `water`.
         command: what was commanded over this interval, (..., n).
@@ -196,6 +196,8 @@ class Moment:
         drag: everything that resists motion through the water, damping subnetworks included, as a wrench on
             the body, N and N m, (..., 6); in `wrench` only.
         fin_lift: how the fins lift with the effects before this one; None as stated. In `wrench` only.
+        body_lift: the hull's lift as it was added before, N and N m, (..., 6), or None. In `wrench` only.
+        lift_lost: share of the hull's lift that is lost, (...), where an earlier effect says so. In `wrench` only.
     """
 
     time: Tensor
@@ -212,6 +214,8 @@ class Moment:
     drag: Tensor | None = None
     fin_lift: FinLift | None = None
     dragged: Tensor | None = None
+    body_lift: Tensor | None = None
+    lift_lost: Tensor | None = None
 
     @property
     def drag_flow(self) -> Tensor:

@@ -112,6 +112,18 @@ def test_an_effect_says_what_a_simplifying_simulator_does(share):
     assert apart(move("own", plain), moved) > 1e-3
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_an_effect_says_how_lift_of_another_form_falls_off(order):
+    lift = {"body_lift": {"Yuv": -40.0, "Zuw": -30.0, "Muw": -5.0, "Nuv": 4.0}}
+    both = {**lift, "body_lift_stall": {"share": 0.6}}
+    plain = still(task("rov95", lift), nu0=[0.5, 0.3, -0.2, 0.1, 0.1, 0.3])
+    # The model's effects act one after the other: whichever comes first, the lift is the same.
+    told = still(task("rov95", dict([*both.items()][::order])), nu0=[0.5, 0.3, -0.2, 0.1, 0.1, 0.3])
+    law = move("numpy", dataclasses.replace(plain, laws=Laws(separation=0.6)))
+    assert [*told.effects] == [*both][::order] and apart(move("own", told), law) < 2e-6
+    assert apart(move("own", plain), law) > 1e-4
+
+
 def test_an_inflow_by_the_speed_over_ground_sees_no_current():
     loss = {"thrust_inflow_loss": {"coefficient": 20.0}}
     current = {"ocean_current": {"v_north": 0.4, "v_east": 0.0, "v_down": 0.0}}

@@ -68,6 +68,7 @@ def nominal(vehicle, beside=()):
                    "bottom_proximity")),
         ("bluerov2", ("ocean_current", "drag_only_current", "drag_curve", "quadratic_damping")),
         ("rov95", ("ocean_current", "drag_only_current", "drag_curve")),
+        ("remus100", ("body_lift_stall", "ocean_current", "body_lift", "drag_only_current", "munk_moment")),
         ("remus100", ("ocean_current", "drag_only_current", "cross_flow_drag")),
         ("remus100", ("drag_only_current", "ocean_current", "fin_stall", "fin_gain", "body_lift", "tether",
                       "turning_forces", "thrust_inflow_loss")),

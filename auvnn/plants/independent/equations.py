@@ -75,6 +75,8 @@ class Equations(Forces):
         if vehicle.fins:
             self.fins = Fins(vehicle, laws.separation, effects)
         self.moves = any(n in effects for n in ("ocean_current", "current_shear", "waves"))
+        # Share of the hull's lift that is lost across the flow.
+        self.fading = laws.separation + effects.get("body_lift_stall", {}).get("share", 0.0)
         # Share of the water's motion that anything but the drag feels.
         self.felt = laws.relative * (1.0 - effects.get("drag_only_current", {}).get("share", 0.0))
         # Share of the ideal forces of the water's inertia that acts on a body that moves steadily.
@@ -210,7 +212,7 @@ class Equations(Forces):
             a = (near.grown * np.diagonal(self.hull.added)[:3]).T
             instant = Instant(
                 self.vehicle, t, place, rotation, down, v, turn, flow, near.dragged, command,
-                self.hull.buoyancy, self.hull.cb, (a[2] - a[0], a[1] - a[0]), self.laws.separation,
+                self.hull.buoyancy, self.hull.cb, (a[2] - a[0], a[1] - a[0]), self.fading,
             )  # fmt: skip
             for name, load, values in self.loads:
                 out[f"force of {name}"] = np.concatenate(load(values, instant), axis=-1)

@@ -11,7 +11,7 @@ from auvnn.plants.independent.water import WATERS
 
 _OTHERS = ("biofouling", "payload", "flooding", "bottom_proximity", "surface_proximity", "fin_stall",
            "fin_gain", "fin_offset", "fin_drag", "fin_lag", "drag_curve", "added_mass_coriolis",
-           "drag_only_current")  # fmt: skip
+           "drag_only_current", "body_lift_stall")  # fmt: skip
 _DRIVING = (
     "thruster_gain", "thruster_deadband", "thruster_lag", "thrust_overshoot", "actuation_delay", "thrust_asymmetry",
     "thrust_curve", "thrust_polynomial", "thrust_inflow_loss", "thrust_advance", "voltage_droop", "propeller_torque",

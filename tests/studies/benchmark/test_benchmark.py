@@ -99,6 +99,7 @@ def test_all_is_the_catalogue_without_what_such_a_log_says_nothing_of():
     # No fins, no stated battery, accelerations only where they are measured, and what does nothing by itself.
     absent = {
         "drag_only_current",
+        "body_lift_stall",
         "fin_stall",
         "fin_gain",
         "fin_offset",
