@@ -29,7 +29,7 @@ class Effect(nn.Module):
         `delay`, `respond`, `steer`: how late thrust comes, its lag, that of fin angles; at most one effect each.
         `thrust`: the thrust of each actuator (gain, voltage, loss by inflow).
         `water`: velocity and acceleration of the water, NED.
-        `flow`: how much of the water's motion all but the drag feels.
+        `flow`: how much of the water's motion everything except the drag feels.
         `body`: mass, centres, inertia, added mass, buoyancy, damping coefficients.
         `wrench`: any further force and moment on the body.
         `sense`: what the sensors make of the state.
@@ -274,7 +274,7 @@ class Effect(nn.Module):
         return zero, zero
 
     def flow(self, moment: Moment) -> Moment:
-        """Return the moment with the water's motion as all but the drag feels it; asked where the water moves."""
+        """Return the moment with the water's motion as everything except the drag feels it."""
         return moment
 
     def body(self, body: Body, moment: Moment | None) -> Body:

@@ -17,7 +17,7 @@ HOOK_WORDS = {
     "steer": "how fin angles follow their commands",
     "thrust": "the thrust",
     "water": "the motion of the water",
-    "flow": "how much of the water's motion all but the drag feels",
+    "flow": "how much of the water's motion everything except the drag feels",
     "body": "mass, buoyancy, centres and damping",
     "wrench": "a further force and moment",
     "sense": "what the sensors report",

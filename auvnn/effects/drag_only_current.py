@@ -24,7 +24,7 @@ class DragOnlyCurrent(Effect):
     symbol = "s_c"
     reference = "Fossen (2011), section 8.3"
     acts_with = ("ocean_current", "current_shear", "waves")
-    confused_with = ("added_mass_coriolis", "body_lift", "current_shear")
+    confused_with = ("added_mass_coriolis", "current_shear")
     manoeuvre = "rotation"
     told_apart_by = "turning in the current: added mass feels how its direction changes, drag does not"
 

@@ -15,7 +15,7 @@ def in_moving_water(moment: Moment, moving: Sequence[Effect], flows: Sequence[Ef
     Args:
         moment: as if the water were still.
         moving: effects that move the water, at least one; their motions add up.
-        flows: effects that say how much of that motion all but the drag feels.
+        flows: effects that say how much of that motion everything except the drag feels.
     """
     velocity, acceleration = moving[0].water(moment)
     for effect in moving[1:]:

@@ -119,7 +119,9 @@ class _Scene(Stretch):
         model.geom_fluid[:, 6:] = diagonal / task.vehicle.water_density
         model.opt.gravity[:] = [0.0, 0.0, task.vehicle.gravity]
         current = task.effects.get("ocean_current", {})
-        model.opt.wind[:] = [current.get(n, 0.0) for n in ("v_north", "v_east", "v_down")]
+        model.opt.wind[:] = [
+            self.equations.felt * current.get(n, 0.0) for n in ("v_north", "v_east", "v_down")
+        ]
         self.data = mujoco.MjData(model)
         # The engine weighs what it moves; what is left of the stated weight comes by hand.
         self.equations.hull.weight -= mass * task.vehicle.gravity

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from auvnn.effects import EFFECTS
+from auvnn.effects.company import in_words, lacks_company
 from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
 from auvnn.plants import PlantTask
@@ -34,10 +35,10 @@ def _told(world: World, task: PlantTask, sensing: Sensing, wandering: Mapping[st
 
 
 def _can_be_hidden(model: GreyBox, name: str, wanted: Iterable[str]) -> None:
-    kind = EFFECTS.get(name)
-    if kind.acts_with and not {*kind.acts_with} & {*wanted, *model.effect_names}:
-        raise ConfigError(f"{name} does nothing by itself: hide one of {', '.join(kind.acts_with)} with it")
-    lacking = kind.lacks(model.vehicle, model.actuation)
+    needed = lacks_company(name, (*wanted, *model.effect_names))
+    if needed:
+        raise ConfigError(f"{name} does nothing by itself: hide {in_words(needed)} with it")
+    lacking = EFFECTS.get(name).lacks(model.vehicle, model.actuation)
     if lacking:
         raise ConfigError(
             f"{name} cannot be hidden in a log of {model.vehicle.name}: its model file states no "

@@ -78,7 +78,7 @@ def test_learned_drag_feels_the_whole_current():
 
 def test_alone_it_cannot_be_hidden():
     how = dict(runs=1, duration=2.0, rate=20.0)
-    with pytest.raises(ConfigError, match="hide one of ocean_current, current_shear, waves with it"):
+    with pytest.raises(ConfigError, match="hide ocean_current, current_shear or waves with it"):
         simulate("rov95", "multisine", "none", {"drag_only_current": None}, **how)
     made = simulate("rov95", "multisine", "none", {"drag_only_current": None, "ocean_current": None}, **how)
     assert {*made.truth["hidden"]} == {"drag_only_current", "ocean_current"}

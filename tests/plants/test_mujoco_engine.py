@@ -99,6 +99,7 @@ def test_nominal_vehicles_move_as_in_numpy(mujoco, vehicle):
 
 @pytest.mark.parametrize("names", [
     ("ocean_current", "cg_offset", "trapped_water", "added_mass", "net_buoyancy"),
+    ("ocean_current", "drag_only_current", "added_mass", "body_lift", "body_lift_stall"),
     ("thruster_lag", "actuation_delay", "tether", "constant_force", "velocity_lever_arm", "coupled_damping"),
 ])  # fmt: skip
 def test_effects_move_as_in_numpy(mujoco, names):

@@ -20,6 +20,7 @@ class _Removal:
 
 
 def _run(job: Job) -> Answering:
+    from auvnn.effects.company import in_words, lacks_company
     from auvnn.models import remove
 
     names = job.names("effect")
@@ -27,6 +28,10 @@ def _run(job: Job) -> Answering:
     rest.save(job.folder / "model")
     left = list(rest.effect_names)
     job.say(f"result    without {', '.join(names)}; left: {', '.join(left) or 'none'}")
+    for name in left:
+        needed = lacks_company(name, left)
+        if needed:
+            job.say(f"note      {name} does nothing without {in_words(needed)}: remove it too")
     return _Removal(str(job["model"]), names, left)
 
 

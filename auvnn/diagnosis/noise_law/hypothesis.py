@@ -232,9 +232,13 @@ def p_value_of(layout: Layout, after: Hypothesis, before: Hypothesis) -> float:
         after: the fit with it.
         before: the fit without it.
     """
+    return float(chi2.sf(max(before.misfit - after.misfit, 0.0), _degrees(layout, after, before)))
+
+
+def _degrees(layout: Layout, after: Hypothesis, before: Hypothesis) -> int:
+    """Return how many parameters the last effect has, and those that came with it."""
     names = {*after.explanation.effects} - {*before.explanation.effects} | {after.name}
-    degrees = sum(len(layout.columns[n]) for n in names)
-    return float(chi2.sf(max(before.misfit - after.misfit, 0.0), degrees))
+    return sum(len(layout.columns[n]) for n in names)
 
 
 def tied(layout: Layout, good: list[Hypothesis], before: Hypothesis) -> list[Hypothesis]:
@@ -253,14 +257,12 @@ def tied(layout: Layout, good: list[Hypothesis], before: Hypothesis) -> list[Hyp
     best = good[0]
     for other in good[1:]:
         # Evidence weighs how large parameters might have been, which is a guess: it must not outvote the fit.
-        extra = len(layout.columns[other.name])
+        extra = _degrees(layout, other, before)
         if best.misfit - other.misfit > chi2.isf(ALPHA_REFUTED, extra):
             best = other
-    mine = len(layout.columns[best.name])
+    mine = _degrees(layout, best, before)
     alike, near = [], []
-    for h in good:
-        if h is best:
-            continue
+    for h in (h for h in good if h is not best):
         worse, likely = h.misfit - best.misfit, best.evidence - h.evidence < ODDS
         if likely and worse < chi2.isf(ALPHA_REFUTED, mine):
             alike.append(h)

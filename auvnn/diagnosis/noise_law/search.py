@@ -127,10 +127,10 @@ class ForceSearch(NameAfterName):
         most: int,
     ) -> None:
         """Compare names again beside all that were found, and go on as long as that changes one."""
-        earlier = path.chosen[:-1]
+        earlier = _to_ask(path)
         while self._fewer(path, earlier) or self._exchanged(path, earlier, rivals):
             self.names_after(path, null, fitted, most)
-            earlier = path.chosen[:-1]
+            earlier = _to_ask(path)
         if path.groups:
             self.say("comparing effects that could not be told apart, beside all names")
             rest, refit = self.rest(path), self._refit(path.current, whole=True)
@@ -218,6 +218,11 @@ class ForceSearch(NameAfterName):
             with suppress(*UNSOLVED):
                 told.append(self.fits().told(h.explanation))
         return told
+
+
+def _to_ask(path: Path) -> list[str]:
+    """Return the names to ask for again: what came after the last one is nothing, but that may have lost its company."""
+    return [n for n in path.chosen if n != path.chosen[-1] or effect_class(n).acts_with]
 
 
 def _changed(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -27,6 +28,7 @@ class Round:
             that explains most first (`one_step_leaders`); then those fitted when nothing was chosen.
         null: the explanation without any name.
         alone: logarithm of the odds that effects brought when nothing was chosen, the largest first.
+        places: how many more names may be given.
     """
 
     tested: Tested
@@ -36,6 +38,7 @@ class Round:
     begins: Mapping[str, Array] = field(default_factory=dict)
     null: Hypothesis | None = None
     alone: Mapping[str, float] = field(default_factory=dict)
+    places: float = math.inf
 
 
 @dataclass(frozen=True)

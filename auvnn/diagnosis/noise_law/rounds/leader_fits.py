@@ -15,7 +15,12 @@ from auvnn.diagnosis.hypotheses.within_record import within_record
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
 from auvnn.diagnosis.noise_law.rounds.a_round import Round
-from auvnn.diagnosis.noise_law.rounds.acting_together import begin_beside, comes_with, worth_fitting_together
+from auvnn.diagnosis.noise_law.rounds.acting_together import (
+    begin_beside,
+    comes_with,
+    with_company,
+    worth_fitting_together,
+)
 from auvnn.diagnosis.noise_law.rounds.leaders import contained_in, rivals_of
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.estimation.priors import parameters_of, set_parameters
@@ -78,7 +83,10 @@ class LeaderFits:
 
     def _beside(self, at: Round) -> list[Hypothesis]:
         """Return what was fitted beside an explanation, now and by an earlier search, the most evident first."""
-        return _by_evidence(h for h in self._fitted_beside(at.current) if h.name in at.tested.scores)
+        able = {*at.tested.scores, *at.chosen}
+        return _by_evidence(
+            h for h in self._fitted_beside(at.current) if able.issuperset(with_company(h.explanation.effects))
+        )
 
     def _fitted_beside(self, current: Hypothesis) -> list[Hypothesis]:
         return [h for (where, _), (_, h) in self.known.items() if where == id(current) and h is not None]
@@ -115,7 +123,8 @@ class LeaderFits:
         """
         known = self._known(at, fitted)
         worth = self._worth(at, known, WORTH_A_FIT * min(odds, LARGE_ODDS))
-        beside = worth_fitting_together(self.layout, at.chosen, at.tested.scores)
+        places = at.places > 1
+        beside = worth_fitting_together(self.layout, at.chosen, at.tested.scores, at.base) if places else []
         found = self._each([*known, *worth, *_ahead(at, odds), *beside], at, known)
         # Beside what was found tests are weaker: a rival of a further name need not be clear among all effects.
         rivals = rivals_of(found, at.tested.scores, level, among_all=not at.chosen)
@@ -200,10 +209,9 @@ class LeaderFits:
         begins += [] if known is None else [parameters_of(known.fitted.model, [name])]
         begins += [at.begins[name]] if name in at.begins else []
         alone = self._from(begins, name, at)
-        together = [
-            self._from([null], name, at, other) for other in comes_with(name, at.chosen, tested.scores)
-        ]
         # Two names are given for one where they are likelier by as much as a name needs.
+        others = comes_with(name, at.chosen, tested.scores, at.base) if at.places > 1 else []
+        together = [self._from(begins[:1], name, at, other) for other in others]
         least = -np.inf if alone is None else alone.evidence + ODDS
         found = [h for h in together if h is not None and h.evidence > least]
         return max(found, key=lambda h: h.evidence, default=alone)

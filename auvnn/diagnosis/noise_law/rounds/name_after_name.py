@@ -62,7 +62,7 @@ class NameAfterName(UnderLaw):
         self.usable = list(asked.usable)
         self.names = NamesGiven(asked.layout, asked.log, scale_of(asked.log), asked.tolerance)
         self.names.white_noise = windows.noise is None
-        self.looks_further = False
+        self.looks_further, self.most = False, len(self.usable)
         # What was asked at an explanation, for a second search that passes there: its tests, and where it went with a law
         # of its own.
         self._tests: dict[int, tuple[frozenset[str], Tested]] = {}
@@ -104,7 +104,7 @@ class NameAfterName(UnderLaw):
             fitted: explanations of one effect that the first search has fitted.
             most: look for at most this many.
         """
-        tried, whole = list[Hypothesis](), 1.0
+        tried, whole, self.most = list[Hypothesis](), 1.0, most
         while len(path.chosen) < most:
             # What could not be told from a name may be missing beside it: then it is no rival.
             result = self._round(null, path.current, path.chosen, path.dropped, fitted)
@@ -217,7 +217,7 @@ class NameAfterName(UnderLaw):
         share = 0.0 if self.looks_further else FURTHER_SHARE
         odds = max(ODDS, share * (current.evidence - null.evidence))
         begins, alone = (self._earlier, self._alone) if chosen else (self._one_step, {})
-        at = Round(tests, current, base, list(chosen), begins, null, alone)
+        at = Round(tests, current, base, list(chosen), begins, null, alone, self.most - len(chosen))
         good_of = partial(self.names.good, at, len(remaining))
         self._leaders = self._leaders or LeaderFits(self.layout, self.fits(), self.say, self.pool)
         found, good = self._leaders.fitted(at, fitted, odds, ALPHA_NAME, good_of)

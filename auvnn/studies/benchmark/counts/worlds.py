@@ -145,7 +145,7 @@ def force_right(row: Row) -> list[bool]:
 
 
 def own_amounts(row: Row) -> dict[str, float]:
-    """Return how much of the hidden effect its world has by itself, by parameter, where parameters of it say that.
+    """Return how much of the hidden effect the row's world has by itself, by parameter; empty where that is not known.
 
     A vertical that is off in a world and a hidden tilt are one rotation after the other: of small angles the
     rotation vectors add up, and what a log can tell is their sum.
