@@ -258,7 +258,7 @@ def test_a_rival_that_does_better_beside_all_names_takes_the_place(
     asked._tested = lambda *_: SimpleNamespace(
         p_value=0.0, scores={"waves": SimpleNamespace(evidence=rest, degrees=1)}
     )
-    monkeypatch.setattr(module, "effect_class", lambda _: SimpleNamespace(plainer=plainer))
+    monkeypatch.setattr(module, "effect_class", lambda _: SimpleNamespace(plainer=plainer, acts_with=()))
     monkeypatch.setattr(module, "those_that_lose", lambda *_: set())
     monkeypatch.setattr(
         module, "rivals_among", lambda known, null: {"payload": [h.explanation for h in known]}
@@ -330,7 +330,9 @@ def test_what_is_not_asked_for_is_no_further_name_though_it_was_fitted():
     leaders = LeaderFits(None, None, print)  # type: ignore[arg-type]
     leaders.take(current, found(9.0, "payload", "trapped_water"))
     leaders.take(current, found(8.0, "payload", "waves"))
-    at: Any = SimpleNamespace(current=current, tested=SimpleNamespace(scores={"waves": None}))
+    at: Any = SimpleNamespace(
+        current=current, chosen=["payload"], tested=SimpleNamespace(scores={"waves": None})
+    )
     assert names(leaders._beside(at)) == ["waves"]
 
 

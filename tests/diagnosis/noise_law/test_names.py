@@ -74,7 +74,12 @@ def test_without_a_force_the_answer_is_the_plain_search():
 
 def hypothesis(name, misfit, evidence=None) -> Any:
     """Return as much of a hypothesis as a comparison looks at."""
-    return SimpleNamespace(name=name, misfit=misfit, evidence=-0.5 * misfit if evidence is None else evidence)
+    return SimpleNamespace(
+        name=name,
+        misfit=misfit,
+        evidence=-0.5 * misfit if evidence is None else evidence,
+        explanation=SimpleNamespace(effects=(name,) if name else ()),
+    )
 
 
 COLUMNS: Any = SimpleNamespace(

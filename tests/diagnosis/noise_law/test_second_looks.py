@@ -158,7 +158,8 @@ def test_a_small_lead_is_none_before_more_effects_are_fitted(monkeypatch, lead, 
     worth = {"a": lead, "g": 500.0}
 
     def one(self, name, at, known):
-        return SimpleNamespace(name=name, evidence=-1000.0 + worth.get(name, -5.0))
+        explanation = SimpleNamespace(effects=(name,))
+        return SimpleNamespace(name=name, evidence=-1000.0 + worth.get(name, -5.0), explanation=explanation)
 
     monkeypatch.setattr(LeaderFits, "_one", one)
     monkeypatch.setattr(leader_fits, "rivals_of", lambda *given, **more: [])
