@@ -55,6 +55,9 @@ class NameAfterName(UnderLaw):
         closed_loop: whether commands are known to answer the motion; else it is asked of the fit without any name.
     """
 
+    # How many names may be given; a search says it where it begins.
+    most: float = np.inf
+
     def __init__(self, asked: Setting, windows: Windows, *, closed_loop: bool = False) -> None:
         """Begin without a law."""
         super().__init__(asked, windows, closed_loop=closed_loop)
@@ -62,7 +65,7 @@ class NameAfterName(UnderLaw):
         self.usable = list(asked.usable)
         self.names = NamesGiven(asked.layout, asked.log, scale_of(asked.log), asked.tolerance)
         self.names.white_noise = windows.noise is None
-        self.looks_further, self.most = False, len(self.usable)
+        self.looks_further = False
         # What was asked at an explanation, for a second search that passes there: its tests, and where it went with a law
         # of its own.
         self._tests: dict[int, tuple[frozenset[str], Tested]] = {}

@@ -148,12 +148,16 @@ def own_amounts(row: Row) -> dict[str, float]:
     """Return how much of the hidden effect the row's world has by itself, by parameter; empty where that is not known.
 
     A vertical that is off in a world and a hidden tilt are one rotation after the other: of small angles the
-    rotation vectors add up, and what a log can tell is their sum.
+    rotation vectors add up. The exponents that a world gives the drag and hidden ones are powers of the same ratio of
+    speeds, and add up less the square's two. What a log can tell is the sum.
     """
-    tilt = ((row.get("world_law") or {}).get("drawn") or {}).get("tilt")
-    if not tilt or effects_of(row) != ["tilted_vertical"]:
-        return {}
-    return dict(zip(("north", "east"), map(float, tilt), strict=True))
+    drawn = (row.get("world_law") or {}).get("drawn") or {}
+    tilt, exponent = drawn.get("tilt"), drawn.get("exponent")
+    if effects_of(row) == ["tilted_vertical"] and tilt:
+        return dict(zip(("north", "east"), map(float, tilt), strict=True))
+    if effects_of(row) == ["drag_curve"] and exponent:
+        return {axis: float(e) - 2.0 for axis, e in zip("XYZKMN", exponent, strict=True)}
+    return {}
 
 
 def _asked(rows: Sequence[Row], kind: str) -> list[Row]:

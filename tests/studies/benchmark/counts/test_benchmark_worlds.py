@@ -12,8 +12,11 @@ import torch
 from scipy.spatial.transform import Rotation
 
 from auvnn.effects import EFFECTS, Sensed
+from auvnn.effects.sizes import usual_speeds
 from auvnn.errors import ConfigError
 from auvnn.models import load
+from auvnn.plants.independent.hull import curved
+from auvnn.plants.laws import Laws
 from auvnn.simulation import simulate
 from auvnn.simulation.noise import make_noise
 from auvnn.simulation.worlds import make_world
@@ -23,6 +26,7 @@ from auvnn.studies.benchmark.case import Case
 from auvnn.studies.benchmark.cases import targets
 from auvnn.studies.benchmark.costs import cost_of, costly
 from auvnn.studies.benchmark.counts.rates import NUMBERS, RATES, z_of
+from auvnn.studies.benchmark.counts.worlds import own_amounts
 from tests.studies.benchmark.plans import OPTIONS, of_plan
 
 WORLDS = ("between", "disturbed", "shaped", "sensors", "conventions", "everything")
@@ -130,3 +134,19 @@ def test_a_hidden_tilt_and_that_of_the_world_are_one():
         "found": [{"verdict": "named", "effects": name}],
     }
     assert z_of(other) == [e["z"] for e in errors.values()]
+
+
+def test_hidden_exponents_of_the_drag_and_those_of_the_world_are_one():
+    # As the plant puts them together.
+    vehicle = load("rov95").vehicle
+    world, hidden = (
+        np.array([1.8, 2.1, 1.9, 2.2, 1.75, 2.0]),
+        dict(zip("XYZKMN", [1.5, 2.4, 2.0, 2.2, 1.7, 2.6], strict=True)),
+    )
+    law = curved(Laws(exponent=world, speed=np.full(6, 0.5)), vehicle, {"drag_curve": hidden})
+    row = {"kind": "effect", "hidden": "drag_curve", "effects": ["drag_curve"],
+           "world_law": {"drawn": {"tilt": [0.0, 0.0], "exponent": world.tolist()}}}  # fmt: skip
+    own = own_amounts(row)
+    assert [hidden[a] + own[a] for a in "XYZKMN"] == pytest.approx(np.asarray(law.exponent).tolist())
+    assert np.allclose(law.speed, usual_speeds(vehicle)), "the speeds at which the effect's powers agree"
+    assert own_amounts({**row, "hidden": "payload", "effects": ["payload"]}) == {}
