@@ -13,7 +13,7 @@ from auvnn.app.logview import run_of
 from auvnn.app.traces import POINTS, part, thin
 from auvnn.comparison.predictions import stitch
 from auvnn.effects import EFFECTS, effect_class
-from auvnn.effects.company import in_words, lacks_company
+from auvnn.effects.acting_beside import in_words, needed_beside
 from auvnn.errors import InputError
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import NAMES, Rolled, Scale, horizon_windows, roll_windows, scale_of
@@ -152,7 +152,7 @@ def catalogue(model: GreyBox, log: Log) -> list[dict[str, Any]]:
         kind = effect_class(name)
         sentence, equation, reference = _told(kind)
         parameters = kind.describe(model.vehicle, model.actuation)
-        needed = lacks_company(name, model.effect_names)
+        needed = needed_beside(name, model.effect_names)
         present = name in model.effect_names
         values = model.effect(name).values() if present else {}
         found.append(

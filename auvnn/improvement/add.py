@@ -15,7 +15,7 @@ from auvnn.diagnosis.answers.table import values
 from auvnn.diagnosis.cross_validation.fitters import OBJECTIVES
 from auvnn.diagnosis.one_step.fit import left_out_gain
 from auvnn.effects import effect_class
-from auvnn.effects.company import in_words, lacks_company
+from auvnn.effects.acting_beside import in_words, needed_beside
 from auvnn.effects.registering import names_of
 from auvnn.errors import ConfigError
 from auvnn.improvement.added import Improvement
@@ -210,6 +210,6 @@ def _check_request(model: GreyBox, names: list[str]) -> None:
             raise ConfigError(f"effect {name} is named twice: name it once")
         if name in model.effect_names:
             raise ConfigError(f"the model has {name} already: remove it first, or name another effect")
-        needed = lacks_company(name, (*names, *model.effect_names))
+        needed = needed_beside(name, (*names, *model.effect_names))
         if needed:
             raise ConfigError(f"{name} does nothing by itself: add {in_words(needed)} with it")

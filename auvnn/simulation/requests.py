@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from auvnn.effects import EFFECTS
-from auvnn.effects.company import in_words, lacks_company
+from auvnn.effects.acting_beside import in_words, needed_beside
 from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
 from auvnn.plants import PlantTask
@@ -35,7 +35,7 @@ def _told(world: World, task: PlantTask, sensing: Sensing, wandering: Mapping[st
 
 
 def _can_be_hidden(model: GreyBox, name: str, wanted: Iterable[str]) -> None:
-    needed = lacks_company(name, (*wanted, *model.effect_names))
+    needed = needed_beside(name, (*wanted, *model.effect_names))
     if needed:
         raise ConfigError(f"{name} does nothing by itself: hide {in_words(needed)} with it")
     lacking = EFFECTS.get(name).lacks(model.vehicle, model.actuation)

@@ -12,7 +12,7 @@ from auvnn.effects import Extent
 from auvnn.models import GreyBox
 from auvnn.testing.effect_derivatives import has_right_gradient, recovers, transforms
 from auvnn.testing.effect_texts import Kind, describes_itself, refuses
-from auvnn.testing.one_effect import built, company
+from auvnn.testing.one_effect import beside, built
 from auvnn.testing.scene import (
     EXAMPLE,
     THETA,
@@ -43,7 +43,7 @@ def vanishes(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters
     shapes = [{}, *kind.starts(described, Extent(0.0, 1.0, 1.0, (3.0, 5.0)))[:5]]
     shapes.append({p.name: v for p in described if p.shape for v in (p.probes or (p.null + 0.3 * p.scale,))})
     for shape in shapes:
-        effects = [kind.build(vehicle, actuation, shape), *company(kind.acts_with, vehicle, actuation)]
+        effects = [kind.build(vehicle, actuation, shape), *beside(kind.acts_with, vehicle, actuation)]
         null = Predictor(GreyBox(vehicle, effects, actuation=actuation))
         with torch.no_grad():
             found = null(scene)
@@ -54,12 +54,12 @@ def vanishes(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters
 
 @lru_cache(maxsize=2)
 def _without(
-    beside: tuple[str, ...], vehicle: Vehicle, actuation: str
+    acts_with: tuple[str, ...], vehicle: Vehicle, actuation: str
 ) -> tuple[Scene, dict[str, torch.Tensor]]:
     """Return a scene and what happens in it without an effect, which is the same for all that act with the same ones."""
     scene = make_scene(vehicle, actuation)
     with torch.no_grad():
-        return scene, Predictor(GreyBox(vehicle, company(beside, vehicle, actuation), actuation=actuation))(
+        return scene, Predictor(GreyBox(vehicle, beside(acts_with, vehicle, actuation), actuation=actuation))(
             scene
         )
 
@@ -149,7 +149,7 @@ def keeps_units(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrust
     described = model.model.effect(kind.name).parameters_of
     other = units.vehicle(vehicle)
     twins = [kind.build(other, actuation)]
-    for effect in company(kind.acts_with, vehicle, actuation):
+    for effect in beside(kind.acts_with, vehicle, actuation):
         values = {p.name: effect.values()[p.name] * units.factor(p.unit) for p in effect.parameters_of}
         twins.append(type(effect).build(other, actuation, values))
     twin = Predictor(GreyBox(other, twins, actuation=actuation))
@@ -172,7 +172,7 @@ def restores(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "thrusters
         actuation: "thrusters" or "wrench".
     """
     model, scene = built(kind, vehicle, actuation), make_scene(vehicle, actuation)
-    effects = [kind.build(vehicle, actuation), *company(kind.acts_with, vehicle, actuation)]
+    effects = [kind.build(vehicle, actuation), *beside(kind.acts_with, vehicle, actuation)]
     fresh = Predictor(GreyBox(vehicle, effects, actuation=actuation))
     with torch.no_grad():
         expected = together(model(scene))

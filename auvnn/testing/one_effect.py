@@ -20,11 +20,11 @@ def built(kind: type[Effect], vehicle: Vehicle, actuation: str, share: float = 0
         share: of each parameter's scale by which it is away from its null.
     """
     values = typical_values(kind, vehicle, actuation, share)
-    effects = [kind.build(vehicle, actuation, values), *company(kind.acts_with, vehicle, actuation)]
+    effects = [kind.build(vehicle, actuation, values), *beside(kind.acts_with, vehicle, actuation)]
     return Predictor(GreyBox(vehicle, effects, actuation=actuation))
 
 
-def company(names: Sequence[str], vehicle: Vehicle, actuation: str) -> list[Effect]:
+def beside(names: Sequence[str], vehicle: Vehicle, actuation: str) -> list[Effect]:
     """Return what an effect needs beside it to do anything: the first of those with which it acts, or nothing.
 
     Args:

@@ -61,7 +61,7 @@ def _model(job: Job, kinds: tuple[str, ...] | None, several: bool = False) -> An
 
 def _names(job: Job, key: str, model: Any) -> None:
     from auvnn.effects import effect_class
-    from auvnn.effects.company import in_words, lacks_company
+    from auvnn.effects.acting_beside import in_words, needed_beside
 
     value = job.options[key]
     named = value if isinstance(value, dict) else dict.fromkeys(job.names(key))
@@ -76,7 +76,7 @@ def _names(job: Job, key: str, model: Any) -> None:
             raise ConfigError(
                 f"{name} needs {lacking[0]}, which the file of {model.vehicle.name} does not state"
             )
-        needed = lacks_company(str(name), (*map(str, named), *model.effect_names))
+        needed = needed_beside(str(name), (*map(str, named), *model.effect_names))
         if needed and key != "effects":
             raise ConfigError(f"{name} does nothing by itself: name {in_words(needed)} with it")
         kind.build(model.vehicle, model.actuation, values)

@@ -20,7 +20,7 @@ class _Removal:
 
 
 def _run(job: Job) -> Answering:
-    from auvnn.effects.company import in_words, lacks_company
+    from auvnn.effects.acting_beside import in_words, needed_beside
     from auvnn.models import remove
 
     names = job.names("effect")
@@ -29,7 +29,7 @@ def _run(job: Job) -> Answering:
     left = list(rest.effect_names)
     job.say(f"result    without {', '.join(names)}; left: {', '.join(left) or 'none'}")
     for name in left:
-        needed = lacks_company(name, left)
+        needed = needed_beside(name, left)
         if needed:
             job.say(f"note      {name} does nothing without {in_words(needed)}: remove it too")
     return _Removal(str(job["model"]), names, left)

@@ -26,6 +26,7 @@ from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.diagnosis.residuals.whiteness import residual_tests
 from auvnn.diagnosis.stages.partial import without
 from auvnn.diagnosis.stages.state import Setting, State
+from auvnn.effects.acting_beside import in_words, needed_beside
 from auvnn.estimation.prediction_error import FitError
 
 # A force of one measured input surer than this is reported where no smooth function of the inputs was sure enough.
@@ -187,7 +188,11 @@ def _warnings(asked: Setting, state: State) -> list[str]:
     log, found = asked.log, [*asked.model.vehicle.warnings, *asked.log.quality().reservations]
     if len(log.runs) < 2:
         found.append("the log holds one run: what is left out in turn are stretches of it")
-    far = {*state.silent} >= {*asked.usable} and noise_share(state.first.fitted) < GROSS
+    there = (*asked.usable, *asked.model.effect_names)
+    alone = {n: needed for n in asked.usable if (needed := needed_beside(n, there))}
+    found += [f"{n} does nothing by itself: name {in_words(needed)} with it" for n, needed in alone.items()]
+    able = {n for n in asked.usable if not needed_beside(n, asked.model.effect_names)}
+    far = {*state.silent} >= able and noise_share(state.first.fitted) < GROSS
     if state.silent and far:
         found.append(
             f"free running over {_length(state):g} s is so far from the measurements that no effect of a plausible size "

@@ -221,7 +221,7 @@ class ForceSearch(NameAfterName):
 
 
 def _to_ask(path: Path) -> list[str]:
-    """Return the names to ask for again: what came after the last one is nothing, but that may have lost its company."""
+    """Return the names to ask for again: all but the last one, and that one where what it acts beside may be gone."""
     return [n for n in path.chosen if n != path.chosen[-1] or effect_class(n).acts_with]
 
 

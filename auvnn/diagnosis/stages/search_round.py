@@ -18,7 +18,7 @@ from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.selection.choose import ALPHA, LITTLE
 from auvnn.diagnosis.selection.model_comparison import forms_that_leave
 from auvnn.diagnosis.stages.state import Setting, State
-from auvnn.effects.company import lacks_company
+from auvnn.effects.acting_beside import needed_beside
 from auvnn.estimation.prediction_error import FitError
 from auvnn.metrics.windows import Windows
 
@@ -64,7 +64,7 @@ def search_round(
             p_value=p_value,
             similar=similar,
             table=candidate_table(asked.layout, tested.scores, state.current, similar, dict(asked.needs)),
-            silent=tuple(n for n in remaining if not (tested.scores[n].degrees or lacks_company(n, beside))),
+            silent=tuple(n for n in remaining if not (tested.scores[n].degrees or needed_beside(n, beside))),
         )
     if p_value >= (ALPHA_NEXT if chosen else ALPHA) or not remaining or len(chosen) >= asked.most:
         return state.step(rest(asked, state.current), [], p_value).but(ended=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from auvnn.catalogue import unknown_name
 from auvnn.effects import EFFECTS
-from auvnn.effects.company import in_words, lacks_company
+from auvnn.effects.acting_beside import in_words, needed_beside
 from auvnn.errors import ConfigError
 from auvnn.simulation.noise import make_noise
 from auvnn.studies.benchmark.case import CLOSED, JOIN, KINDS, LOOPS, NOTHING, Case, apart
@@ -203,7 +203,7 @@ def _names(
     """Return the names asked for; "all" are those of which a log of this kind can hold anything."""
     out: list[str] = []
     for name in asked:
-        if name not in ("all", NOTHING) and (needed := lacks_company(name, ())):
+        if name not in ("all", NOTHING) and (needed := needed_beside(name, ())):
             raise ConfigError(
                 f"effects={name}: it does nothing without {in_words(needed)}, and cannot be hidden alone"
             )

@@ -13,7 +13,7 @@ from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.hypothesis import p_value_of
 from auvnn.diagnosis.noise_law.rounds import leader_fits
 from auvnn.diagnosis.noise_law.rounds.a_round import Round
-from auvnn.diagnosis.noise_law.rounds.acting_together import comes_with, with_company, worth_fitting_together
+from auvnn.diagnosis.noise_law.rounds.acting_together import comes_with, last_names, worth_fitting_together
 from auvnn.diagnosis.noise_law.rounds.beside_all_names import refitted
 from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import Branch, shared
@@ -83,7 +83,7 @@ def test_two_names_stand_where_they_are_likelier_by_what_a_name_needs(monkeypatc
 
 
 def begun_at(name, estimate, places=9.0, base=()):
-    """Return the values from which an effect is fitted beside missing Coriolis forces, alone and with its company."""
+    """Return from which values an effect is fitted beside missing Coriolis forces, alone and with what acts beside it."""
     layout, begun = lay_out(GreyBox(small_vehicle()), [*LEFT_OUT, *OPEN]), []
 
     def from_null(layout, model, current, base, effects, least):
@@ -125,8 +125,8 @@ def test_a_share_that_lost_its_current_is_asked_for_though_it_came_last():
 
 def test_a_rival_comes_with_what_acts_beside_it_only():
     both = ("payload", "drag_only_current", "waves")
-    assert with_company(both) == ["drag_only_current", "waves"]
-    assert with_company(("drag_only_current", "payload")) == ["payload"]
+    assert last_names(both) == ["drag_only_current", "waves"]
+    assert last_names(("drag_only_current", "payload")) == ["payload"]
     layout = lay_out(GreyBox(small_vehicle()), [*OPEN, "tether"])
     values = {"drag_only_current": {"share": 0.7}, "waves": {"amplitude": 0.3}}
     model = GreyBox(small_vehicle()).with_effects({n: values.get(n, {}) for n in (*OPEN, "tether")})
@@ -163,9 +163,12 @@ def test_both_are_names_each_in_a_step_of_its_own(monkeypatch):
         ("payload", "waves", "thrust_asymmetry"): [],
     }
     asked, rounds = scripted(monkeypatch, further)
-    told = asked.run(found(-1000.0), [], 4).steps
+    ended = asked.run(found(-1000.0), [], 4)
+    told = ended.steps
     assert [s["effects"] for s in told] == [["payload"], ["waves"], ["thrust_asymmetry"]]
     assert {s["verdict"] for s in told} == {"named"}
+    # Whoever goes on from there finds them in the same order.
+    assert asked.averaged_with == [[]] and ended.last.effects == ("payload", "waves", "thrust_asymmetry")
     assert rounds[0].places == 4 and rounds[-1].places == 1
     # Neither is asked for again.
     assert list(rounds[-1].chosen) == ["payload", "waves", "thrust_asymmetry"]

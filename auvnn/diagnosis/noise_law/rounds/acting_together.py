@@ -19,7 +19,7 @@ from auvnn.diagnosis.hypotheses.stated_priors import Layout, shapes
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.selection.model_comparison import confused
 from auvnn.effects import EFFECTS, effect_class
-from auvnn.effects.company import lacks_company
+from auvnn.effects.acting_beside import needed_beside
 
 
 def comes_with(
@@ -37,7 +37,7 @@ def comes_with(
     acting = [n for n in EFFECTS.names() if n in names and name in effect_class(n).acts_with]
     acting = [n for n in acting if any(confused(n, c) for c in chosen)]
     # Where one of those beside which it acts was found, its own test says whether it is missing.
-    return [n for n in acting if lacks_company(n, (*chosen, *there))]
+    return [n for n in acting if needed_beside(n, (*chosen, *there))]
 
 
 def worth_fitting_together(
@@ -68,8 +68,8 @@ def begin_beside(layout: Layout, name: str) -> NDArray[np.float64]:
     return np.array([min(p.null + 2.0 * p.scale, p.high) for p in layout.described(name)])
 
 
-def with_company(effects: Sequence[str]) -> list[str]:
-    """Return those of an explanation's effects that act beside its last one only, and that one, last.
+def last_names(effects: Sequence[str]) -> list[str]:
+    """Return the last effect of an explanation, and before it those that act beside it only and so came with it.
 
     Args:
         effects: of the explanation.

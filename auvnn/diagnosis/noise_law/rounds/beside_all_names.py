@@ -26,7 +26,7 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis, predicts_better
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
-from auvnn.diagnosis.noise_law.rounds.acting_together import with_company
+from auvnn.diagnosis.noise_law.rounds.acting_together import last_names
 from auvnn.diagnosis.noise_law.rounds.leaders import RIVALS
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import RIVALS_SHARE
 from auvnn.diagnosis.noise_law.rounds.path import with_last
@@ -79,7 +79,7 @@ def refitted(
     effects = [e for e in current.explanation.effects if e != name]
     if rival is not None:
         # What acts beside the rival only comes with it.
-        new = [e for e in with_company(rival.effects) if e not in effects]
+        new = [e for e in last_names(rival.effects) if e not in effects]
         effects += new
         set_parameters(model, new, parameters_of(rival.fitted.model, new))
     with suppress(*UNSOLVED):

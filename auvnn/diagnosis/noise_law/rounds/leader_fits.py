@@ -18,7 +18,7 @@ from auvnn.diagnosis.noise_law.rounds.a_round import Round
 from auvnn.diagnosis.noise_law.rounds.acting_together import (
     begin_beside,
     comes_with,
-    with_company,
+    last_names,
     worth_fitting_together,
 )
 from auvnn.diagnosis.noise_law.rounds.leaders import contained_in, rivals_of
@@ -85,7 +85,7 @@ class LeaderFits:
         """Return what was fitted beside an explanation, now and by an earlier search, the most evident first."""
         able = {*at.tested.scores, *at.chosen}
         return _by_evidence(
-            h for h in self._fitted_beside(at.current) if able.issuperset(with_company(h.explanation.effects))
+            h for h in self._fitted_beside(at.current) if able.issuperset(last_names(h.explanation.effects))
         )
 
     def _fitted_beside(self, current: Hypothesis) -> list[Hypothesis]:

@@ -146,6 +146,9 @@ class NameAfterName(UnderLaw):
             for name in named_with(group[0], path.chosen):
                 path.steps.append({**path.steps[-1], "verdict": "named", "effects": [name]})
                 path.chosen.append(name)
+                # Told in the order of the steps, whoever goes on from there: first what moves the water.
+                ordered = replace(current.explanation, effects=tuple(path.chosen))
+                path.current = replace(current, explanation=ordered)
         return tried, whole
 
     def _with_simpler(

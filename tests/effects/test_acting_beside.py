@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 import auvnn
 from auvnn.app.trial import catalogue
+from auvnn.diagnosis.answers import answering
 from auvnn.effects import EFFECTS
-from auvnn.effects.company import in_words, lacks_company
+from auvnn.effects.acting_beside import in_words, needed_beside
 from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
 from auvnn.studies.benchmark import cases
@@ -18,9 +22,9 @@ WATER = ("ocean_current", "current_shear", "waves")
 
 
 def test_what_is_missing_is_said_where_none_of_them_is_there():
-    assert lacks_company("drag_only_current", ()) == lacks_company("drag_only_current", ["payload"]) == WATER
-    assert lacks_company("drag_only_current", ["payload", "waves"]) == ()
-    assert lacks_company("ocean_current", ()) == ()
+    assert needed_beside("drag_only_current", ()) == needed_beside("drag_only_current", ["payload"]) == WATER
+    assert needed_beside("drag_only_current", ["payload", "waves"]) == ()
+    assert needed_beside("ocean_current", ()) == ()
     assert (
         in_words(WATER) == "ocean_current, current_shear or waves" and in_words(["body_lift"]) == "body_lift"
     )
@@ -54,7 +58,30 @@ def test_a_log_is_not_said_to_say_nothing_of_what_nothing_could_show():
     log, model = make_log(truth, noise=1.0), GreyBox(small_vehicle())
     names = ["net_buoyancy", "drag_only_current"]
     said = " ".join(auvnn.diagnose(model, log, names, advice=False, costs=False, whiteness=False).warnings)
-    assert "drag_only_current" not in said and "gross errors" not in said
+    assert "says nothing" not in said and "gross errors" not in said
+    assert (
+        "drag_only_current does nothing by itself: name ocean_current, current_shear or waves with it" in said
+    )
+
+
+def test_gross_errors_hide_all_that_could_act(monkeypatch):
+    monkeypatch.setattr(answering, "noise_share", lambda _: 0.0)
+    monkeypatch.setattr(answering, "reservations", lambda *_: [])
+    monkeypatch.setattr(answering, "_length", lambda _: 5.0)
+    model = GreyBox(small_vehicle())
+    asked: Any = SimpleNamespace(
+        model=model, log=make_log(model, noise=1.0), usable=["ocean_current", "payload", "drag_only_current"]
+    )
+
+    def said(*silent):
+        state: Any = SimpleNamespace(
+            silent=silent, first=SimpleNamespace(fitted=None), current=SimpleNamespace(effects=()), failed={}
+        )
+        return " ".join(answering._warnings(asked, state))
+
+    asked.layout = None
+    assert "look for gross errors" in said("ocean_current", "payload")
+    assert "the log says nothing about payload" in said("payload") and "gross" not in said("payload")
 
 
 def test_it_is_not_hidden_alone_in_a_benchmark():

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from auvnn.effects import effect_class
 
 
-def lacks_company(name: str, beside: Iterable[str]) -> tuple[str, ...]:
+def needed_beside(name: str, beside: Iterable[str]) -> tuple[str, ...]:
     """Return the effects of which one is missing for an effect to do anything; empty where nothing is missing.
 
     Args:
