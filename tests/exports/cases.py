@@ -57,7 +57,8 @@ def model(name):
             "voltage_droop": {"exponent": 1.2}, "bottom_proximity": {"strength": 0.4},
             "fin_stall": {"factor": 1.5, "separated": 0.6, "sharpness": 0.4, "crossflow": 0.5},
             "fin_gain": {"fin_1": 0.7},
-            "body_lift": {"Yuv": 3.0}, "compressibility": {"per_metre": 1e-3}, "propeller_torque": {"coefficient": 0.02},
+            "body_lift": {"Yuv": 3.0}, "body_lift_stall": {"share": 0.4},
+            "compressibility": {"per_metre": 1e-3}, "propeller_torque": {"coefficient": 0.02},
             "thrust_inflow_loss": {"coefficient": 2.0}, "cross_flow_drag": None,
         })  # fmt: skip
     return load(name)
