@@ -69,6 +69,33 @@ def test_a_rival_that_contains_the_leader_loses_by_evidence(monkeypatch, short, 
     assert loses(leader, rival, 13.0 if short < 13.0 else 1.5, extra) is expected
 
 
+@pytest.mark.parametrize(
+    ("short", "gained", "extra", "rest", "expected"),
+    [
+        # A lift of four numbers in the place of a Munk moment of two: both further ones are seen to be nothing.
+        (6.1, 0.9, 2, 308.8, True),
+        (4.7, 0.9, 2, 308.8, True),
+        (4.5, 0.9, 2, 308.8, False),
+        # They gain something; whether that is a lift or what the model gets wrong, the log cannot say.
+        (6.1, 9.3, 2, 308.8, False),
+        # Of a payload's eleven the log would not have seen a tenth of what is plausible of each: 11 ln 10 is 25.3.
+        (25.2, 6.4, 11, 308.8, False),
+        (25.4, 6.4, 11, 308.8, True),
+        # Where a further effect gains less than that, this much is enough, as before.
+        (14.0, 6.4, 11, 13.0, True),
+        # What fits worse is judged by what is still unexplained.
+        (25.4, -9.3, 11, 308.8, False),
+    ],
+)
+def test_further_parameters_that_are_seen_to_be_nothing_lose_however_wrong_the_model_is(
+    monkeypatch, short, gained, extra, rest, expected
+):
+    monkeypatch.setattr(module, "predicts_better", lambda *_, **__: True)
+    leader, rival = worth(short), worth(0.0)
+    leader.misfit, rival.misfit = 1000.0, 1000.0 - gained
+    assert loses(leader, rival, rest, extra) is expected
+
+
 def test_a_plainer_cause_does_not_lose_by_its_parameters(monkeypatch):
     asked: list[int] = []
     monkeypatch.setattr(module, "loses", lambda current, rival, rest, extra: asked.append(extra))

@@ -41,6 +41,8 @@ Array = NDArray[np.float64]
 SURE, SURE_OF_ALL = 3.0, 2.0
 # What the further parameters of a rival gain by chance alone is exceeded as seldom as this.
 ALPHA_EXTRA = 0.01
+# Logarithm of the odds against each of them where the log tells a tenth of its plausible size (MacKay's Occam factor).
+SEEN = float(np.log(10.0))
 # Logarithm of the odds by which a fit may fall short, what its next step promises included, before it is given up: where
 # a name is needed so much, the fit without it need not be finished.
 FAR = 1000.0
@@ -175,9 +177,11 @@ def loses(current: Hypothesis, rival: Hypothesis, rest: float, extra: int) -> bo
 
     A rival that contains what leads predicts as well, whatever the truth. Where it has more parameters, fits as well, and
     gains no more than chance by them, evidence decides: what that counts against the rival is that it could have
-    explained much else. One that fits worse does not contain what leads, or its fit has not come so far: runs left out
-    decide (the test of Vuong, of models that do not contain each other), on weaker grounds where no further effect gains
-    anything: then nothing says that the model is wrong, and the odds hold as they are.
+    explained much else. Where the log would have seen a tenth of what is plausible of each of them, how far the model is
+    wrong does not matter: that would have made them gain more, and not less. One that fits worse does not contain what
+    leads, or its fit has not come so far: runs left out decide (the test of Vuong, of models that do not contain each
+    other), on weaker grounds where no further effect gains anything: then nothing says that the model is wrong, and the
+    odds hold as they are.
 
     Args:
         current: with the names that were found.
@@ -188,10 +192,11 @@ def loses(current: Hypothesis, rival: Hypothesis, rest: float, extra: int) -> bo
     Reference: MacKay (2003), Information Theory, Inference and Learning Algorithms, chapter 28 (Occam's razor); Vuong
         (1989), Econometrica 57(2) 307-333.
     """
-    if current.evidence - rival.evidence <= max(ODDS, rest):
-        return False
+    ahead = current.evidence - rival.evidence
     if extra > 0 and -2.0 * ODDS < current.misfit - rival.misfit < chi2.isf(ALPHA_EXTRA, extra):
-        return True
+        return ahead > max(ODDS, min(rest, SEEN * extra))
+    if ahead <= max(ODDS, rest):
+        return False
     return predicts_better(current, rival, SURE if rest > ODDS else SURE_OF_ALL, ranks=False)
 
 
