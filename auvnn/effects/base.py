@@ -39,7 +39,7 @@ class Effect(nn.Module):
     of a group, never alone. `contains`: plainer effects that it is at some values, each with the parameters they share.
     `leaves`: effects that look like what its own form gets wrong. `remembers`: what `command` returns depends on earlier
     commands by one state per command: `follow`, `advance`. `acts_with`: effects without any of which it does nothing, so
-    that it can neither be missing nor be hidden alone.
+    that it can neither be missing nor be hidden alone. `is_drag`: what it adds grows with the drag that others scale.
     """
 
     name: ClassVar[str]
@@ -62,6 +62,7 @@ class Effect(nn.Module):
     remembers: ClassVar[bool] = False
     leaves: ClassVar[tuple[str, ...]] = ()
     acts_with: ClassVar[tuple[str, ...]] = ()
+    is_drag: ClassVar[bool] = False
 
     theta: nn.Parameter
     # Standard deviations by parameter, as they were stated or fitted; of what is not in it the default holds.
@@ -202,9 +203,9 @@ class Effect(nn.Module):
 
     def absent(self) -> bool:
         """Return whether the effect is at its null, whatever its shape, and so does nothing."""
-        null = torch.tensor([p.null for p in self.parameters_of], dtype=torch.float64)
-        shape = torch.tensor([p.shape for p in self.parameters_of])
-        return bool((shape | (self.theta.detach().cpu().double() == null)).all())
+        return all(
+            p.shape or v == p.null for p, v in zip(self.parameters_of, self.theta.tolist(), strict=True)
+        )
 
     def words(self) -> str:
         """Return what the effect has to say about itself once it is fitted, beyond its parameters; or nothing."""

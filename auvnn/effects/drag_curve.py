@@ -30,6 +30,7 @@ class DragCurve(Effect):
     manoeuvre = "coast_down"
     told_apart_by = "coasting without thrust over at least four to one in speed"
     plainer = ("quadratic_damping", "linear_damping")
+    is_drag = True
 
     @classmethod
     def lacks(cls, vehicle: Any, actuation: str) -> tuple[str, ...]:

@@ -284,8 +284,11 @@ class EquationsOfMotion(Sensors):
             drag = [terms[name] for name in DRAG_TERMS if name in terms]
             moment = replace(moment, thrust=thrust, drag=sum(drag, torch.zeros_like(nu)))
         for effect in self.using("wrench"):
-            terms[str(effect.name)] = effect.wrench(moment, body)
+            more = terms[str(effect.name)] = effect.wrench(moment, body)
             moment = effect.onward(moment)
+            if effect.is_drag and moment.drag is not None:
+                # What lets the drag grow, near a wall or by fouling, lets all of it grow; it comes after.
+                moment = replace(moment, drag=moment.drag + more)
         return self._with_learned(terms, prepared, nu, rotation), prepared
 
     def _with_learned(

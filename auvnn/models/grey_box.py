@@ -96,6 +96,7 @@ class GreyBox(ShownModel, EquationsOfMotion):
                 raise ConfigError(f"effects {effect.name} and {clash[0]} exclude each other: keep one")
         self.effects = nn.ModuleList(members)
         self._by_hook = {h: [e for e in members if h in e.hooks()] for h in HOOKS}
+        self._by_hook["wrench"].sort(key=lambda e: not e.is_drag)
         # Depth of a flat bottom, m: gives the altitude to a simulated vehicle that has no altimeter to go by.
         self.bottom: float | None = None
         self.joint: JointCovariance | None = None  # of the effects' parameters, where a fit has said it

@@ -73,6 +73,8 @@ def nominal(vehicle, beside=()):
         ("remus100", ("drag_only_current", "ocean_current", "fin_stall", "fin_gain", "body_lift", "tether",
                       "turning_forces", "thrust_inflow_loss")),
         ("rov95", ("bottom_proximity", "surface_proximity", "biofouling", "ocean_current", "quadratic_damping")),
+        ("rov95", ("bottom_proximity", "payload", "biofouling", "drag_curve")),
+        ("remus100", ("biofouling", "ocean_current", "drag_curve", "surface_proximity")),
         ("remus100", ("cg_offset", "payload", "net_buoyancy", "compressibility", "coupled_damping", "ocean_current")),
         ("remus100", ("fin_stall", "body_lift", "turning_forces", "flooding", "trapped_water", "linear_damping")),
         ("remus100", ("fin_stall", "fin_gain", "fin_offset", "fin_drag", "fin_lag")),
