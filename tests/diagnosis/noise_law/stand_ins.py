@@ -5,6 +5,12 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
+
+from auvnn.diagnosis.answers.tolerance import Tolerance
+from auvnn.diagnosis.noise_law.rounds.names_given import NamesGiven
+from auvnn.metrics.force_law import ForceLaw
+
 
 def one_by_one(refit: Any) -> Any:
     """Return what fits several changes, from what fits one."""
@@ -24,3 +30,26 @@ def fit(evidence: float, *effects: str) -> Any:
 
 
 NULL = fit(-1000.0, "")
+
+
+def hypothesis(name, misfit, evidence=None) -> Any:
+    """Return as much of a hypothesis as a comparison looks at."""
+    return SimpleNamespace(
+        name=name,
+        misfit=misfit,
+        evidence=-0.5 * misfit if evidence is None else evidence,
+        explanation=SimpleNamespace(effects=(name,) if name else ()),
+    )
+
+
+def with_law(rms, evidence=0.0, name="", time=1.0) -> Any:
+    law = ForceLaw(np.array([*rms, 0.0, 0.0, 0.0, 0.0]), np.full(6, time), 0.5, 5.0)
+    return SimpleNamespace(
+        name=name, evidence=evidence, misfit=-2.0 * evidence, estimate=SimpleNamespace(law=law)
+    )
+
+
+def given(**changes: Any) -> NamesGiven:
+    """Return what decides which of the likely explanations cost enough."""
+    at: dict[str, Any] = {"layout": None, "log": None, "scale": None, "tolerance": Tolerance(), **changes}
+    return NamesGiven(**at)
