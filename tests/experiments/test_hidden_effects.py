@@ -11,6 +11,7 @@ import pytest
 
 from auvnn.studies.benchmark import summarise
 from auvnn.studies.benchmark.counts import counting
+from auvnn.studies.benchmark.counts.rates import Z95, z_of
 
 HERE = Path(__file__).resolve().parents[2] / "experiments" / "hidden_effects"
 
@@ -106,3 +107,6 @@ def test_logs_run_again_have_the_answers_that_the_text_says():
         again = [r for r in rows_of(name) if key(r) in before]
         same = sum(answer(r) == before[key(r)] for r in again)
         assert f"{same} of {len(again)} have the answer" in (HERE / "README.md").read_text()
+    last = [z for r in rows_of("rows-sample-4.jsonl") for z in z_of(r)]
+    told = f"{sum(abs(z) < Z95 for z in last)} of {len(last)} intervals right; 19 s in the median"
+    assert told in (HERE / "README.md").read_text()

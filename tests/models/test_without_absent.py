@@ -48,6 +48,12 @@ def test_it_is_another_one_once_an_effect_comes_or_goes(model):
     assert lean.effect_names == ["ocean_current"]
 
 
+@pytest.mark.parametrize(("strength", "left"), [(0.0, []), (1e-9, ["bottom_proximity"])])
+def test_a_form_without_an_amount_is_nothing(strength, left):
+    near = {"bottom_proximity": {"strength": strength, "exponent": 2.0}}
+    assert GreyBox(small_vehicle()).with_effects(near).without_absent().effect_names == left
+
+
 def test_it_has_the_precision_and_the_subnetworks_that_the_model_has_now(model):
     set_force(model, 0.0)
     lean = model.without_absent()
