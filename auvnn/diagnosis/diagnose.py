@@ -23,6 +23,7 @@ from auvnn.diagnosis.stages.beyond_stated import beyond_stated
 from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.shorter_windows import search_over_shorter
 from auvnn.diagnosis.stages.state import Searched, Setting
+from auvnn.diagnosis.stages.unnamed_effects import beside_unnamed
 from auvnn.diagnosis.stages.what_is_left import settled
 from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.prediction_error import SINGULAR
@@ -192,7 +193,7 @@ def searched(
             asked, state = search_over_shorter(asked, state, search)
         if stochastic:
             state, told, words = answer_with_force(asked, state)
-        state = beyond_stated(asked, settled(asked, state))
+        state = beside_unnamed(asked, beyond_stated(asked, settled(asked, state)))
         found = answer(asked, state)
     except (np.linalg.LinAlgError, SINGULAR) as problem:
         raise InputError(

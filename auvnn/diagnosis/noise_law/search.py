@@ -44,6 +44,7 @@ from auvnn.diagnosis.noise_law.rounds.name_after_name import NameAfterName
 from auvnn.diagnosis.noise_law.rounds.path import Path
 from auvnn.diagnosis.noise_law.under_law import NULL_STEPS
 from auvnn.diagnosis.selection.model_comparison import ODDS
+from auvnn.diagnosis.selection.moved_by_unnamed import moved_by_unnamed, widened
 from auvnn.diagnosis.selection.rivals import Rivals, rivals_tried, without_lost
 from auvnn.diagnosis.stages.state import State
 from auvnn.effects import effect_class
@@ -147,7 +148,7 @@ class ForceSearch(NameAfterName):
         return WithForce(
             path.steps,
             [[under_law.told(e) for e in group] for group in path.in_order],
-            under_law.told(averaged(self.layout, current, path.not_named)),
+            under_law.told(self._uncertain(path)),
             self.about(current.explanation, law),
             replace(current.estimate, law=in_newtons(law, current.explanation)),
             self._told(tried),
@@ -159,6 +160,20 @@ class ForceSearch(NameAfterName):
             path.explains,
             bool(path.chosen) and self.names.worsen(current, null),
         )
+
+    def _uncertain(self, path: Path) -> FittedHypothesis:
+        """Return the explanation that is answered, with what effects without a name would move in its standard errors."""
+        current, passed = path.current, self._passed(path)
+        explanation = averaged(self.layout, current, path.not_named)
+        if not path.chosen:
+            return explanation
+        remaining = [n for n in self.usable if n not in path.chosen and n not in passed]
+        base = [*self.base, *[c for c in path.chosen if c not in self.base]]
+        about = self.about(explanation, current.estimate.law)
+        with suppress(*UNSOLVED):
+            tested = self._tested(current, remaining, base, path.chosen)
+            return widened(explanation, moved_by_unnamed(about, current.weighed, tested, base))
+        return explanation
 
     def _refit(self, current: Hypothesis, *, whole: bool = False) -> Refit:
         """Return what fits all names but one, perhaps with a rival in its place; what was asked before is kept."""

@@ -67,7 +67,8 @@ def search_round(
             silent=tuple(n for n in remaining if not (tested.scores[n].degrees or needed_beside(n, beside))),
         )
     if p_value >= (ALPHA_NEXT if chosen else ALPHA) or not remaining or len(chosen) >= asked.most:
-        return state.step(rest(asked, state.current), [], p_value).but(ended=True)
+        ended = state.step(rest(asked, state.current), [], p_value)
+        return ended.but(ended=True, last_tests=(state.current, tested))
     chooser = asked.chooser(state.windows)
     choice = chooser.choose(tested.scores, tested.at, base, chosen, state.current)
     others = tested.scores
@@ -80,7 +81,7 @@ def search_round(
             state = state.but(table=fill_candidate(asked.layout, state.table, explanation, first))
     if choice.best is None:
         verdict = "unknown" if p_value < ALPHA_UNKNOWN else rest(asked, state.current)
-        return state.step(verdict, [], p_value).but(ended=True)
+        return state.step(verdict, [], p_value).but(ended=True, last_tests=(state.current, tested))
     new = [e for e in choice.best.effects if e not in chosen]
     alike = {e.effects[-1]: group[0].effects[-1] for group in state.groups for e in group[1:]}
     for name in new:

@@ -16,7 +16,7 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.residuals.additive_force_test import AdditiveForce
 from auvnn.diagnosis.residuals.variance_component_test import Unnamed
-from auvnn.diagnosis.score_tests.null_tests import NullTests
+from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.diagnosis.selection.rivals import without_lost
 from auvnn.executors import Executor
@@ -108,6 +108,8 @@ class State:
         refuted: the explanation with names that are no cause, of which it is still open whether they predict.
         unexplained: share of what looked like a force that nothing explains.
         notes: what could not be worked out, in words.
+        last_tests: the tests of the effects that remained, with the fit beside which they were made; None where there
+            were none.
     """
 
     windows: Windows
@@ -135,6 +137,7 @@ class State:
     refuted: FittedHypothesis | None = None
     unexplained: float = 1.0
     notes: tuple[str, ...] = ()
+    last_tests: tuple[FittedHypothesis, Tested] | None = None
 
     def but(self, **changes: Any) -> State:
         """Return the state with some things changed."""

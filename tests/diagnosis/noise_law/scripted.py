@@ -44,6 +44,11 @@ class Found:
         """The effect that came last."""
         return self.explanation.effects[-1] if self.explanation.effects else ""
 
+    @property
+    def weighed(self) -> Effects:
+        """The explanation, as there are no sums to weigh."""
+        return self.explanation
+
 
 def found(evidence: float, *effects: str) -> Any:
     return Found(evidence, Effects(effects))
@@ -132,6 +137,7 @@ def scripted(
         return current.explanation
 
     monkeypatch.setattr(module, "averaged", averaged)
+    monkeypatch.setattr(module, "moved_by_unnamed", lambda *_: np.zeros(1))
     monkeypatch.setattr(module, "no_longer_needed", lambda *_: None)
     monkeypatch.setattr(module, "costs_little", lambda *_: None)
     monkeypatch.setattr(module, "as_good_in_place", lambda *_: None)
