@@ -204,5 +204,10 @@ def _warnings(asked: Setting, state: State) -> list[str]:
     if not has_stated_uncertainty(asked.model):
         found.append("no coefficient of the model is uncertain: any error of theirs will be given a name")
     found += reservations(asked.layout, state.current, state.current.effects)
+    if beside := state.current.beside:
+        found.append(
+            f"not named, but likely beside what is named: {', '.join(beside)} (too little effect in free running, or "
+            "more names than max_effects); the standard errors allow for this"
+        )
     found += [f"{name} was no candidate any more: {why}" for name, why in state.failed.items()]
     return found

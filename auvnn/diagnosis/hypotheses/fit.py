@@ -49,6 +49,7 @@ class FittedHypothesis:
         around: trajectories (B, L, 13) about which its windows are linear under a law; None for free running.
         systematic: (P,) how far its parameters may be off for what no fit to this log tells: when within an interval a
             command acts, and explanations that the data prefer and that are not named; None where that is nothing.
+        beside: effects without a name that the log asks for beside these, and that `systematic` allows for.
     """
 
     effects: tuple[str, ...]
@@ -62,6 +63,7 @@ class FittedHypothesis:
     under_law: Fitted | None = None
     around: Tensor | None = None
     systematic: Array | None = None
+    beside: tuple[str, ...] = ()
 
     @property
     def cv(self) -> float:

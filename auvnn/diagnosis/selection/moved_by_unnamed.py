@@ -13,7 +13,7 @@ Royal Statistical Society B 57(1) 45-97, for what the choice of a model leaves o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,10 +35,23 @@ Array = NDArray[np.float64]
 MOST = 8
 
 
+@dataclass(frozen=True)
+class Moved:
+    """How far parameters may be off because of effects without a name.
+
+    Attributes:
+        effects: that the log asks for together, the likeliest first.
+        by: in each parameter of the fit, (P,); zero where there are none.
+    """
+
+    effects: tuple[str, ...]
+    by: Array
+
+
 def moved_by_unnamed(
     windows: Windows, current: FittedHypothesis, tested: Tested, base: Sequence[str]
-) -> Array:
-    """Return how far each parameter may be off because of effects without a name, (P,); zero where there are none.
+) -> Moved:
+    """Return which effects without a name the log asks for beside a fit, and how far they may move its parameters.
 
     Args:
         windows: of the log, with the law of a stochastic force where there is one.
@@ -50,32 +63,32 @@ def moved_by_unnamed(
     likely = [s for n, s in tested.scores.items() if s.degrees and s.evidence > ODDS and n not in base]
     likely = sorted(likely, key=lambda s: -s.evidence)[:MOST]
     if not likely:
-        return out
+        return Moved((), out)
     asked = _with_shapes(tested.at, windows, likely, base)
     sums = asked.sums(windows, current)
     joined = likely_together(asked, sums, base, [s.effect for s in likely], current.effects)
     if not joined:
-        return out
+        return Moved((), out)
     moved = _moved(asked.layout, sums, base, joined, current.effects)
     at, theirs = tested.at.places(current.names), tested.at.places(base)
     for name in {*at} & {*theirs}:
         out[at[name]] = moved[theirs[name]]
-    return out
+    return Moved(tuple(label.partition("@")[0] for label in joined), out)
 
 
-def widened(explanation: FittedHypothesis, moved: Array) -> FittedHypothesis:
+def widened(explanation: FittedHypothesis, moved: Moved) -> FittedHypothesis:
     """Return an explanation with what effects without a name would move as a part of its standard errors.
 
     What lies between it and explanations with one name more is known of some: the larger of both counts.
 
     Args:
         explanation: a fit.
-        moved: (P,), from `moved_by_unnamed`.
+        moved: from `moved_by_unnamed`.
     """
-    if not moved.any():
+    if not moved.effects:
         return explanation
     known = 0.0 if explanation.systematic is None else explanation.systematic
-    return replace(explanation, systematic=np.maximum(known, moved))
+    return replace(explanation, systematic=np.maximum(known, moved.by), beside=moved.effects)
 
 
 def likely_together(

@@ -13,6 +13,7 @@ from auvnn.diagnosis.noise_law import search as module
 from auvnn.diagnosis.noise_law.rounds import name_after_name
 from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits
 from auvnn.diagnosis.noise_law.search import ForceSearch
+from auvnn.diagnosis.selection.moved_by_unnamed import Moved
 from auvnn.executors.serial import SERIAL
 
 
@@ -137,7 +138,7 @@ def scripted(
         return current.explanation
 
     monkeypatch.setattr(module, "averaged", averaged)
-    monkeypatch.setattr(module, "moved_by_unnamed", lambda *_: np.zeros(1))
+    monkeypatch.setattr(module, "moved_by_unnamed", lambda *_: Moved((), np.zeros(1)))
     monkeypatch.setattr(module, "no_longer_needed", lambda *_: None)
     monkeypatch.setattr(module, "costs_little", lambda *_: None)
     monkeypatch.setattr(module, "as_good_in_place", lambda *_: None)

@@ -14,7 +14,7 @@ from auvnn.diagnosis.hypotheses.standard_errors import standard_errors
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.score_tests.null_tests import NullTests
 from auvnn.diagnosis.selection import moved_by_unnamed as module
-from auvnn.diagnosis.selection.moved_by_unnamed import moved_by_unnamed, widened
+from auvnn.diagnosis.selection.moved_by_unnamed import Moved, moved_by_unnamed, widened
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
 
@@ -50,12 +50,13 @@ def two_causes() -> Any:
 def test_it_is_what_the_fit_of_the_whole_model_moves_and_leaves_open(two_causes):
     world = two_causes
     moved = moved_by_unnamed(world.windows, world.named, world.tested, world.base)
+    assert moved.effects == ("ocean_current",)
     whole = world.of("ocean_current", "net_buoyancy")
     theirs = world.layout.places(whole.names)["net_buoyancy"]
     step = whole.fitted.theta[theirs] - world.named.fitted.theta[world.at]
     open_ = np.diag(whole.fitted.covariance())[theirs] - np.diag(world.named.fitted.covariance())[world.at]
     assert abs(step[0]) > 5.0 * standard_errors(world.named, world.at)[0][0]
-    np.testing.assert_allclose(moved[world.at], np.sqrt(step**2 + open_), rtol=0.1)
+    np.testing.assert_allclose(moved.by[world.at], np.sqrt(step**2 + open_), rtol=0.1)
 
 
 def test_an_interval_that_misses_holds_the_truth_then(two_causes):
@@ -71,7 +72,7 @@ def test_an_interval_that_misses_holds_the_truth_then(two_causes):
 def test_where_the_names_are_all_there_is_nothing_moves():
     world = world_of(net_buoyancy={"force": FORCE})
     moved = moved_by_unnamed(world.windows, world.named, world.tested, world.base)
-    assert not moved.any()
+    assert moved.effects == () and not moved.by.any()
     assert widened(world.named, moved) is world.named
 
 
@@ -97,13 +98,13 @@ def test_an_effect_with_a_shape_is_put_in_at_the_shape_that_its_test_found(monke
     plain = module.likely_together
     monkeypatch.setattr(module, "likely_together", lambda *given: joined.extend(plain(*given)) or joined)
     moved = moved_by_unnamed(world.windows, world.named, world.tested, world.base)
-    assert joined[0] == "tether@0" and moved[world.at[0]] > 0.0
+    assert joined[0] == "tether@0" and moved.effects[0] == "tether" and moved.by[world.at[0]] > 0.0
 
 
 def test_the_larger_of_what_is_known_to_lie_between_explanations_counts(two_causes):
     world = two_causes
     size = len(world.named.fitted.theta)
-    first = widened(world.named, np.full(size, 0.2))
-    second = widened(first, np.linspace(0.0, 1.0, size))
-    assert second.systematic is not None
+    first = widened(world.named, Moved(("waves",), np.full(size, 0.2)))
+    second = widened(first, Moved(("tether",), np.linspace(0.0, 1.0, size)))
+    assert second.systematic is not None and second.beside == ("tether",)
     np.testing.assert_allclose(second.systematic, np.maximum(0.2, np.linspace(0.0, 1.0, size)))

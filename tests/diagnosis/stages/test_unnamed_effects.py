@@ -11,6 +11,7 @@ import pytest
 
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.noise_law import search as force_search
+from auvnn.diagnosis.selection.moved_by_unnamed import Moved
 from auvnn.diagnosis.stages import unnamed_effects as module
 from auvnn.diagnosis.stages.state import State
 from auvnn.diagnosis.stages.unnamed_effects import beside_unnamed
@@ -29,6 +30,7 @@ class Fit:
     effects: tuple[str, ...] = ()
     under_law: Any = None
     systematic: Any = None
+    beside: tuple[str, ...] = ()
 
 
 class Asked:
@@ -59,7 +61,7 @@ def moved(monkeypatch) -> list[Any]:
 
     def by(windows: Any, current: Fit, tested: Any, base: list[str]) -> Any:
         given.append((current.effects, tested, base))
-        return np.array([0.5])
+        return Moved(("waves",), np.array([0.5]))
 
     monkeypatch.setattr(module, "moved_by_unnamed", by)
     return given
@@ -71,6 +73,7 @@ def test_tests_that_were_made_beside_the_names_are_taken_and_others_are_not(move
     told = beside_unnamed(asked, state(fit, last_tests=(fit, "made before")))
     assert moved == [(("payload",), "made before", ["inertia", "payload"])] and asked.tested == []
     np.testing.assert_array_equal(told.current.systematic, [0.5])
+    assert told.current.beside == ("waves",)
     rival: Any = Fit(("tether",))
     beside_unnamed(
         asked,
@@ -127,4 +130,6 @@ def test_an_interval_holds_the_truth_where_a_second_cause_may_not_be_named():
     )
     assert answer.missing == ["net_buoyancy"]
     told = next(c for c in answer.candidates if c["effect"] == "net_buoyancy")["parameters"]["force"]
+    (allowed,) = [w for w in answer.warnings if w.startswith("not named, but likely beside what is named: ")]
+    assert ": ocean_current (" in allowed and allowed.endswith("the standard errors allow for this")
     assert 0.3 < abs(told["value"] - FORCE) < 1.96 * told["std"] < 1.0
