@@ -69,7 +69,7 @@ def moved_by_unnamed(
     joined = likely_together(asked, sums, base, [s.effect for s in likely], current.effects)
     if not joined:
         return Moved((), out)
-    moved = _moved(asked.layout, sums, base, joined, current.effects)
+    moved = moved_together(asked.layout, sums, base, joined, current.effects)
     at, theirs = tested.at.places(current.names), tested.at.places(base)
     for name in {*at} & {*theirs}:
         out[at[name]] = moved[theirs[name]]
@@ -128,10 +128,21 @@ def _with_shapes(layout: Layout, windows: Windows, likely: Sequence[Score], base
     return probed(narrowed(layout, layout.model.rebuilt(kept)), names, extent_of(windows), shapes_of=shapes)
 
 
-def _moved(
+def moved_together(
     layout: Layout, sums: Statistics, base: Sequence[str], joined: Sequence[str], free: Sequence[str]
 ) -> Array:
-    """Return how far the base goes where further effects are put in, and how much less is known of it then, together."""
+    """Return how far the base goes where further effects are put in, and how much less is known of it then, together.
+
+    Args:
+        layout: which columns belong to which effect, at the fit without the further effects.
+        sums: of the windows there, products of all columns in them.
+        base: effects that are free in the fit.
+        joined: further effects, each of plausible size, by the labels that the layout has for them.
+        free: effects of the base whose priors are wide.
+
+    Returns:
+        (P,), parameters in the order of the base.
+    """
     f, c = layout.of(base), layout.of(joined)
     held, theta = priors(layout, base, free), parameters_of(layout.model, base)
     movable = held.inside(theta)

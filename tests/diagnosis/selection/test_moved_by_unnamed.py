@@ -11,16 +11,20 @@ import pytest
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.standard_errors import standard_errors
-from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out, priors, scales
 from auvnn.diagnosis.score_tests.null_tests import NullTests
 from auvnn.diagnosis.selection import moved_by_unnamed as module
-from auvnn.diagnosis.selection.moved_by_unnamed import Moved, moved_by_unnamed, widened
+from auvnn.diagnosis.selection.moved_by_unnamed import Moved, moved_by_unnamed, moved_together, widened
 from auvnn.models import GreyBox
+from tests.diagnosis.linear_world import GROUPS, World, layout
 from tests.small_logs import make_log, small_vehicle
 
 NAMES = ["net_buoyancy", "ocean_current", "cg_offset", "constant_force", "thruster_gain", "tether"]
 # A current along the vertical axis pushes as a buoyancy does, and so does a tether that hangs above.
 FORCE, DRIFT = 6.0, 0.06
+# Of the linear worlds: what has a name, what has none, and all that is free without the latter.
+NAMED, FURTHER = ("ocean_current",), ("net_buoyancy", "cg_offset")
+BASE = [*GROUPS, *NAMED]
 
 
 def world_of(**hidden: dict[str, float]) -> Any:
@@ -108,3 +112,59 @@ def test_the_larger_of_what_is_known_to_lie_between_explanations_counts(two_caus
     second = widened(first, Moved(("tether",), np.linspace(0.0, 1.0, size)))
     assert second.systematic is not None and second.beside == ("tether",)
     np.testing.assert_allclose(second.systematic, np.maximum(0.2, np.linspace(0.0, 1.0, size)))
+
+
+def linear(errors: Any, world: World) -> tuple[Any, Any, Any]:
+    """Return the base fitted without the further effect, its sums there, and the layout."""
+    theta = world.fitted_null(errors, BASE, NAMED)
+    at = world.at(theta[world.layout.of(BASE)], BASE)
+    return theta, world.statistics(errors, theta), at
+
+
+def solved(errors: Any, world: World, names: list[str]) -> tuple[Any, Any]:
+    """Return dense least squares with each prior as a further row of the equations: values and their variances."""
+    columns = world.layout.of(names)
+    flat = world.jacobian.reshape(-1, world.jacobian.shape[-1])[:, columns]
+    known = np.concatenate(
+        [
+            scales(world.layout, n) ** -2.0 if n in FURTHER else priors(world.layout, [n], NAMED).precision
+            for n in names
+        ]
+    )
+    rows = np.vstack([flat, np.diag(np.sqrt(known))])
+    right = np.concatenate([errors.ravel(), np.zeros(len(columns))])
+    return np.linalg.lstsq(rows, right, rcond=None)[0], np.diag(np.linalg.inv(rows.T @ rows))
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return World.random(layout(), strength=12.0, mixing=0.9)
+
+
+@pytest.mark.parametrize("joined", [FURTHER[:1], FURTHER])
+def test_it_is_the_difference_of_two_dense_least_squares(world, joined):
+    random = np.random.default_rng(3)
+    errors = world.errors(world.drawn(random, ocean_current=0.3, net_buoyancy=3.0, cg_offset=0.01), random)
+    _, sums, at = linear(errors, world)
+    moved = moved_together(at, sums, BASE, joined, NAMED)
+    (alone, before), (whole, after) = (solved(errors, world, n) for n in (BASE, [*BASE, *joined]))
+    size = len(alone)
+    np.testing.assert_allclose(moved, np.sqrt((whole[:size] - alone) ** 2 + after[:size] - before), rtol=1e-6)
+    # Both parts count.
+    assert (after[:size] > 1.02 * before).any() and ((whole[:size] - alone) ** 2 > 0.1 * before).any()
+
+
+def test_intervals_hold_the_truth_where_a_further_effect_is_drawn_by_its_plausible_size(world):
+    random, own = np.random.default_rng(5), world.layout.places(BASE)["ocean_current"]
+    inside = []
+    for _ in range(150):
+        size = random.normal(size=1) * scales(world.layout, "net_buoyancy")
+        truth = world.drawn(random, ocean_current=0.3, net_buoyancy=size)
+        theta, sums, at = linear(world.errors(truth, random), world)
+        _, variance = solved(np.zeros(world.jacobian.shape[:2]), world, BASE)
+        moved = moved_together(at, sums, BASE, FURTHER[:1], NAMED)
+        away = np.abs(theta[world.layout.of(BASE)] - truth[world.layout.of(BASE)])[own]
+        wide = np.sqrt(variance[own] + moved[own] ** 2)
+        inside.append([away < 1.96 * np.sqrt(variance[own]), away < 1.96 * wide])
+    alone, told = np.mean(inside, axis=(0, 2))
+    assert alone < 0.9 and told > 0.93

@@ -194,3 +194,18 @@ def test_what_comes_in_the_place_of_one_that_is_passed_over_may_be_passed_over_t
     asked: Any = Asked([named(e) for e in fits])
     assert search_round(asked, begun(*chosen)).chosen[-1] == "tether"
     assert asked.offered[1:] == [["payload", "waves", "tether"], ["payload", "tether"]]
+
+
+@pytest.mark.parametrize("most", [1, 5])
+def test_a_round_that_ends_the_search_keeps_its_tests_with_the_fit_beside_which_they_were_made(
+    monkeypatch, most
+):
+    """Whether no further name may be given, or none was found."""
+    monkeypatch.setattr(module, "rest", lambda *_: "adequate")
+    asked: Any = Asked([Choice("unknown", None, [], [])])
+    asked.most = most
+    state = begun("payload")
+    after = search_round(asked, state)
+    assert after.ended and after.last_tests is not None and after.last_tests[0] is state.current
+    assert [*after.last_tests[1].scores] == ["waves", "tether", "thrust_asymmetry", "constant_force"]
+    assert len(asked.offered) == (most > 1)

@@ -114,6 +114,12 @@ def test_beside_a_force_what_was_named_or_passed_is_not_asked_for(monkeypatch, m
     assert ended.last.effects == ("payload",) and ended.last.by == [0.5]
 
 
+def test_beside_a_force_nothing_is_moved_where_nothing_is_named(monkeypatch):
+    asked, _ = scripted(monkeypatch, {})
+    monkeypatch.setattr(force_search, "moved_by_unnamed", lambda *_: pytest.fail("there is nothing to move"))
+    assert asked.run(found(-1000.0), [], 4).steps == []
+
+
 def test_an_interval_holds_the_truth_where_a_second_cause_may_not_be_named():
     """One name at most: a buoyancy takes up what a vertical current does, and says how far that may be."""
     model = GreyBox(small_vehicle())
