@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -161,3 +162,27 @@ def right_axis(row: Row) -> bool:
 def answer_of(row: Row) -> str:
     """Return what was answered in the first step: the first name, or the verdict where none was given."""
     return row["missing"][0] if row["verdict"] == "named" and row["missing"] else row["verdict"]
+
+
+def nearest(gap: float, unit: str | None) -> float:
+    """Return how far a value is from another one: of angles the shorter way round.
+
+    Args:
+        gap: their difference.
+        unit: of both.
+    """
+    return math.remainder(gap, 2.0 * math.pi) if unit == "rad" else gap
+
+
+def about_a_turn(row: Row, name: str, z: float) -> float:
+    """Return an error in standard errors, of an angle the shorter way round.
+
+    Args:
+        row: of the benchmark.
+        name: of the parameter, with its effect's where several are hidden.
+        z: the error.
+    """
+    effect, _, own = name.partition(".") if kind_of(row) == "several" else ("", "", name)
+    known = row.get("parameters") or {}
+    found = (known.get(effect) or {} if effect else known).get(own) or {}
+    return nearest(z * found["std"], found.get("unit")) / found["std"] if found.get("std") else z

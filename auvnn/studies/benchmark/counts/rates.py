@@ -20,13 +20,14 @@ Z95 = 1.96
 def z_of(row: Row) -> list[float]:
     """Return the errors in standard errors of the parameters of hidden effects that were named.
 
-    What the row's world has of the effect by itself is part of the truth.
+    What the row's world has of the effect by itself is part of the truth, and an angle is the same a whole turn later.
     """
     kept, own = [], worlds.own_amounts(row)
     for name, error in (row.get("errors") or {}).items():
         z = error["z"]
         if z is None or not np.isfinite(z):
             continue
+        z = counting.about_a_turn(row, name, z)
         z -= own[name] / row["parameters"][name]["std"] if name in own else 0.0
         if kind_of(row) == "several":
             # Called by effect and parameter; what was not named was never fitted in earnest.

@@ -10,6 +10,7 @@ from scipy import stats
 
 from auvnn.errors import ConfigError
 from auvnn.studies.benchmark import summarise
+from auvnn.studies.benchmark.cases import Case
 from auvnn.studies.benchmark.counts.counting import (
     STRICT,
     TIED,
@@ -19,11 +20,13 @@ from auvnn.studies.benchmark.counts.counting import (
     given_names,
     named_alone,
     named_or_tied,
+    nearest,
     right_axis,
 )
 from auvnn.studies.benchmark.counts.power import smallest_found
 from auvnn.studies.benchmark.counts.rates import by_part, interval, judged, rate, z_of
 from auvnn.studies.benchmark.falls import names_to_add
+from auvnn.studies.benchmark.one_log import errors_of
 
 
 def row(hidden: str, *found: tuple[str, list[str]], kind: str = "effect", size: str = "medium", **more: Any):
@@ -294,3 +297,34 @@ def test_rows_of_several_versions_of_the_code_are_warned_of():
     rows = [row("a", *named("a"), code=c) for c in ("1", "2")]
     assert "2 versions of the code" in summarise(rows, {}).warnings[0]
     assert summarise(rows[:1], {}).warnings == []
+
+
+def test_an_angle_is_the_same_a_whole_turn_later():
+    """A phase of 3.13 rad is 0.023 rad from one of -3.13 rad; a rate of 6.26 is not the same as none."""
+    turn, std = 2.0 * np.pi, 0.01
+    told = {
+        "phase": {"value": -3.13, "std": std, "unit": "rad"},
+        "rate": {"value": 6.26, "std": std, "unit": "rad/s"},
+    }
+    errors = {n: {"relative": None, "z": -6.26 / std} for n in told}
+    short, long = (turn - 6.26) / std, -6.26 / std
+    assert z_of(row("a", *named("a"), errors=errors, parameters=told)) == pytest.approx([short, long])
+    several = row(
+        "a+b", *named("a", "b"), kind="several", parameters={"a": told, "b": None},
+        errors={"a.phase": errors["phase"], "a.rate": errors["rate"], "b.phase": errors["phase"]},
+    )  # fmt: skip
+    assert z_of(several) == pytest.approx([short, long, long])
+    assert nearest(-3.128 - np.pi, "rad") == pytest.approx(0.0136, abs=1e-4) and nearest(-6.27, "1") == -6.27
+
+
+def test_the_error_of_a_phase_goes_the_shorter_way_round():
+    """A wave against its amplitude's sign, whose phase is half a turn off, is the same wave."""
+    truth = {"waves": {"amplitude": -0.09, "omega": 1.4, "phase": 0.0, "direction": 0.9}}
+    told = {n: {"value": v, "std": 0.01, "unit": u} for n, v, u in (
+        ("amplitude", 0.09, "m"), ("omega", 1.4, "rad/s"), ("phase", 0.02 - np.pi, "rad"), ("direction", 0.9, "rad"),
+    )}  # fmt: skip
+    case = Case(
+        "rov95", "waves", "medium", "realistic", "multisine", "drawn", 1, runs=2, duration=30.0, rate=20.0
+    )
+    errors = errors_of(case, truth, told)
+    assert errors["phase"]["z"] == pytest.approx(2.0) and errors["amplitude"]["z"] == pytest.approx(0.0)
