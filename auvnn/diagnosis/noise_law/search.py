@@ -143,7 +143,9 @@ class ForceSearch(NameAfterName):
 
     def _ended(self, path: Path, null: Hypothesis, tried: Sequence[Hypothesis], whole: float) -> WithForce:
         """Return what was found; from here on free running counts again."""
-        under_law, current, law = self.fits(), path.current, path.current.estimate.law
+        under_law = self.fits()
+        path.current = current = under_law.closer(path.current)
+        law = current.estimate.law
         assert law is not None
         return WithForce(
             path.steps,

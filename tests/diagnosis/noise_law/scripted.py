@@ -128,7 +128,7 @@ def scripted(
     asked._tested = lambda *_: SimpleNamespace(p_value=0.0)
     asked._settled = lambda h: h
     asked._takes_up = lambda *_: False
-    asked.fits = lambda: SimpleNamespace(told=lambda e: diverging(e))
+    asked.fits = lambda: SimpleNamespace(told=lambda e: diverging(e), closer=lambda h: h)
     asked.about = lambda *_: None
     asked.predicted, asked.in_closed_loop, asked.say = lambda _: None, False, lambda _: None
     asked.averaged_with, asked._refits, asked.pool = [], {}, SERIAL

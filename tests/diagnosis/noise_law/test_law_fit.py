@@ -70,6 +70,28 @@ def test_steps_go_on_to_the_top(monkeypatch):
     assert len(climb.seen) < 7
 
 
+def test_values_that_are_answered_go_on_to_the_top_as_far_as_steps_lead(monkeypatch):
+    """Half a unit below the top decides no comparison, but is a standard error from the likeliest value."""
+    climb = Climb(
+        monkeypatch, lambda x: -0.5 * (x - 8.0) ** 2, lambda x: (0.7 * (8.0 - x), 0.5 * (x - 8.0) ** 2)
+    )
+    nothing: Any = None
+    fits = LawFits(nothing, np.ones(18), climb.judge)  # type: ignore[arg-type]
+
+    def at(found: Hypothesis) -> float:
+        return float(found.explanation.fitted.theta[0])
+
+    before = climb.judge(7.0)
+    assert at(fits.settled(before)) == 7.0
+    assert at(fits.closer(before)) == pytest.approx(8.0, abs=0.1)
+    # Where it begins close it stays, and where no share of a step leads up as well.
+    close = climb.judge(7.95)
+    assert fits.closer(close) is close
+    down = Climb(monkeypatch, lambda x: -abs(x), lambda x: (5.0, 300.0))
+    stays = down.judge(0.0)
+    assert LawFits(nothing, np.ones(18), down.judge).closer(stays) is stays  # type: ignore[arg-type]
+
+
 def test_a_step_that_makes_the_values_unlikelier_is_shortened(monkeypatch):
     # Twelve times too far, each time: a tenth of the step is nearly right, the whole of it and 0.3 of it are not.
     climb = Climb(monkeypatch, lambda x: -((x - 2.0) ** 2), lambda x: (12.0 * (2.0 - x), (x - 2.0) ** 2))

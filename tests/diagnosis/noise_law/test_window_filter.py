@@ -165,3 +165,15 @@ def test_a_parameter_that_would_pass_a_bound_ends_there_and_the_others_follow():
     found = minimize(lambda x: linear.joint(law, x), np.zeros(2), bounds=reach.T, tol=1e-12)
     assert step == pytest.approx(found.x, abs=1e-4) and value == pytest.approx(found.fun, abs=1e-3)
     assert gain == pytest.approx(linear.joint(law, np.zeros(2)) - found.fun, abs=1e-3)
+
+
+def test_sums_that_say_less_than_nothing_of_a_parameter_leave_it_where_it_is(recwarn):
+    """A window of enormous errors rounds away what the others say of it; the others follow as if it were held."""
+    found = Likelihood(Linear([True, True]).sums())
+    whole = np.eye(KNOWN + 1)
+    whole[0, 1:] = whole[1:, 0] = 2.0
+    whole[1, 1] = -3.0
+    whole[1, 2] = whole[2, 1] = 1e4
+    step, _, _ = found._followed(whole)
+    np.testing.assert_allclose(step, [0.0, *[2.0] * (KNOWN - 1)], rtol=1e-6)
+    assert not recwarn.list

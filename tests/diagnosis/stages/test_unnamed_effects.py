@@ -107,9 +107,12 @@ def test_beside_a_force_what_was_named_or_passed_is_not_asked_for(monkeypatch, m
     monkeypatch.setattr(force_search, "widened", lambda of, by: SimpleNamespace(effects=of.effects, by=by))
     asked._tested = lambda current, remaining, *_: SimpleNamespace(p_value=0.0, asked=remaining)
     asked.base = ["inertia"]
+    # What is answered are the likeliest values, and what is moved are these.
+    there = found(10.3, "payload")
+    asked.fits = lambda: SimpleNamespace(told=lambda e: e, closer=lambda h: there if h.name else h)
     ended = asked.run(found(-1000.0), [], most)
     (_, current, tested, base) = told[0]
-    assert len(told) == 1 and current.effects == ("payload",) and base == ["inertia", "payload"]
+    assert len(told) == 1 and current is there.explanation and base == ["inertia", "payload"]
     assert tested.asked == ["thrust_asymmetry", "trapped_water", "waves"]
     assert ended.last.effects == ("payload",) and ended.last.by == [0.5]
 

@@ -24,7 +24,7 @@ from auvnn.diagnosis.noise_law.likelihood.force_smoother import Wave, moments, s
 from auvnn.diagnosis.noise_law.likelihood.law_information import law_information
 from auvnn.diagnosis.noise_law.likelihood.sums import ForceSums
 from auvnn.diagnosis.noise_law.likelihood.window_filter import WindowFilter
-from auvnn.estimation.priors import bounded_step
+from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.force_law import ForceLaw
 
@@ -127,10 +127,7 @@ class Likelihood:
         if not len(pull):
             return pull, square, pull
         # What would go beyond a bound ends there, and the others follow.
-        normal = square + self.precision
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
-        low, high = self.sums.reach / unit
-        step = unit * bounded_step(normal * unit[:, None] * unit, pull * unit, low, high)
+        step = NormalEquations(square + self.precision, pull).bounded(*self.sums.reach)
         return step, square, pull
 
     def sloped(self, axes: Sequence[int], x: Array) -> tuple[float, Array]:
