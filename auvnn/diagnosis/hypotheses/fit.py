@@ -121,9 +121,15 @@ def left_out(statistics: Statistics, theta: Array, held: Priors, fold: NDArray[n
         theta: that fit, (P,).
         held: its priors.
         fold: of each window, (B,).
+
+    Raises:
+        numpy.linalg.LinAlgError: free running grows without bound, so that the sums cannot be solved.
     """
     cost = np.empty(len(fold))
     free = held.inside(theta)
+    # The solver would say so as well, but LAPACK writes of it to the terminal first.
+    if free.any() and not (np.isfinite(statistics.hessian).all() and np.isfinite(statistics.slope).all()):
+        raise np.linalg.LinAlgError("free running grows without bound")
     for f in np.unique(fold):
         keep = fold != f
         if not keep.any():

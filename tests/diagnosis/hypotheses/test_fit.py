@@ -52,6 +52,17 @@ def test_what_is_left_out_is_predicted_by_a_fit_without_it(world):
     assert cost.sum() > found.fitted.statistics.cost.sum()
 
 
+def test_sums_of_free_running_that_diverged_are_refused_without_a_word_on_the_terminal(world, capfd):
+    random = np.random.default_rng(1)
+    found, _ = fitted(world, world.errors(world.drawn(random), random), ("ocean_current",))
+    sums = found.fitted.statistics
+    hessian = sums.hessian.copy()
+    hessian[3] = np.nan
+    with pytest.raises(np.linalg.LinAlgError, match="without bound"):
+        left_out(replace(sums, hessian=hessian), found.fitted.theta, found.fitted.priors, world.run)
+    assert capfd.readouterr() == ("", "")
+
+
 def judged(world, errors, effects):
     """Return the explanation with what it leaves on runs left out."""
     found, _ = fitted(world, errors, effects)
