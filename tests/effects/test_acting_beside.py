@@ -75,7 +75,10 @@ def test_gross_errors_hide_all_that_could_act(monkeypatch):
 
     def said(*silent):
         state: Any = SimpleNamespace(
-            silent=silent, first=SimpleNamespace(fitted=None), current=SimpleNamespace(effects=()), failed={}
+            silent=silent,
+            first=SimpleNamespace(fitted=None),
+            current=SimpleNamespace(effects=(), beside=()),
+            failed={},
         )
         return " ".join(answering._warnings(asked, state))
 

@@ -28,7 +28,7 @@ def begun(monkeypatch, further: Any = None) -> tuple[Any, Any, list[str]]:
         done.append(f"settled {h.name or 'nothing'} {steps}")
         return h
 
-    asked.fits = lambda: SimpleNamespace(settled=settled, told=lambda e: e)
+    asked.fits = lambda: SimpleNamespace(settled=settled, told=lambda e: e, closer=lambda h: h)
     asked.judged = lambda first, law: done.append(f"judged {first} by {law}") or NULL
     first: Any = SimpleNamespace(fitted=SimpleNamespace(sigma=None))
     before: Any = SimpleNamespace(steps=STEPS, tried=(), groups=(), p_value=0.5, first=first)
