@@ -165,16 +165,14 @@ class ForceSearch(NameAfterName):
 
     def _uncertain(self, path: Path) -> FittedHypothesis:
         """Return the explanation that is answered, with what effects without a name would move in its standard errors."""
-        current, passed = path.current, self._passed(path)
+        current = path.current
         explanation = averaged(self.layout, current, path.not_named)
         if not path.chosen:
             return explanation
-        remaining = [n for n in self.usable if n not in path.chosen and n not in passed]
-        base = [*self.base, *[c for c in path.chosen if c not in self.base]]
-        about = self.about(explanation, current.estimate.law)
+        about, free = self.about(explanation, current.estimate.law), self._free(path.chosen)
         with suppress(*UNSOLVED):
-            tested = self._tested(current, remaining, base, path.chosen)
-            return widened(explanation, moved_by_unnamed(about, current.weighed, tested, base))
+            moved = moved_by_unnamed(about, current.weighed, self._tested_beside(path), free)
+            return widened(explanation, moved)
         return explanation
 
     def _refit(self, current: Hypothesis, *, whole: bool = False) -> Refit:

@@ -12,7 +12,7 @@ from auvnn.answers import plain
 from auvnn.effects import EFFECTS
 from auvnn.errors import AuvnnError, one_line
 from auvnn.studies.benchmark.cases import Case
-from auvnn.studies.benchmark.counts.counting import TIED, nearest
+from auvnn.studies.benchmark.counts.counting import TIED, wrapped
 from auvnn.studies.benchmark.strangers import axis_of, said_axis, sized_stranger
 
 # The plant's step, s: the error of 2e-5 m/s that the longer one leaves is far below any noise, but not below none.
@@ -236,7 +236,7 @@ def errors_of(
             found = answered.get(name)
             if found is None or found["value"] is None:
                 continue
-            gap, std = nearest(found["value"] - value, found.get("unit")), found["std"]
+            gap, std = wrapped(found["value"] - value, found.get("unit")), found["std"]
             out[name if case.kind == "effect" else f"{effect}.{name}"] = {
                 "relative": abs(gap) / size if name in null else None,
                 "z": gap / std if std and np.isfinite(std) else None,

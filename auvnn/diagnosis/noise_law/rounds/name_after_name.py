@@ -195,13 +195,18 @@ class NameAfterName(UnderLaw):
         Args:
             path: with the names.
         """
-        passed = self._passed(path)
-        remaining = [n for n in self.usable if n not in path.chosen and n not in passed]
-        base = [*self.base, *[c for c in path.chosen if c not in self.base]]
-        scores = self._tested(path.current, remaining, base, list(path.chosen)).scores
-        told = {n: s.evidence for n, s in scores.items() if s.degrees}
+        told = {n: s.evidence for n, s in self._tested_beside(path).scores.items() if s.degrees}
         fitted = {} if self._leaders is None else self._leaders.gains(path.current)
         return max([fitted.get(n, promised) for n, promised in told.items()], default=0.0)
+
+    def _tested_beside(self, path: Path) -> Tested:
+        """Return the tests of the effects that are still asked for beside all names."""
+        remaining = [n for n in self.usable if n not in {*path.chosen, *self._passed(path)}]
+        return self._tested(path.current, remaining, self._free(path.chosen), list(path.chosen))
+
+    def _free(self, chosen: Sequence[str]) -> list[str]:
+        """Return the effects that are free where some are named."""
+        return [*self.base, *[c for c in chosen if c not in self.base]]
 
     def _round(
         self,
@@ -215,7 +220,7 @@ class NameAfterName(UnderLaw):
         remaining = [n for n in self.usable if n not in chosen and n not in passed]
         if not remaining:
             return None
-        base = [*self.base, *[c for c in chosen if c not in self.base]]
+        base = self._free(chosen)
         tests = self._tested(current, remaining, base, list(chosen))
         # Beside what was found the variance is no longer inflated by it: the tests say whether to go on.
         if chosen and tests.p_value >= ALPHA:

@@ -164,7 +164,7 @@ def answer_of(row: Row) -> str:
     return row["missing"][0] if row["verdict"] == "named" and row["missing"] else row["verdict"]
 
 
-def nearest(gap: float, unit: str | None) -> float:
+def wrapped(gap: float, unit: str | None) -> float:
     """Return how far a value is from another one: of angles the shorter way round.
 
     Args:
@@ -174,7 +174,7 @@ def nearest(gap: float, unit: str | None) -> float:
     return math.remainder(gap, 2.0 * math.pi) if unit == "rad" else gap
 
 
-def about_a_turn(row: Row, name: str, z: float) -> float:
+def wrapped_error(row: Row, name: str, z: float) -> float:
     """Return an error in standard errors, of an angle the shorter way round.
 
     Args:
@@ -185,4 +185,4 @@ def about_a_turn(row: Row, name: str, z: float) -> float:
     effect, _, own = name.partition(".") if kind_of(row) == "several" else ("", "", name)
     known = row.get("parameters") or {}
     found = (known.get(effect) or {} if effect else known).get(own) or {}
-    return nearest(z * found["std"], found.get("unit")) / found["std"] if found.get("std") else z
+    return wrapped(z * found["std"], found.get("unit")) / found["std"] if found.get("std") else z

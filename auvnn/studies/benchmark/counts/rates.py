@@ -27,7 +27,7 @@ def z_of(row: Row) -> list[float]:
         z = error["z"]
         if z is None or not np.isfinite(z):
             continue
-        z = counting.about_a_turn(row, name, z)
+        z = counting.wrapped_error(row, name, z)
         z -= own[name] / row["parameters"][name]["std"] if name in own else 0.0
         if kind_of(row) == "several":
             # Called by effect and parameter; what was not named was never fitted in earnest.

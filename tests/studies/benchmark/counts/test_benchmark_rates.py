@@ -20,8 +20,8 @@ from auvnn.studies.benchmark.counts.counting import (
     given_names,
     named_alone,
     named_or_tied,
-    nearest,
     right_axis,
+    wrapped,
 )
 from auvnn.studies.benchmark.counts.power import smallest_found
 from auvnn.studies.benchmark.counts.rates import by_part, interval, judged, rate, z_of
@@ -314,7 +314,7 @@ def test_an_angle_is_the_same_a_whole_turn_later():
         errors={"a.phase": errors["phase"], "a.rate": errors["rate"], "b.phase": errors["phase"]},
     )  # fmt: skip
     assert z_of(several) == pytest.approx([short, long, long])
-    assert nearest(-3.128 - np.pi, "rad") == pytest.approx(0.0136, abs=1e-4) and nearest(-6.27, "1") == -6.27
+    assert wrapped(-3.128 - np.pi, "rad") == pytest.approx(0.0136, abs=1e-4) and wrapped(-6.27, "1") == -6.27
 
 
 def test_the_error_of_a_phase_goes_the_shorter_way_round():
