@@ -44,7 +44,7 @@ class Tether(Effect):
         stiffness = 0.02 * weight / length
         return (
             Parameter("stiffness", "N/m", 0.0, stiffness, 0.0, 1e3 * stiffness),
-            Parameter("slack", "m", 0.0, 5.0 * length, 0.0, 1e4 * length, shape=True),
+            Parameter("slack", "m", 0.0, 5.0 * length, 0.0, 1e4 * length, shape=True, of="stiffness"),
             Parameter("weight", "N/m", 0.0, 2e-3 * weight / length, -weight / length, weight / length),
             Parameter("drag", "N s2/m3", 0.0, 1e-3 * density * length, 0.0, density * length),
             *(

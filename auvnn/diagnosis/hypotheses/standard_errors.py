@@ -22,20 +22,41 @@ Array = NDArray[np.float64]
 # determines a value.
 ROUNDING, RESOLVED = 1e-3, 1e-9
 TINY = 1e-300
+# Standard errors from its null within which an amplitude is known for one value of its shape alone.
+NEAR_NULL = 3.0
 
 
 def determined(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Return whether the log says more of some parameters than their priors do, by sums that can be right.
+
+    Where an amplitude may be null the log says nothing of its shape, and its variance holds for the one shape that the
+    fit happens to have: a cable that is never taut may be of any stiffness (Davies 1977, Biometrika 64(2)).
 
     Args:
         explanation: a fit.
         columns: positions within its own parameter vector.
     """
     fitted = explanation.under_law or explanation.fitted
-    variance = np.diag(fitted.covariance())[columns]
-    known = np.diag(fitted.statistics.total + fitted.priors.square)[columns]
-    told = variance * fitted.priors.precision[columns] < DETERMINED**2
-    return told & is_possible(variance, known, fitted.theta[columns])
+    variance = np.diag(fitted.covariance())
+    known = np.diag(fitted.statistics.total + fitted.priors.square)
+    told = variance * fitted.priors.precision < DETERMINED**2
+    told &= is_possible(variance, known, fitted.theta)
+    for amplitude, null in _with_shapes(fitted.model, explanation.names):
+        spread = np.sqrt(max(variance[amplitude], 0.0))
+        told[amplitude] &= abs(fitted.theta[amplitude] - null) >= NEAR_NULL * spread
+    return told[columns]
+
+
+def _with_shapes(model: GreyBox, names: Sequence[str]) -> list[tuple[int, float]]:
+    """Return the positions of amplitudes without which a shape says nothing, and their nulls."""
+    found, first = list[tuple[int, float]](), 0
+    for name in names:
+        described = model.effect(name).parameters_of
+        place = {p.name: first + k for k, p in enumerate(described)}
+        nulls = {p.name: p.null for p in described}
+        found += [(place[p.of], nulls[p.of]) for p in described if p.of]
+        first += len(described)
+    return found
 
 
 def standard_errors(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> tuple[Array, float]:

@@ -102,3 +102,28 @@ def test_delays_have_an_interval_in_their_standard_errors():
 def test_all_effects_that_act_late_say_so(effect, parameter):
     described = {p.name: p for p in effect_class(effect).describe(load_vehicle("remus100"), "thrusters")}
     assert described[parameter].timing and described[parameter].unit == "s"
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 8.0])
+def test_a_cable_that_is_never_taut_may_be_of_any_stiffness(stiffness):
+    """The sums exclude a stiff cable with the slack that the fit happens to have, and say nothing of one with more."""
+    plain = GreyBox(small_vehicle(0.0))
+    hidden = {"stiffness": stiffness, "slack": 0.0, "weight": 1.5, "north": 3.0, "east": -2.0, "down": -4.0}
+    log = make_log(plain.with_effects({"tether": hidden}), duration=40.0, noise=1.0)
+    windows = cut_windows(log, 4.0)
+    asked = lay_out(plain, ["tether"])
+    start = {n: 0.9 * v for n, v in hidden.items() if n not in ("stiffness", "slack")}
+    guess = replace(asked, model=plain.with_effects({"tether": start}))
+    found = fit_hypothesis(asked, windows, (), ["tether"], guess=guess)
+    names = [p.name for p in found.fitted.model.effect("tether").parameters_of]
+    told = dict(zip(names, standard_errors(found, np.arange(len(names)))[0], strict=True))
+    value = dict(zip(names, found.fitted.theta, strict=True))
+    taut = stiffness > 0.0
+    assert np.isfinite(told["weight"])
+    assert np.isfinite(told["stiffness"]) == taut
+    fitted_alone = np.sqrt(found.fitted.covariance()[0, 0])
+    if taut:
+        assert abs(value["stiffness"] - stiffness) < 4.0 * told["stiffness"]
+    else:
+        # By the sums alone it would be known to within a hundredth of the taut cable's, of which a slack one may be.
+        assert fitted_alone < 0.01 * 8.0
