@@ -103,6 +103,15 @@ class WrongUnit(Push):
         return force, replace(moment, unit="N m/s")
 
 
+class ShapeOfNothing(Push):
+    """Says that an amount is the shape of another one."""
+
+    @classmethod
+    def describe(cls, vehicle, actuation):
+        force, moment = super().describe(vehicle, actuation)
+        return force, replace(moment, of="force")
+
+
 class NotSI(Push):
     @classmethod
     def describe(cls, vehicle, actuation):
@@ -169,6 +178,7 @@ BROKEN = [
     ("describes_itself", NoCause),
     ("describes_itself", NoHook),
     ("describes_itself", NotSI),
+    ("describes_itself", ShapeOfNothing),
     ("describes_itself", LooksOutside),
     ("describes_itself", LooksForever),
     ("refuses", AnythingGoes),
