@@ -29,11 +29,14 @@ class Tether(Effect):
     cause = "a cable pulls on the vehicle"
     symbol = "F_t"
     reference = "Driscoll, Lueck and Nahon (2000), Applied Ocean Research 22"
-    # Far from its anchor the whole cable is dragged along, and hangs: that is drag and weight of the vehicle.
-    confused_with = ("ocean_current", "constant_force", "net_buoyancy", "quadratic_damping", "fin_drag")
+    # Far from its anchor the whole cable is dragged along, and hangs: that is drag and weight of the vehicle. Below a far
+    # anchor each metre of depth hangs on half a metre more of it: buoyancy that falls with depth.
+    confused_with = (
+        "ocean_current", "constant_force", "net_buoyancy", "compressibility", "quadratic_damping", "fin_drag",
+    )  # fmt: skip
     manoeuvre = "survey"
     told_apart_by = "the same legs at several distances and bearings from the anchor"
-    plainer = ("net_buoyancy", "constant_force", "quadratic_damping")
+    plainer = ("net_buoyancy", "constant_force", "compressibility", "quadratic_damping")
     channels = ("x", "y", "z")
 
     @classmethod

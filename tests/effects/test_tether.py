@@ -66,3 +66,19 @@ def test_made_fast_at_the_stern_it_turns_the_vehicle_by_its_arm(plain, vector, s
     found = model(vector(10, 0, 3, 0, 0, 0), still, still).tolist()
     inertia = np.array([70, 80, 90, *np.diag(model.vehicle.inertia_matrix)[3:]])
     assert found == pytest.approx(np.concatenate([force, moment]) / inertia, rel=1e-9, abs=1e-12)
+
+
+def test_below_a_far_anchor_its_weight_is_buoyancy_that_falls_with_depth(plain, vector, still):
+    """At a depth z, and r aside of an anchor at a height h, w (h + z + r^2 / 2 h) / 2: w / 2 for each metre of depth."""
+    height, weight = 2000.0, 0.04
+    vehicle, light = plain({}).vehicle, -0.5 * weight * height
+    at = {n: float(v) for n, v in zip("xyz", vehicle.center_of_buoyancy, strict=True)}
+    cable = plain({"tether": {"weight": weight, "down": -height, **at}})
+    # What shrinks is the buoyancy that there is.
+    shrinks = {"per_metre": 0.5 * weight / (float(vehicle.buoyancy) + light)}
+    plainer = plain({"net_buoyancy": {"force": light}, "compressibility": shrinks})
+    for place in ([0.0, 0.0, 10.0, 0.3, -0.2, 0.5], [8.0, -6.0, 400.0, -0.4, 0.1, 2.0]):
+        found = cable(vector(*place), still, still)
+        torch.testing.assert_close(found, plainer(vector(*place), still, still), rtol=1e-4, atol=1e-5)
+    deep, high = (plainer(vector(0, 0, z, 0, 0, 0), still, still)[2] for z in (400.0, 0.0))
+    assert deep > 1.1 * high
