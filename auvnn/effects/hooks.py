@@ -32,7 +32,7 @@ class Parameter:
         actuator: of the effects on commands and on how thrust and fins follow them: the number of the only actuator on
             which it acts, or `EACH` where it acts on each by itself. None where what one actuator does depends on the
             commands of others, or where this is not known; slopes then take longer.
-        of: of a shape that says nothing without one of several amplitudes: the name of that amplitude.
+        of: the amount that a shape belongs to, where without it the shape says nothing though other amounts are not null.
     """
 
     name: str

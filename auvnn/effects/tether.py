@@ -29,8 +29,8 @@ class Tether(Effect):
     cause = "a cable pulls on the vehicle"
     symbol = "F_t"
     reference = "Driscoll, Lueck and Nahon (2000), Applied Ocean Research 22"
-    # Far from its anchor the whole cable is dragged along, and hangs: that is drag and weight of the vehicle. Below a far
-    # anchor each metre of depth hangs on half a metre more of it: buoyancy that falls with depth.
+    # Far from its anchor the whole cable is dragged along, and hangs: that is drag and weight of the vehicle. Far below
+    # it, each metre of depth adds the weight of half a metre of cable: that is buoyancy that falls with depth.
     confused_with = (
         "ocean_current", "constant_force", "net_buoyancy", "compressibility", "quadratic_damping", "fin_drag",
     )  # fmt: skip

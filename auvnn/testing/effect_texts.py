@@ -64,7 +64,7 @@ def describes_itself(kind: Kind, vehicle: Vehicle = EXAMPLE, actuation: str = "t
     require(set(kind.levers) <= shapes, f"{name}: levers are {kind.levers}, shapes are {sorted(shapes)}")
     amounts = {p.name for p in described if not p.shape}
     lost = [p.name for p in described if p.of and not (p.shape and p.of in amounts)]
-    require(not lost, f"{name}: {lost} must be shapes, each of one of the amounts {sorted(amounts)}")
+    require(not lost, f"{name}: {lost} must be shapes that belong to one of the amounts {sorted(amounts)}")
     require(
         set(kind.carried) <= amounts and bool(kind.carried) == bool(kind.levers),
         f"{name}: {kind.carried} act on the levers {kind.levers}, amounts are {sorted(amounts)}",

@@ -103,13 +103,23 @@ class WrongUnit(Push):
         return force, replace(moment, unit="N m/s")
 
 
-class ShapeOfNothing(Push):
-    """Says that an amount is the shape of another one."""
+class AmountOfAnother(Push):
+    """Says that an amount belongs to another one, as only a shape does."""
 
     @classmethod
     def describe(cls, vehicle, actuation):
         force, moment = super().describe(vehicle, actuation)
         return force, replace(moment, of="force")
+
+
+class ShapeOfNobody(EFFECTS.get("tether")):
+    """Has a shape that belongs to an amount which is not there."""
+
+    name = "shape_of_nobody"
+
+    @classmethod
+    def describe(cls, vehicle, actuation):
+        return tuple(replace(p, of=p.of and "elasticity") for p in super().describe(vehicle, actuation))
 
 
 class NotSI(Push):
@@ -178,7 +188,8 @@ BROKEN = [
     ("describes_itself", NoCause),
     ("describes_itself", NoHook),
     ("describes_itself", NotSI),
-    ("describes_itself", ShapeOfNothing),
+    ("describes_itself", AmountOfAnother),
+    ("describes_itself", ShapeOfNobody),
     ("describes_itself", LooksOutside),
     ("describes_itself", LooksForever),
     ("refuses", AnythingGoes),

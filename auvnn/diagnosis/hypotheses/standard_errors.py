@@ -22,15 +22,15 @@ Array = NDArray[np.float64]
 # determines a value.
 ROUNDING, RESOLVED = 1e-3, 1e-9
 TINY = 1e-300
-# Standard errors from its null within which an amplitude is known for one value of its shape alone.
+# Standard errors within which an amount may be null, and is known for one value of its shape alone.
 NEAR_NULL = 3.0
 
 
 def determined(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Return whether the log says more of some parameters than their priors do, by sums that can be right.
 
-    Where an amplitude may be null the log says nothing of its shape, and its variance holds for the one shape that the
-    fit happens to have: a cable that is never taut may be of any stiffness (Davies 1977, Biometrika 64(2)).
+    Where an amount may be null the log says nothing of its shape, and its variance holds for the one shape that the fit
+    happens to have: a cable that is never taut may be of any stiffness (Davies 1977, Biometrika 64(2)).
 
     Args:
         explanation: a fit.
@@ -41,22 +41,16 @@ def determined(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> NDA
     known = np.diag(fitted.statistics.total + fitted.priors.square)
     told = variance * fitted.priors.precision < DETERMINED**2
     told &= is_possible(variance, known, fitted.theta)
-    for amplitude, null in _with_shapes(fitted.model, explanation.names):
-        spread = np.sqrt(max(variance[amplitude], 0.0))
-        told[amplitude] &= abs(fitted.theta[amplitude] - null) >= NEAR_NULL * spread
+    for at, null in _with_shapes_of_their_own(fitted.model, explanation.names):
+        told[at] &= abs(fitted.theta[at] - null) >= NEAR_NULL * np.sqrt(max(variance[at], 0.0))
     return told[columns]
 
 
-def _with_shapes(model: GreyBox, names: Sequence[str]) -> list[tuple[int, float]]:
-    """Return the positions of amplitudes without which a shape says nothing, and their nulls."""
-    found, first = list[tuple[int, float]](), 0
-    for name in names:
-        described = model.effect(name).parameters_of
-        place = {p.name: first + k for k, p in enumerate(described)}
-        nulls = {p.name: p.null for p in described}
-        found += [(place[p.of], nulls[p.of]) for p in described if p.of]
-        first += len(described)
-    return found
+def _with_shapes_of_their_own(model: GreyBox, names: Sequence[str]) -> list[tuple[int, float]]:
+    """Return where amounts stand without which a shape says nothing, and their nulls."""
+    described = [(name, p) for name in names for p in model.effect(name).parameters_of]
+    needed = {(name, p.of) for name, p in described if p.of}
+    return [(at, p.null) for at, (name, p) in enumerate(described) if (name, p.name) in needed]
 
 
 def standard_errors(explanation: FittedHypothesis, columns: NDArray[np.int64]) -> tuple[Array, float]:

@@ -111,19 +111,22 @@ def test_a_cable_that_is_never_taut_may_be_of_any_stiffness(stiffness):
     hidden = {"stiffness": stiffness, "slack": 0.0, "weight": 1.5, "north": 3.0, "east": -2.0, "down": -4.0}
     log = make_log(plain.with_effects({"tether": hidden}), duration=40.0, noise=1.0)
     windows = cut_windows(log, 4.0)
-    asked = lay_out(plain, ["tether"])
+    asked = lay_out(plain, ["velocity_scale", "tether"])
     start = {n: 0.9 * v for n, v in hidden.items() if n not in ("stiffness", "slack")}
-    guess = replace(asked, model=plain.with_effects({"tether": start}))
-    found = fit_hypothesis(asked, windows, (), ["tether"], guess=guess)
+    guess = replace(asked, model=plain.with_effects({"velocity_scale": {}, "tether": start}))
+    found = fit_hypothesis(asked, windows, ["velocity_scale"], ["tether"], guess=guess)
+    # Another effect's parameter comes first.
+    assert found.names == ("velocity_scale", "tether")
     names = [p.name for p in found.fitted.model.effect("tether").parameters_of]
-    told = dict(zip(names, standard_errors(found, np.arange(len(names)))[0], strict=True))
-    value = dict(zip(names, found.fitted.theta, strict=True))
+    told = dict(zip(names, standard_errors(found, 1 + np.arange(len(names)))[0], strict=True))
+    value = dict(zip(names, found.fitted.theta[1:], strict=True))
     taut = stiffness > 0.0
+    assert determined(found, np.array([0])).all()
     assert np.isfinite(told["weight"])
     assert np.isfinite(told["stiffness"]) == taut
-    fitted_alone = np.sqrt(found.fitted.covariance()[0, 0])
+    by_the_sums = np.sqrt(found.fitted.covariance()[1, 1])
     if taut:
         assert abs(value["stiffness"] - stiffness) < 4.0 * told["stiffness"]
     else:
         # By the sums alone it would be known to within a hundredth of the taut cable's, of which a slack one may be.
-        assert fitted_alone < 0.01 * 8.0
+        assert by_the_sums < 0.01 * 8.0

@@ -17,6 +17,7 @@ COLUMNS: Any = SimpleNamespace(
         "tether": range(10),
         "quadratic_damping": range(6),
         "fin_drag": range(2),
+        "compressibility": range(1),
     }
 )
 
@@ -44,6 +45,8 @@ def test_drag_is_plainer_than_a_cable_that_is_dragged_along():
         "fin_drag",
     ]
     assert names_of([best, hypothesis("net_buoyancy", 5200.0)]) == ["net_buoyancy", "tether"]
+    # So is buoyancy that falls with depth, which the weight of a long cable looks like.
+    assert names_of([best, hypothesis("compressibility", 5200.0)]) == ["compressibility", "tether"]
 
 
 def test_what_is_as_likely_and_known_to_be_confused_is_tied_however_much_more_parameters_fit():
