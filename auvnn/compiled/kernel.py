@@ -137,7 +137,15 @@ class Kernel:
 
         Returns:
             (B, T, n).
+
+        Raises:
+            CannotCompile: the code was made for inputs of other sizes, and would read beyond them.
         """
+        (_, first), *_, _ = self.layout.inputs
+        if (mean.shape[-1], 1 + row.shape[-1]) != (first, self.layout.width - (first or 1)):
+            raise CannotCompile(
+                f"{mean.shape[-1]} and {row.shape[-1]} numbers as inputs of {self.layout.inputs}"
+            )
         return _Run.apply(self, parts, y0, mean, slope, row, times, numbers)  # type: ignore[no-any-return]
 
 

@@ -75,10 +75,12 @@ def _layout(model: GreyBox, inputs: Inputs) -> Layout:
     size = model.actuators.size
     fins = 0 if inputs.fins is None else inputs.fins.shape[-1]
     # Fins that follow their commands, or change within an interval, come after the thrust, as lines over each step.
-    size += fins if inputs.fins_move(bool(model.using("steer"))) else 0
+    moving = fins if inputs.fins_move(bool(model.using("steer"))) else 0
     there = (("voltage", inputs.voltage), ("altitude", inputs.altitude))
     plain = tuple((name, None if x is not None else 0) for name, x in there)
-    return Layout(SIZE, (("thrust", size), ("command", size), ("fins", fins), *plain, ("time", None)))
+    return Layout(
+        SIZE, (("thrust", size + moving), ("command", size), ("fins", fins), *plain, ("time", None))
+    )
 
 
 def _made(model: GreyBox, inputs: Inputs, gradient: bool, tableau: tuple) -> Made[Kernel]:

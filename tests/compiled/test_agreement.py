@@ -6,6 +6,7 @@ import pytest
 import torch
 
 from auvnn.compiled.program import Numbers
+from auvnn.compiled.recorder import CannotCompile
 from auvnn.damping.bank import DampingBank
 from auvnn.models import GreyBox, Inputs
 from auvnn.models import engine as engines
@@ -30,6 +31,11 @@ CASES = {
     ),
     "remus100 with fins, polynomial, near the bottom": (
         "remus100", "polynomial", "wrench", {"bottom_proximity": None, "munk_moment": None, "payload": None},
+    ),
+    "remus100, fins that lag, a propeller in its inflow, near the bottom, sagging voltage": (
+        "remus100", "polynomial", "thrusters",
+        {"fin_lag": {"time_constant": 0.15}, "thrust_inflow_loss": None, "thrust_advance": {"loss": 0.2},
+         "bottom_proximity": {"strength": 0.5}, "voltage_droop": {"exponent": 1.0}},
     ),
 }  # fmt: skip
 
@@ -182,3 +188,20 @@ def test_a_diverging_run_is_reported_as_by_torch(compiler):
         (d.index, d.time, d.term) for d in other.divergences
     ]
     assert one.diverged
+
+
+@pytest.mark.parametrize("more", [(1, 0), (0, 1)])
+def test_inputs_of_other_sizes_are_refused_and_not_read_from_elsewhere(compiler, more):
+    """The code steps through memory by the sizes that it was made for."""
+    model = GreyBox(load_vehicle("rov95"), actuation="wrench")
+    inputs = Inputs(torch.zeros(4, 6, dtype=DOUBLE))
+    kernel = kernels._made(model, inputs, False, engines_tableau()).code
+    y0, times = torch.zeros(1, 13, dtype=DOUBLE), torch.arange(4.0, dtype=DOUBLE).unsqueeze(0)
+    y0[:, 3] = 1.0
+    numbers = Numbers.of(kernels._RightHandSide(model)).row()
+    drive, row = (
+        torch.zeros(1, 4, 1, 6 + more[0], dtype=DOUBLE),
+        torch.zeros(1, 4, 6 + more[1], dtype=DOUBLE),
+    )
+    with pytest.raises(CannotCompile, match="numbers as inputs"):
+        kernel.run(y0, drive, None, row, times, numbers, 1)
