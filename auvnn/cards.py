@@ -120,6 +120,22 @@ def parameter_rows(fitted: Any) -> list[list[str]]:
     return rows
 
 
+def not_needed(gain: Any, by_effect: Any) -> str:
+    """Return in words which of several effects adds nothing; empty where each does, or where all of them bring nothing.
+
+    Args:
+        gain: fall of the held-out error by all of them, {value, std}.
+        by_effect: effect to what it brings in addition to the others, see `improvement.json`.
+    """
+    idle = [str(name) for name, entry in by_effect.items() if not entry.get("accepted")]
+    fall, std = gain.get("value"), gain.get("std")
+    if not idle or None in (fall, std) or not fall > std:
+        return ""
+    if len(idle) == 1:
+        return f"{idle[0]} adds nothing to what the others bring: leave it out"
+    return f"{', '.join(idle)} each add nothing to what the others bring: leave one of them out"
+
+
 def _safe(text: Any) -> str:
     import html  # for cards alone: every command imports this file
 

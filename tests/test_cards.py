@@ -8,7 +8,7 @@ import torch
 from matplotlib.figure import Figure
 
 import auvnn
-from auvnn.cards import Card, Text, measured
+from auvnn.cards import Card, Text, measured, not_needed
 from auvnn.errors import ConfigError, InputError
 from auvnn.models import as_log, as_model
 
@@ -191,3 +191,25 @@ def test_a_neutral_vehicle_is_called_neutral(model):
 
     v = replace(model.vehicle, mass=10.0, gravity=9.81, buoyancy=98.1)
     assert v.weight != v.buoyancy and "+0 N, neutral" in v.summary()
+
+
+@pytest.mark.parametrize(
+    ("fall", "bring", "words"),
+    [
+        (0.1, {"a": True, "b": True}, ""),
+        (0.1, {"a": True, "b": False}, "b adds nothing to what the others bring: leave it out"),
+        (
+            0.1,
+            {"a": False, "b": False},
+            "a, b each add nothing to what the others bring: leave one of them out",
+        ),
+        (0.005, {"a": True, "b": False}, ""),
+        (None, {"a": True, "b": False}, ""),
+    ],
+)
+def test_an_effect_that_adds_nothing_is_told_where_all_together_lower_the_error(fall, bring, words):
+    """Two that each add nothing may be two names of one thing: one of them is left out, not both."""
+    assert (
+        not_needed({"value": fall, "std": 0.01}, {n: {"accepted": pays} for n, pays in bring.items()})
+        == words
+    )

@@ -78,6 +78,29 @@ def test_improvement_says_whether_it_was_accepted(unseen, accepted, words):
     assert "95 % of what could be gained" in page.text
 
 
+@pytest.mark.parametrize(
+    ("idle", "words"),
+    [
+        (
+            ["fin_gain"],
+            "but fin_gain adds nothing to what the others bring: leave it out. Not accepted as it is.",
+        ),
+        (
+            ["fin_gain", "body_lift"],
+            "fin_gain, body_lift each add nothing to what the others bring: leave one",
+        ),
+        ([], "no more than chance could: not accepted."),
+    ],
+)
+def test_an_effect_that_adds_nothing_is_said_to_be_what_is_not_accepted(unseen, idle, words):
+    """The error falls by far more than chance could; only one of the effects has no part in that."""
+    names = ["ocean_current", "fin_gain", "body_lift"]
+    own = {n: {"gain": {"value": 0.1, "std": 0.01}, "accepted": n not in idle} for n in names}
+    fall = {"value": 0.1, "std": 0.01}
+    answer = improvement(60, accepted=False, effects=names, gain=fall, by_effect=own)
+    assert words in PageText(drawer("improvement").page(answer)).text
+
+
 def test_quality_says_what_is_wrong_and_how_to_mend_it(unseen):
     page = PageText(drawer("quality").page(quality(60)))
     assert "p has the opposite sign of the attitude's derivative (scale: -1 in the mapping)" in page.text

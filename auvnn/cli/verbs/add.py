@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from auvnn.cards import not_needed
 from auvnn.cli.runs.dry import check_inputs
 from auvnn.cli.runs.job import Answering, Job, Verb
 
@@ -32,7 +33,8 @@ def _run(job: Job) -> Answering:
         error = "unknown" if step["error"] is None else f"{step['error']:.4g}"
         say(f"error     {step['step']}: {error}")
     gain = f"{data['gain']['value']:.4g} +- {data['gain']['std']:.2g}" if data["gain"]["std"] else "unknown"
-    verdict = "accepted" if data["accepted"] else "not accepted: the held-out error does not fall enough"
+    why = not_needed(data["gain"], data["by_effect"]) or "the held-out error does not fall enough"
+    verdict = "accepted" if data["accepted"] else f"not accepted: {why}"
     minded = [w for entry in data["by_effect"].values() for w in entry["reservations"]]
     if data["accepted"] and minded:
         verdict = f"accepted, but mind: {'; '.join(dict.fromkeys(minded))}"

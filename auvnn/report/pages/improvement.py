@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from auvnn.cards import not_needed
 from auvnn.report import style
 from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
@@ -48,7 +49,9 @@ class ImprovementPage(Page):
         gain, steps = view.mapping("gain"), _steps(view)
         fall, std = finite(gain.get("value")), finite(gain.get("std"))
         errors = {stage: _main_error(view, stage) for stage in STAGES}
-        out = [_verdict(effects, bool(view.get("accepted")), fall, std), *_error_words(view, effects, errors)]
+        idle = not_needed(gain, view.mapping("by_effect"))
+        verdict = _verdict(effects, bool(view.get("accepted")), fall, std, idle)
+        out = [verdict, *_error_words(view, effects, errors)]
         out += common.baseline_words(view)
         out += _floor_words(steps, errors)
         fitted = view.mapping("parameters")
@@ -148,7 +151,7 @@ def _fitted_words(fitted: Mapping[str, Any]) -> list[str]:
     return out
 
 
-def _verdict(effects: str, accepted: bool, fall: float | None, std: float | None) -> str:
+def _verdict(effects: str, accepted: bool, fall: float | None, std: float | None, idle: str) -> str:
     share = None if fall is None else 100.0 * fall
     size = interval(share, None if std is None else 100.0 * std, "% of the spread of the motion")
     by = f" by {size}" if fall is not None else ""
@@ -157,6 +160,8 @@ def _verdict(effects: str, accepted: bool, fall: float | None, std: float | None
             f"Adding {effects} lowers the error on held-out data{by}, more than its own uncertainty: "
             "accepted."
         )
+    if idle:
+        return f"Adding {effects} lowers the error on held-out data{by}, but {idle}. Not accepted as it is."
     if fall is not None and fall <= 0:
         gain = f"(gain {size})"
         return f"Adding {effects} does not lower the error on held-out data {gain}: not accepted."
