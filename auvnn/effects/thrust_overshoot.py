@@ -10,9 +10,7 @@ from torch import Tensor
 from auvnn.effects.base import Effect
 from auvnn.effects.factors import actuators
 from auvnn.effects.hooks import EACH, Parameter
-
-# Rows whose filter is worked out as one product of matrices.
-CHUNK = 128
+from auvnn.physics.recurrence import closing_gap
 
 
 class ThrustOvershoot(Effect):
@@ -54,7 +52,10 @@ class ThrustOvershoot(Effect):
         # The last row has no known length: as long as the one before, as if the record went on.
         last = steps[..., -1:, :] if steps.shape[-2] else torch.zeros_like(times[..., :1].unsqueeze(-1))
         steps = torch.cat([steps, last], dim=-2)
-        return command + excess * (command - self._flow(command, times, tau)) * _left(steps / tau)
+        ratio = steps / tau
+        # The flow follows the held commands by first-order filtering, exactly.
+        gap = closing_gap(torch.exp(-ratio[..., :-1, :]), command)
+        return command - excess * gap * _left(ratio)
 
     def follow(self, state: Tensor, command: Tensor) -> tuple[Tensor, Tensor]:
         """Return the command with its excess, and ds/dt."""
@@ -66,24 +67,6 @@ class ThrustOvershoot(Effect):
         ratio, excess = step / self.theta[0].to(command), self.theta[1:].to(command)
         gap = command - state
         return command + excess * gap * _left(ratio), command - gap * torch.exp(-ratio)
-
-    def _flow(self, command: Tensor, times: Tensor, tau: Tensor) -> Tensor:
-        """Return s at the start of every row: first-order filtering of the held commands, exact, (..., T, n)."""
-        rows, parts, state, begin = command.shape[-2], [], command[..., 0, :], 0
-        while begin < rows:
-            end = min(begin + CHUNK, rows)
-            # One row more than is kept: the state with which the next chunk begins.
-            last = min(end + 1, rows)
-            t, c = times[..., begin:last], command[..., begin:last, :]
-            # s_i = s_0 exp(-(t_i - t_0)/tau) + sum_{j<i} c_j [exp(-(t_i - t_{j+1})/tau) - exp(-(t_i - t_j)/tau)]
-            gap = torch.clamp(t.unsqueeze(-1) - t.unsqueeze(-2), min=0.0)
-            left = torch.tril(torch.exp(-gap / tau))
-            weight = torch.tril(left[..., 1:] - left[..., :-1], -1)
-            flow = left[..., :1] * state.unsqueeze(-2) + weight @ c[..., :-1, :]
-            parts.append(flow[..., : end - begin, :])
-            state = flow[..., -1, :]
-            begin = end
-        return torch.cat(parts, dim=-2)
 
 
 def _left(ratio: Tensor) -> Tensor:

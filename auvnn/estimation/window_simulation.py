@@ -52,8 +52,7 @@ class Thrust(nn.Module):
     def forward(self, windows: Windows, substeps: int) -> tuple[Tensor, Tensor]:
         """Return both, (B, L, n) each, by so many substeps in an interval."""
         drive = self.drive(windows, substeps)
-        mean = torch.stack([sum(parts[1:], parts[0]) / len(parts) for parts in drive.mean], dim=-2)
-        return mean, torch.stack(drive.start, dim=-2)
+        return drive.means.mean(-2), drive.starts
 
 
 def output_error(model: GreyBox, windows: Windows, initial: Tensor) -> Tensor:

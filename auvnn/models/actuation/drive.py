@@ -10,6 +10,7 @@ from torch import Tensor
 
 from auvnn.effects import Response
 from auvnn.models.actuation.thrust_signal import Answer, ThrustSignal
+from auvnn.physics.recurrence import closing_gap
 
 
 @dataclass(frozen=True)
@@ -79,17 +80,10 @@ def states_of(demand: Tensor, times: Tensor, lag: Answer, substeps: int) -> tupl
     # No interval follows the last row; its thrust is needed only at its very start.
     steps = torch.cat([times[..., 1:] - times[..., :-1], torch.zeros_like(times[..., :1])], dim=-1)
     h = steps.to(demand).unsqueeze(-1) / substeps
-    # The answer is linear in the gap between state and demand: one call for all steps tells how the gap closes,
-    # and the recursion in time is left with two operations a row.
+    # The answer is linear in the gap between state and demand: one call for all steps tells how the gap closes.
     unit = torch.ones_like(h)
     answer = lag(unit, torch.zeros_like(h), h)
-    rows = demand.unbind(-2)
-    over = (answer.end**substeps).unbind(-2)
-    state, states = rows[0], []
-    for row, left in zip(rows, over, strict=True):
-        states.append(state)
-        state = row + (state - row) * left
-    return torch.stack(states, dim=-2), answer
+    return demand + closing_gap((answer.end**substeps)[..., :-1, :], demand), answer
 
 
 def lagged(demand: Tensor, states: Tensor, answer: Response, substeps: int, warmup: int) -> Drive:
