@@ -10,7 +10,7 @@ if os.environ.get("AUVNN_CHECK_SHAPES") == "1":
 
     install_import_hook("auvnn.physics", "beartype.beartype")
 
-# What is compiled, and when, is for tests/fast to ask; elsewhere nothing is left in anybody's cache.
+# What is compiled, and when, is for tests/compiled to ask; elsewhere nothing is left in anybody's cache.
 os.environ.setdefault("AUVNN_ENGINE", "torch")
 # Diagnoses run the same few models free a thousand times: their machine code is kept for all workers, until the end.
 if "AUVNN_CACHE" not in os.environ:

@@ -34,6 +34,7 @@ from auvnn.logs import Log
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
+from auvnn.models.engine import slower
 from auvnn.models.load_arguments import GivenLog, GivenModel, as_log, as_model
 from auvnn.progress import Counted
 from auvnn.threads import on_one_thread
@@ -169,6 +170,7 @@ def searched(
     absorbed = confounded_effects(model, log)
     notes += [] if spread is None else [LEARNED]
     notes += [] if absorbed is None else absorbed.words()
+    notes += slower(known.without_absent(), windows.inputs, len(windows))
     asked = Setting(
         model=model,
         log=log,

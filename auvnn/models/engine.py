@@ -58,7 +58,12 @@ def default_engine() -> str:
 
 
 def why_not(
-    model: GreyBox, inputs: Inputs | None = None, *, gradient: bool = True, solver: str = "rk4"
+    model: GreyBox,
+    inputs: Inputs | None = None,
+    *,
+    gradient: bool = True,
+    solver: str = "rk4",
+    batch: int = 1,
 ) -> str:
     """Return why a model cannot run compiled, in words; empty where it can.
 
@@ -69,16 +74,29 @@ def why_not(
         inputs: inputs of a run, for which of them there are; without fins, voltage and altitude by default.
         gradient: with gradients in the parameters that ask for one.
         solver: one of the own solvers.
+        batch: trajectories at a time; the code for many is another one than that for one.
     """
     inputs = inputs or Inputs(torch.zeros(1, model.actuators.size, dtype=torch.float64))
     try:
         made = _made(model, inputs, gradient, TABLEAUS[solver])
         if made.code is None:
             return made.reason
-        _ready(made, model, inputs, 1)
+        _ready(made, model, inputs, batch)
     except CannotCompile as no:
         return str(no)
     return ""
+
+
+def slower(model: GreyBox, inputs: Inputs, batch: int) -> list[str]:
+    """Return in words that free running is by plain torch, and why; nothing where it is not, or was asked for.
+
+    Args:
+        model: the model.
+        inputs: inputs of a run, for which of them there are.
+        batch: trajectories at a time.
+    """
+    reason = "" if default_engine() == "torch" else why_not(model, inputs, gradient=False, batch=batch)
+    return [f"free running is by plain torch and takes several times as long: {reason}"] if reason else []
 
 
 def compiled_run(

@@ -9,12 +9,14 @@ import stat
 import pytest
 import torch
 
+import auvnn
 from auvnn.compiled import toolchain
+from auvnn.compiled.known_code import KnownCode
 from auvnn.damping.bank import DampingBank
 from auvnn.effects.base import Effect
 from auvnn.effects.hooks import Parameter
 from auvnn.errors import ConfigError
-from auvnn.models import GreyBox
+from auvnn.models import GreyBox, Inputs, model_kernels
 from auvnn.models import engine as engines
 from auvnn.vehicle import load_vehicle
 
@@ -131,6 +133,33 @@ def test_without_a_compiler_torch_runs(monkeypatch):
     assert "no C compiler" in engines.why_not(model)
     with torch.no_grad(), pytest.raises(ConfigError, match="no C compiler"):
         run(model)
+
+
+def test_a_diagnosis_by_plain_torch_says_so_and_why(monkeypatch):
+    """It gives the same names, and takes several times as long: who waits should know that a compiler is missing."""
+    model = GreyBox(load_vehicle("rov95"))
+    log = auvnn.simulate(
+        model, "multisine", "realistic", {"net_buoyancy": {"force": 8.0}}, runs=1, duration=6.0
+    ).log
+    asked = {"advice": False, "whiteness": False, "stochastic": False, "costs": False}
+    monkeypatch.setenv("AUVNN_ENGINE", "auto")
+    monkeypatch.setenv("AUVNN_CC", "none")
+    monkeypatch.setattr(model_kernels, "_MADE", KnownCode(4))
+    found = auvnn.diagnose(model, log, ["net_buoyancy"], **asked)
+    assert found.missing == ["net_buoyancy"], found.warnings
+    told = [w for w in found.warnings if w.startswith("free running is by plain torch")]
+    assert ["no C compiler" in w for w in told] == [True], found.warnings
+    # Who asked for torch need not be told.
+    inputs = Inputs(torch.zeros(1, model.actuators.size, dtype=DOUBLE))
+    assert engines.slower(model, inputs, 2)
+    monkeypatch.setenv("AUVNN_ENGINE", "torch")
+    assert engines.slower(model, inputs, 2) == []
+
+
+def test_nothing_is_said_where_it_compiles(compiler, monkeypatch):
+    monkeypatch.setenv("AUVNN_ENGINE", "auto")
+    model = GreyBox(load_vehicle("rov95"))
+    assert engines.slower(model, Inputs(torch.zeros(1, model.actuators.size, dtype=DOUBLE)), 2) == []
 
 
 @pytest.mark.parametrize("single", [True, False])

@@ -87,8 +87,7 @@ class OneStepReplay:
             drive = model.actuators.drive(
                 self.inputs.command, self.times, model.before_thrust, fins=self.inputs.fins
             )
-        self.start = torch.stack(drive.start)
-        self.mean = torch.stack([part[0] for part in drive.mean])
+        self.start, self.mean = drive.starts, drive.means[..., 0, :]
 
     def acceleration(self) -> Array:
         """Return what the sensors would report just after each row's command has begun to act, (N, 6)."""
