@@ -112,7 +112,7 @@ def projection(
     others = [n for n in base if n != effect]
     f, c = layout.of(others), layout.columns[effect]
     held = priors(layout, others, free)
-    theta = parameters_of(layout.model, others)
+    theta = _values(layout, others)
     # What is at the end of its reach cannot move further to take the candidate's share.
     movable = held.inside(theta)
     f, pull = f[movable], held.pull(theta)[movable]
@@ -121,6 +121,12 @@ def projection(
     right[f] -= pull
     left = NormalEquations(square, right).eliminate(c, f)
     return Projection(c, f, left.carry, left.equations.right, left.information)
+
+
+def _values(layout: Layout, names: Sequence[str]) -> Array:
+    """Return the values of effects and of stand-ins, which are at their nulls, joined, (P,)."""
+    each = [layout.means[n] if "@" in n else parameters_of(layout.model, [n]) for n in names]
+    return np.concatenate(each) if each else np.zeros(0)
 
 
 def _information_by_window(
@@ -198,8 +204,7 @@ def score_from_sums(
         windows: how many there are.
     """
     scale = scales(layout, effect)
-    # A stand-in is at its null, which the layout knows.
-    now = layout.means[effect] if "@" in effect else parameters_of(layout.model, [effect])
+    now = _values(layout, [effect])
     # Work in units of the plausible scale, so that one threshold tells what the log says nothing about.
     values, vectors = np.linalg.eigh(information * scale[:, None] * scale)
     seen = values > max(TINY * values.max(initial=0.0), BLIND)

@@ -105,6 +105,19 @@ def test_an_effect_with_a_shape_is_put_in_at_the_shape_that_its_test_found(monke
     assert joined[0] == "tether@0" and moved.effects[0] == "tether" and moved.by[world.at[0]] > 0.0
 
 
+def test_further_effects_are_asked_for_beside_one_that_has_a_shape(monkeypatch):
+    """A stand-in has its values at its null: it is no effect of the model under its own name."""
+    world = world_of(
+        net_buoyancy={"force": FORCE}, tether={"stiffness": 8.0, "slack": 2.0}, ocean_current={"v_north": 0.1}
+    )
+    joined: list[str] = []
+    plain = module.likely_together
+    monkeypatch.setattr(module, "likely_together", lambda *given: joined.extend(plain(*given)) or joined)
+    moved = moved_by_unnamed(world.windows, world.named, world.tested, world.base)
+    assert "tether@0" in joined[:-1] and len(joined) > 1
+    assert set(moved.effects) >= {"tether", "ocean_current"}
+
+
 def test_the_larger_of_what_is_known_to_lie_between_explanations_counts(two_causes):
     world = two_causes
     size = len(world.named.fitted.theta)
