@@ -95,6 +95,20 @@ def test_fresh_pairs_and_strangers_are_as_the_text_says():
     assert all(r["missing"] == ["cg_offset"] for r in strangers if r["verdict"] != "unknown")
 
 
+def test_strangers_run_once_more_are_as_the_text_says():
+    rows, text = rows_of("rows-strangers.jsonl"), (HERE / "README.md").read_text()
+    assert len({(r["seed"], r["hidden"], r["size"]) for r in rows}) == len(rows) == 48
+    right = [r for r in rows if r["verdict"] in ("unknown", "partial") and not r["missing"]]
+    assert f"{len(right)} of {len(rows)} are `unknown` or `partial`" in text
+    assert all(r["axis"] in r["axes_true"] for r in right)
+    wrong = [r for r in rows if r["missing"]]
+    assert [r["missing"] for r in wrong] == [["cg_offset"]] * 5
+    assert {r["size"] for r in wrong} == {"medium"}
+    kinds = sorted(r["hidden"] for r in wrong)
+    assert kinds == ["stranger_loose_mass"] * 3 + ["stranger_turn_roll"] * 2
+    assert sum(r["verdict"] == "adequate" for r in rows) == 2
+
+
 def test_logs_run_again_have_the_answers_that_the_text_says():
     def key(row):
         return tuple(row[k] for k in ("part", "hidden", "size", "seed", "vehicle"))
