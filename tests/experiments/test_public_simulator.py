@@ -1,0 +1,149 @@
+"""The study on a public simulator's REMUS 100: its logs and its model, by a stand-in with the simulator's interface."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import auvnn
+from auvnn.effects import EFFECTS
+
+HERE = Path(__file__).resolve().parents[2] / "experiments" / "public_simulator"
+# A vehicle with the interface of the simulator's class, and numbers of our own: six masses with linear drag.
+VEHICLE = """
+import numpy as np
+
+class remus100:
+    def __init__(self):
+        self.L, self.diam, self.rho, self.S, self.CD_0 = 1.5, 0.2, 1000, 0.2, 0.06
+        self.nMax, self.T_delta, self.T_n = 1500, 1.0, 1.0
+        self.A_r, self.A_s, self.CL_delta_r, self.CL_delta_s = 0.005, 0.01, 0.5, 0.7
+        self.r_bg, self.r_bb = np.array([0.0, 0.0, 0.02]), np.zeros(3)
+        self.MRB = np.diag([30.0, 30.0, 30.0, 0.2, 4.0, 4.0])
+        self.MA = np.diag([1.0, 30.0, 30.0, 0.1, 3.0, 3.0])
+        self.M = self.MRB + self.MA
+        self.Minv = np.linalg.inv(self.M)
+        self.T_heave, self.zeta_roll, self.zeta_pitch, self.w_roll, self.w_pitch = 20.0, 0.3, 0.8, 4.0, 0.9
+        self.W = self.B = 294.3
+        self.V_c = self.beta_c = 0.0
+
+    def dynamics(self, eta, nu, u_actual, u_control, sampleTime):
+        lag = np.array([self.T_delta, self.T_delta, self.T_n])
+        rudder, stern, speed = u_actual
+        force = np.array([0.04 * speed, 0.0, self.W - self.B, -6.0 * eta[3], 4.0 * stern - 6.0 * eta[4], 4.0 * rudder])
+        moved = nu + sampleTime * (self.Minv @ (force - np.diag([25.0, 40, 40, 1, 8, 8]) @ nu))
+        return moved, u_actual + sampleTime * (u_control - u_actual) / lag
+"""
+KINEMATICS = """
+import numpy as np
+
+def attitudeEuler(eta, nu, sampleTime):
+    eta[:3] += sampleTime * np.array([nu[0] * np.cos(eta[5]), nu[0] * np.sin(eta[5]), nu[2] - nu[0] * np.sin(eta[4])])
+    eta[3:] += sampleTime * nu[3:]
+    return eta
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """The study's modules, and a checkout with a stand-in for the simulator."""
+    checkout = tmp_path_factory.mktemp("checkout")
+    package = checkout / "src" / "python_vehicle_simulator"
+    for folder in (package, package / "lib", package / "vehicles"):
+        folder.mkdir(parents=True)
+        (folder / "__init__.py").write_text("")
+    (package / "vehicles" / "remus100.py").write_text(VEHICLE)
+    (package / "lib" / "gnc.py").write_text(KINEMATICS)
+    before = set(sys.modules)
+    sys.path.insert(0, str(HERE))
+    try:
+        sys.modules.pop("run", None)
+        import remus
+        import run
+
+        yield remus, run, remus.simulator(checkout)
+    finally:
+        sys.path[:] = [p for p in sys.path if p not in (str(HERE), str(checkout / "src"))]
+        for name in set(sys.modules) - before:
+            if name in ("run", "remus") or name.startswith("python_vehicle_simulator"):
+                del sys.modules[name]
+
+
+def test_a_folder_without_the_simulator_is_refused_in_one_line(study, tmp_path):
+    with pytest.raises(SystemExit, match="no python_vehicle_simulator"):
+        study[0].simulator(tmp_path)
+
+
+def test_a_run_is_a_log_that_the_package_reads(study, tmp_path, monkeypatch):
+    remus, _, module = study
+    monkeypatch.setattr(remus, "DURATION", 4.0)
+    log = auvnn.Log.read(remus.Plant(module).write(tmp_path / "log.parquet", 1))
+    assert len(log) == remus.RUNS
+    assert [len(r.t) for r in log.runs] == [81] * remus.RUNS
+    np.testing.assert_allclose(np.diff(log[0]["t"]), 0.05, atol=1e-9)
+    # The attitude is that of the same roll, pitch and yaw: a unit quaternion, and nearly level.
+    q = np.stack([log[c] for c in ("qw", "qx", "qy", "qz")])
+    np.testing.assert_allclose(np.linalg.norm(q, axis=0), 1.0, atol=1e-9)
+    assert np.abs(2 * (q[0] * q[1] + q[2] * q[3])).max() < 0.1
+
+
+def test_what_is_hidden_shows_in_the_motion_and_not_in_the_commands_that_are_logged(study, monkeypatch):
+    remus, run, module = study
+    monkeypatch.setattr(remus, "DURATION", 6.0)
+    commands = slice(14, 17)
+    plain = remus.Plant(module).run(3)
+    # The stand-in has no current, centre of gravity or fins' lift: those need the simulator itself.
+    for name in (
+        "thruster_gain",
+        "net_buoyancy",
+        "added_mass",
+        "fin_offset",
+        "fin_lag",
+        "thruster_lag",
+        "payload",
+    ):
+        other = remus.Plant(module, **run.CHANGES[name]).run(3)
+        assert np.abs(other - plain)[:, 5:14].max() > 0.003, name
+        np.testing.assert_array_equal(other[0, commands], plain[0, commands])
+    half = len(plain) // 2
+    np.testing.assert_array_equal(remus.Plant(module, **run.CHANGES["payload"]).run(3)[:half], plain[:half])
+    offset = remus.Plant(module, **run.CHANGES["gyro_bias"]).run(3) - plain
+    np.testing.assert_allclose(offset[:, 10], 0.01, atol=1e-12)
+    assert not np.delete(offset, 10, axis=1).any()
+
+
+def test_the_model_is_one_that_the_package_takes_and_has_the_vehicles_numbers(study, tmp_path):
+    remus, _, module = study
+    vehicle = remus.Plant(module).vehicle
+    assert vehicle.T_delta == vehicle.T_n == remus.LAG
+    given = remus.description(vehicle)
+    path = tmp_path / "given.yaml"
+    path.write_text(yaml.safe_dump(given))
+    model = auvnn.load(path)
+    assert sorted(model.effect_names) == sorted(given["effects"])
+    added = model.prepare().added.numpy()
+    np.testing.assert_allclose(added, vehicle.MA, atol=1e-12)
+    rigid = model.prepare().rigid.numpy()
+    np.testing.assert_allclose(np.diag(rigid), np.diag(vehicle.MRB), rtol=1e-9)
+
+
+def test_the_names_are_those_of_the_catalogue_and_the_readme_tells_what_came_out(study):
+    run = study[1]
+    assert set(run.CHANGES) - {"nothing"} <= set(EFFECTS.names())
+    expected = {r["hidden"]: r for r in json.loads((HERE / "expected.json").read_text())}
+    assert set(expected) == set(run.CHANGES)
+    text = (HERE / "README.md").read_text()
+    rows = dict(re.findall(r"^\| `?(\w+)`? \| (.*?) \|", text, re.M))
+    for name, row in expected.items():
+        said = ", then ".join(" or ".join(f"`{e}`" for e in group) for group in row["groups"])
+        assert (said or row["verdict"]) in rows[name].replace("**", ""), name
+    hidden = [r for r in expected.values() if r["hidden"] != "nothing"]
+    assert f"{sum(r['first'] for r in hidden)} of {len(hidden)} are named first" in text
+    assert all(r["first"] == (r["hidden"] in (r["groups"] or [[]])[0]) for r in expected.values())
+    assert f"| {round(float(np.median([r['seconds'] for r in expected.values()])))} s |" in text
