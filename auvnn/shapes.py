@@ -71,3 +71,12 @@ Allocation = Float[Tensor, "... 6 n"]
 
 Flag = Bool[Tensor, "..."]
 """Yes or no per sample."""
+
+Rows = Float[Tensor, "... t n"]
+"""Numbers of n parts, row by row in time."""
+
+RowShares = Float[Tensor, "... t #n"]
+"""What belongs to the same rows, of each part or of all of them."""
+
+StepShares = Float[Tensor, "... t-1 #n"]
+"""What belongs to the steps from each row to the next, of each part or of all of them."""

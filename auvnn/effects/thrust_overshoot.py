@@ -54,7 +54,7 @@ class ThrustOvershoot(Effect):
         steps = torch.cat([steps, last], dim=-2)
         ratio = steps / tau
         # The flow follows the held commands by first-order filtering, exactly.
-        gap = closing_gap(torch.exp(-ratio[..., :-1, :]), command)
+        gap = closing_gap(command, torch.exp(-ratio[..., :-1, :]))
         return command - excess * gap * _left(ratio)
 
     def follow(self, state: Tensor, command: Tensor) -> tuple[Tensor, Tensor]:

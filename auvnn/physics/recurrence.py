@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import torch
-from torch import Tensor
+
+from auvnn.shapes import Rows, RowShares, StepShares
 
 
-def first_order_recurrence(left: Tensor, added: Tensor) -> Tensor:
+def first_order_recurrence(left: RowShares, added: Rows) -> Rows:
     """Return x_k = left_k x_(k-1) + added_k with x = 0 before the first row, (..., T, n), in log2(T) steps.
 
     A loop over rows costs as many operations as there are rows, and its derivatives cost several times that.
@@ -17,6 +18,7 @@ def first_order_recurrence(left: Tensor, added: Tensor) -> Tensor:
 
     Reference: Blelloch (1990), Prefix sums and their applications, CMU-CS-90-190, section 1.4.
     """
+    left, added = torch.broadcast_tensors(left, added)
     reach = 1
     while reach < added.shape[-2]:
         here, before = slice(reach, None), slice(None, -reach)
@@ -28,14 +30,14 @@ def first_order_recurrence(left: Tensor, added: Tensor) -> Tensor:
     return added
 
 
-def closing_gap(left: Tensor, demand: Tensor) -> Tensor:
+def closing_gap(demand: Rows, left: StepShares) -> Rows:
     """Return x - demand as each row begins, (..., T, n), of what closes a share of its gap to the demand in each row.
 
     It begins at the first demand. Where the demand stays, the gap is zero to the last bit.
 
     Args:
+        demand: held over each row, (..., T, n).
         left: share of the gap that is left at the end of each row but the last, (..., T - 1, 1) or (..., T - 1, n).
-        demand: (..., T, n).
     """
-    jumps = demand[..., :-1, :] - demand[..., 1:, :]
-    return torch.cat([torch.zeros_like(demand[..., :1, :]), first_order_recurrence(left, jumps)], dim=-2)
+    gaps = first_order_recurrence(left, demand[..., :-1, :] - demand[..., 1:, :])
+    return torch.nn.functional.pad(gaps, (0, 0, 1, 0))

@@ -24,6 +24,7 @@ from auvnn.physics import (
     frames,
     inertia,
     kinematics,
+    recurrence,
     restoring,
     thrusters,
 )
@@ -120,6 +121,8 @@ CASES = {
     frames.enu_flu_quaternion: (Q,),
     energy.kinetic_energy: (M6, V6),
     energy.potential_energy: (V3, R, positive(), positive(), V3, V3),
+    recurrence.first_order_recurrence: (small(5, 3), vector(5, 3)),
+    recurrence.closing_gap: (vector(5, 3), small(4, 3)),
     matvec: (vector(4, 3), V3),
     cross: (V3, V3),
 }

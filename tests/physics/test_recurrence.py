@@ -43,12 +43,12 @@ def test_the_gap_to_a_demand_closes_as_an_exponential_does():
     left = torch.exp(-(times[1:] - times[:-1]) / tau).unsqueeze(-1)
     expected = torch.zeros(40, dtype=DOUBLE)
     expected[1:] = -torch.exp(-(times[1:] - times[1]) / tau)
-    torch.testing.assert_close(closing_gap(left, demand).squeeze(-1), expected, rtol=1e-13, atol=1e-15)
+    torch.testing.assert_close(closing_gap(demand, left).squeeze(-1), expected, rtol=1e-13, atol=1e-15)
 
 
 def test_a_demand_that_stays_leaves_no_gap_and_no_share_left_the_last_jump_alone():
     demand = torch.tensor([0.1, 0.1, 0.1, 0.7, 0.7], dtype=DOUBLE).unsqueeze(-1)
     left = torch.full((4, 1), 0.6, dtype=DOUBLE)
-    assert not closing_gap(left, demand)[:3].any()
-    assert closing_gap(0.0 * left, demand).squeeze(-1).tolist() == [0.0, 0.0, 0.0, 0.1 - 0.7, 0.0]
-    assert closing_gap(left[:0], demand[:1]).tolist() == [[0.0]]
+    assert not closing_gap(demand, left)[:3].any()
+    assert closing_gap(demand, 0.0 * left).squeeze(-1).tolist() == [0.0, 0.0, 0.0, 0.1 - 0.7, 0.0]
+    assert closing_gap(demand[:1], left[:0]).tolist() == [[0.0]]

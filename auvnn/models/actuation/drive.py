@@ -83,7 +83,7 @@ def states_of(demand: Tensor, times: Tensor, lag: Answer, substeps: int) -> tupl
     # The answer is linear in the gap between state and demand: one call for all steps tells how the gap closes.
     unit = torch.ones_like(h)
     answer = lag(unit, torch.zeros_like(h), h)
-    return demand + closing_gap((answer.end**substeps)[..., :-1, :], demand), answer
+    return demand + closing_gap(demand, (answer.end**substeps)[..., :-1, :]), answer
 
 
 def lagged(demand: Tensor, states: Tensor, answer: Response, substeps: int, warmup: int) -> Drive:

@@ -50,14 +50,10 @@ class ImprovementPage(Page):
         fall, std = finite(gain.get("value")), finite(gain.get("std"))
         errors = {stage: _main_error(view, stage) for stage in STAGES}
         idle = not_needed(gain, view.mapping("by_effect"))
-        verdict = _verdict(effects, bool(view.get("accepted")), fall, std, idle)
-        out = [verdict, *_error_words(view, effects, errors)]
-        out += common.baseline_words(view)
+        out = [_verdict(effects, bool(view.get("accepted")), fall, std, idle)]
+        out += [*_error_words(view, effects, errors), *common.baseline_words(view)]
         out += _floor_words(steps, errors)
-        fitted = view.mapping("parameters")
-        if fitted:
-            out += _fitted_words(fitted)
-        return out + _channel_words(view)
+        return [*out, *_fitted_words(view.mapping("parameters")), *_channel_words(view)]
 
     def plots(self, view: View) -> list[Plot]:
         """Return the figures."""
@@ -152,20 +148,17 @@ def _fitted_words(fitted: Mapping[str, Any]) -> list[str]:
 
 
 def _verdict(effects: str, accepted: bool, fall: float | None, std: float | None, idle: str) -> str:
-    share = None if fall is None else 100.0 * fall
-    size = interval(share, None if std is None else 100.0 * std, "% of the spread of the motion")
+    share, own = (None if x is None else 100.0 * x for x in (fall, std))
+    size = interval(share, own, "% of the spread of the motion")
     by = f" by {size}" if fall is not None else ""
+    lowers = f"Adding {effects} lowers the error on held-out data{by}"
     if accepted:
-        return (
-            f"Adding {effects} lowers the error on held-out data{by}, more than its own uncertainty: "
-            "accepted."
-        )
+        return f"{lowers}, more than its own uncertainty: accepted."
     if idle:
-        return f"Adding {effects} lowers the error on held-out data{by}, but {idle}. Not accepted as it is."
+        return f"{lowers}, but {idle}. Not accepted as it is."
     if fall is not None and fall <= 0:
-        gain = f"(gain {size})"
-        return f"Adding {effects} does not lower the error on held-out data {gain}: not accepted."
-    return f"Adding {effects} lowers the error on held-out data{by}, no more than chance could: not accepted."
+        return f"Adding {effects} does not lower the error on held-out data (gain {size}): not accepted."
+    return f"{lowers}, no more than chance could: not accepted."
 
 
 def _error_words(view: View, effects: str, errors: Mapping[str, float | None]) -> list[str]:
