@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 
 STEP, RATE, RUNS, DURATION = 0.01, 20, 3, 60.0
+# The vehicle has changed between commits: other limits, areas and damping, and a stern plane with the opposite sign.
+COMMIT = "25b1e153fd4b694706f7059e4662eaab97c39ee0"
 # The class has lags of 1 s on fins and propeller; newer versions of its MATLAB original have a tenth of that.
 LAG = 0.1
 # Propeller of the class, whose numbers stand inside its `dynamics`: diameter, K_T at J = 0 and 0.6632, wake, deduction.
@@ -25,34 +27,31 @@ NOISE = {
     "depth": 0.01,
 }
 COLUMNS = (
-    "qw",
-    "qx",
-    "qy",
-    "qz",
-    "u",
-    "v",
-    "w",
-    "p",
-    "q",
-    "r",
-    "x",
-    "y",
-    "z",
-    "thruster_1",
-    "fin_1",
-    "fin_2",
+    *("qw", "qx", "qy", "qz", "u", "v", "w", "p", "q", "r", "x", "y", "z"),
+    *("thruster_1", "fin_1", "fin_2"),
 )
-# The moments of the settings are drawn; their sizes are these: heading, rad, depth, m, and revolutions per minute.
+# Ends between which settings are drawn: change of heading, rad, change of depth, m, and revolutions per minute.
 SETTINGS = ((-1.5, 1.5), (-3.0, 4.0), (700.0, 1500.0))
 
 
 def simulator(folder: Path) -> Any:
-    """Return the module of the vehicle from a checkout of the simulator."""
+    """Return the module of the vehicle from a checkout of the simulator; another version of the vehicle is refused."""
     for place in (folder, folder / "src"):
         if (place / "python_vehicle_simulator" / "vehicles" / "remus100.py").exists():
             sys.path.insert(0, str(place))
-            return importlib.import_module("python_vehicle_simulator.vehicles.remus100")
+            module = importlib.import_module("python_vehicle_simulator.vehicles.remus100")
+            if not _is_known(module.remus100()):
+                raise SystemExit(f"{folder}: another version of the vehicle; git checkout {COMMIT}")
+            return module
     raise SystemExit(f"{folder}: no python_vehicle_simulator/vehicles/remus100.py in it or in its src")
+
+
+def _is_known(vehicle: Any) -> bool:
+    """Return whether limits and lags are those that the model file is written for, and a stern plane lifts the bow."""
+    state, actual = np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.1, 1000.0])
+    moved, _ = vehicle.dynamics(np.zeros(6), state, actual, actual, STEP)
+    limits = (vehicle.deltaMax_r, vehicle.deltaMax_s, vehicle.T_delta, vehicle.T_n)
+    return bool(np.allclose(limits, (math.pi / 6, math.pi / 6, 1.0, 1.0)) and moved[4] > 0.0)
 
 
 class Plant:
@@ -74,19 +73,24 @@ class Plant:
         sensors: Callable[[np.ndarray], np.ndarray] | None = None,
         later: Callable[[Any], None] | None = None,
     ) -> None:
-        """Make the vehicle."""
+        """Keep what is changed: each run has a vehicle of its own."""
         self.kinematics = importlib.import_module(f"{module.__name__.split('.')[0]}.lib.gnc").attitudeEuler
-        self.vehicle = module.remus100()
-        self.vehicle.T_delta = self.vehicle.T_n = LAG
-        if change is not None:
-            change(self.vehicle)
+        self.module, self.change = module, change
         self.command = command or (lambda given: given)
         self.sensors = sensors or (lambda nu: nu)
         self.later = later
 
+    def vehicle(self) -> Any:
+        """Return a new vehicle, as it is when a run begins."""
+        made = self.module.remus100()
+        made.T_delta = made.T_n = LAG
+        if self.change is not None:
+            self.change(made)
+        return made
+
     def run(self, seed: int) -> np.ndarray:
-        """Return the rows of one run, (samples, 1 + columns): the autopilot holds headings, depths and speeds in turn."""
-        rng = np.random.default_rng(seed)
+        """Return the rows of one run, (samples, 1 + columns): the autopilot holds headings and depths in turn."""
+        vehicle, rng = self.vehicle(), np.random.default_rng(seed)
         eta, nu = np.array([0.0, 0.0, 8.0, 0.0, 0.0, rng.uniform(-3, 3)]), np.array([1.2, 0, 0, 0, 0, 0])
         actual, integral = np.array([0.0, 0.0, 1000.0]), np.zeros(2)
         until = rng.uniform(6, 14, 20).cumsum()
@@ -97,14 +101,12 @@ class Plant:
         for i in range(steps + 1):
             t = i * STEP
             if self.later is not None and i == steps // 2:
-                self.later(self.vehicle)
+                self.later(vehicle)
             heading, depth, speed = aims[int(np.searchsorted(until, t))]
             given = _autopilot(eta, nu, heading, depth, speed, integral, rng)
             if i % every == 0:
-                rows.append(
-                    [t, *_measured(eta, self.sensors(nu), rng), given[2] / self.vehicle.nMax, *given[:2]]
-                )
-            moved, actual = self.vehicle.dynamics(eta, nu, actual, self.command(given), STEP)
+                rows.append([t, *_measured(eta, self.sensors(nu), rng), given[2] / vehicle.nMax, *given[:2]])
+            moved, actual = vehicle.dynamics(eta, nu, actual, self.command(given), STEP)
             eta, nu = self.kinematics(eta, nu, STEP), moved
         return np.array(rows)
 
@@ -129,7 +131,7 @@ def _autopilot(
     integral: np.ndarray,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Return rudder, stern plane, rad, and revolutions per minute; it sees what sensors report, and not the truth."""
+    """Return rudder, stern plane, rad, and revolutions per minute; it sees states with noise of their own."""
     seen = eta[2:6] + rng.standard_normal(4) * [
         NOISE["depth"],
         NOISE["tilt"],
@@ -233,3 +235,36 @@ def description(vehicle: Any) -> dict[str, Any]:
         "uncertainty": {"added_mass": 0.1, "linear_damping": 0.3, "quadratic_damping": 0.3, "inertia": 0.05},
         "source": "PythonVehicleSimulator, remus100.py",
     }  # fmt: skip
+
+
+def disagreement(vehicle: Any, model: Any, count: int = 400) -> list[float]:
+    """Return the difference of the model's forces from the class's, as shares of these (rms), X to N, lags aside.
+
+    Args:
+        vehicle: of the simulator.
+        model: of the same vehicle, without lags.
+        count: states that are drawn: 0.8 to 2.2 m/s ahead, 0.15 m/s across, 0.2 rad/s, 0.3 rad, fins at 0.2 rad.
+    """
+    import torch
+
+    from auvnn.models import Inputs
+    from auvnn.physics.attitude import euler_to_quat, quat_to_matrix
+
+    rng, forces = np.random.default_rng(0), []
+    full = model.vehicle.thrusters[0].max_forward
+    for _ in range(count):
+        nu = np.array([rng.uniform(0.8, 2.2), *rng.normal(0, 0.15, 2), *rng.normal(0, 0.2, 3)])
+        eta = np.array([0.0, 0.0, 8.0, *rng.normal(0, 0.3, 2), rng.uniform(-3, 3)])
+        actual = np.array([*rng.normal(0, 0.2, 2), rng.uniform(700, 1500)])
+        moved, _ = vehicle.dynamics(eta.copy(), nu.copy(), actual, actual, STEP)
+        share = actual[2] / vehicle.nMax
+        at, speed, command, thrust, fins, now = (
+            torch.tensor(x, dtype=torch.float64)
+            for x in (eta, nu, [share], [full * share**2], actual[:2], 0.0)
+        )
+        turned = quat_to_matrix(euler_to_quat(at[3:]))
+        with torch.no_grad():
+            mine = model.nu_dot(at[:3], turned, speed, thrust, Inputs(command, fins), now).numpy()
+        forces.append(vehicle.M @ np.stack([mine, (moved - nu) / STEP], axis=1))
+    mine, theirs = np.stack(forces).transpose(2, 0, 1)
+    return (np.sqrt(((mine - theirs) ** 2).mean(0)) / np.sqrt((theirs**2).mean(0))).tolist()

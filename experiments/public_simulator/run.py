@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import yaml
-from remus import Plant, description, simulator
+from remus import Plant, description, disagreement, simulator
 
 import auvnn
 
@@ -25,12 +25,15 @@ FITTED = ("linear_damping", "quadratic_damping", "coupled_damping")
 def _set(**values: Any) -> Callable[[Any], None]:
     def change(vehicle: Any) -> None:
         for name, value in values.items():
+            # A number that the class does not have would hide nothing.
+            if not hasattr(vehicle, name):
+                raise SystemExit(f"the simulator's vehicle has no {name}")
             setattr(vehicle, name, value)
 
     return change
 
 
-def _heavier(vehicle: Any) -> None:
+def _buoyant(vehicle: Any) -> None:
     vehicle.B = vehicle.W + 3.0
 
 
@@ -70,7 +73,7 @@ CHANGES: dict[str, dict[str, Any]] = {
     "nothing": {},
     "ocean_current": {"change": _set(V_c=0.3, beta_c=1.0)},
     "thruster_gain": {"command": lambda given: given * [1.0, 1.0, 0.8**0.5]},
-    "net_buoyancy": {"change": _heavier},
+    "net_buoyancy": {"change": _buoyant},
     "added_mass": {"change": _more_added_mass},
     "cg_offset": {"change": _off_centre},
     "quadratic_damping": {"change": _more_drag},
@@ -88,7 +91,15 @@ def fitted(module: Any, out: Path) -> Path:
     """Return the model of the vehicle as its user would have it: fitted to a log in which nothing is hidden."""
     folder = out / "model"
     if not folder.exists():
-        (out / "given.yaml").write_text(yaml.safe_dump(description(Plant(module).vehicle), sort_keys=False))
+        vehicle = Plant(module).vehicle()
+        given = description(vehicle)
+        (out / "given.yaml").write_text(yaml.safe_dump(given, sort_keys=False))
+        plain = auvnn.load(str(out / "given.yaml")).without_absent()
+        effects = [e for e in plain.copied_effects() if e.name not in ("thruster_lag", "fin_lag")]
+        shares = zip("XYZKMN", disagreement(vehicle, plain.rebuilt(effects)), strict=True)
+        print(
+            "forces of the model, off by: " + ", ".join(f"{k} {100 * x:.0f} %" for k, x in shares), flush=True
+        )
         log = auvnn.Log.read(Plant(module).write(out / "clean.parquet", 1))
         better = auvnn.add(str(out / "given.yaml"), log, list(FITTED))
         steps = ", ".join(f"{s['step']} {s['error']:.3f}" for s in better.waterfall if s["error"] is not None)
@@ -99,9 +110,12 @@ def fitted(module: Any, out: Path) -> Path:
 
 def main(checkout: str, out: Path, wanted: list[str]) -> None:
     """Hide each change in turn and print what is said of it."""
+    unknown = sorted({*wanted} - {*CHANGES})
+    if unknown:
+        raise SystemExit(f"{', '.join(unknown)}: no such change; there are {', '.join(CHANGES)}")
     module = simulator(Path(checkout))
     out.mkdir(parents=True, exist_ok=True)
-    model, rows = fitted(module, out), []
+    model = fitted(module, out)
     for k, (name, plant) in enumerate(CHANGES.items()):
         if wanted and name not in wanted:
             continue
@@ -109,20 +123,18 @@ def main(checkout: str, out: Path, wanted: list[str]) -> None:
         began = time.monotonic()
         found = auvnn.diagnose(str(model), log)
         groups = [s["effects"] for s in found.steps if s["effects"]]
-        rows.append(
-            {
-                "hidden": name,
-                "verdict": found.verdict,
-                "groups": groups,
-                "first": bool(groups) and name in groups[0],
-                "seconds": round(time.monotonic() - began, 1),
-            }
-        )
+        row = {
+            "hidden": name,
+            "verdict": found.verdict,
+            "groups": groups,
+            "first": bool(groups) and name in groups[0],
+            "seconds": round(time.monotonic() - began, 1),
+        }
         said = ", then ".join(" or ".join(g) for g in groups) or found.verdict
-        print(f"{name:<18} {said} ({found.verdict}, {rows[-1]['seconds']:.0f} s)", flush=True)
+        print(f"{name:<18} {said} ({found.verdict}, {row['seconds']:.0f} s)", flush=True)
         done = out / "answers.json"
         known = json.loads(done.read_text()) if done.exists() else []
-        kept = [r for r in known if r["hidden"] != name] + [rows[-1]]
+        kept = [r for r in known if r["hidden"] != name] + [row]
         done.write_text(json.dumps(kept, indent=1) + "\n")
 
 

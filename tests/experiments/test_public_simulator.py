@@ -23,6 +23,7 @@ class remus100:
     def __init__(self):
         self.L, self.diam, self.rho, self.S, self.CD_0 = 1.5, 0.2, 1000, 0.2, 0.06
         self.nMax, self.T_delta, self.T_n = 1500, 1.0, 1.0
+        self.deltaMax_r = self.deltaMax_s = np.pi / 6
         self.A_r, self.A_s, self.CL_delta_r, self.CL_delta_s = 0.005, 0.01, 0.5, 0.7
         self.r_bg, self.r_bb = np.array([0.0, 0.0, 0.02]), np.zeros(3)
         self.MRB = np.diag([30.0, 30.0, 30.0, 0.2, 4.0, 4.0])
@@ -80,6 +81,32 @@ def test_a_folder_without_the_simulator_is_refused_in_one_line(study, tmp_path):
         study[0].simulator(tmp_path)
 
 
+@pytest.mark.parametrize(("name", "value"), [("deltaMax_r", 0.26), ("T_n", 0.1), ("Minv", -np.eye(6))])
+def test_another_version_of_the_vehicle_is_refused(study, monkeypatch, name, value):
+    """Later ones have other limits, lags, and a stern plane with the opposite sign."""
+    remus, _, module = study
+    vehicle = module.remus100()
+    assert remus._is_known(vehicle)
+    setattr(vehicle, name, value)
+    assert not remus._is_known(vehicle)
+    checkout = Path(module.__file__).parents[2]
+    monkeypatch.setattr(module, "remus100", lambda: vehicle)
+    with pytest.raises(SystemExit, match=f"another version of the vehicle; git checkout {remus.COMMIT}"):
+        remus.simulator(checkout)
+
+
+def test_a_number_that_the_vehicle_does_not_have_hides_nothing_and_is_refused(study):
+    remus, run, module = study
+    with pytest.raises(SystemExit, match="no V_cc"):
+        remus.Plant(module, change=run._set(V_cc=0.3)).vehicle()
+
+
+def test_a_change_that_there_is_not_is_refused_before_anything_is_run(study, tmp_path):
+    with pytest.raises(SystemExit, match="fin_gian: no such change; there are nothing, ocean_current"):
+        study[1].main(str(tmp_path / "nowhere"), tmp_path / "out", ["fin_gian"])
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_run_is_a_log_that_the_package_reads(study, tmp_path, monkeypatch):
     remus, _, module = study
     monkeypatch.setattr(remus, "DURATION", 4.0)
@@ -112,15 +139,21 @@ def test_what_is_hidden_shows_in_the_motion_and_not_in_the_commands_that_are_log
         assert np.abs(other - plain)[:, 5:14].max() > 0.003, name
         np.testing.assert_array_equal(other[0, commands], plain[0, commands])
     half = len(plain) // 2
+    # Each run has a vehicle of its own: what is taken up in one is not there when the next begins.
+    again = remus.Plant(module, **run.CHANGES["payload"])
+    np.testing.assert_array_equal(again.run(3), again.run(3))
     np.testing.assert_array_equal(remus.Plant(module, **run.CHANGES["payload"]).run(3)[:half], plain[:half])
     offset = remus.Plant(module, **run.CHANGES["gyro_bias"]).run(3) - plain
     np.testing.assert_allclose(offset[:, 10], 0.01, atol=1e-12)
     assert not np.delete(offset, 10, axis=1).any()
+    scaled = remus.Plant(module, **run.CHANGES["velocity_scale"]).run(3) - plain
+    assert np.abs(scaled[:, 5]).max() > 0.03
+    assert not np.delete(scaled, [5, 6, 7], axis=1).any()
 
 
 def test_the_model_is_one_that_the_package_takes_and_has_the_vehicles_numbers(study, tmp_path):
     remus, _, module = study
-    vehicle = remus.Plant(module).vehicle
+    vehicle = remus.Plant(module).vehicle()
     assert vehicle.T_delta == vehicle.T_n == remus.LAG
     given = remus.description(vehicle)
     path = tmp_path / "given.yaml"
@@ -139,11 +172,21 @@ def test_the_names_are_those_of_the_catalogue_and_the_readme_tells_what_came_out
     expected = {r["hidden"]: r for r in json.loads((HERE / "expected.json").read_text())}
     assert set(expected) == set(run.CHANGES)
     text = (HERE / "README.md").read_text()
-    rows = dict(re.findall(r"^\| `?(\w+)`? \| (.*?) \|", text, re.M))
+    rows = {
+        n: (said, s) for n, said, s in re.findall(r"^\| `?(\w+)`? \| (.*?) \| .* \| (\d+) \|$", text, re.M)
+    }
+    assert set(rows) == set(expected)
     for name, row in expected.items():
         said = ", then ".join(" or ".join(f"`{e}`" for e in group) for group in row["groups"])
-        assert (said or row["verdict"]) in rows[name].replace("**", ""), name
+        assert rows[name][0].replace("**", "") == (said or row["verdict"]), name
+        assert rows[name][1] == f"{row['seconds']:.0f}"
     hidden = [r for r in expected.values() if r["hidden"] != "nothing"]
-    assert f"{sum(r['first'] for r in hidden)} of {len(hidden)} are named first" in text
+    first = [r for r in hidden if r["first"]]
+    assert f"{len(first)} of {len(hidden)} are named first" in text
+    alone = sum(len(r["groups"][0]) == 1 for r in first)
+    assert f"{alone} alone, {len(first) - alone} in a group" in text
+    wrong = [r for r in expected.values() if r["groups"] and not r["first"]]
+    assert {r["groups"][0][0] for r in wrong} == {"fin_stall"}
+    assert f"{len(wrong)} of {len(expected)}, if `fin_stall` counts as wrong" in text
     assert all(r["first"] == (r["hidden"] in (r["groups"] or [[]])[0]) for r in expected.values())
     assert f"| {round(float(np.median([r['seconds'] for r in expected.values()])))} s |" in text
