@@ -121,19 +121,31 @@ def parameter_rows(fitted: Any) -> list[list[str]]:
 
 
 def not_needed(gain: Any, by_effect: Any) -> str:
-    """Return in words which of several effects adds nothing; empty where each does, or where all of them bring nothing.
+    """Return in words which of several effects does not add to the others; empty where that is not why none is accepted.
 
     Args:
         gain: fall of the held-out error by all of them, {value, std}.
         by_effect: effect to what it brings in addition to the others, see `improvement.json`.
     """
-    idle = [str(name) for name, entry in by_effect.items() if not entry.get("accepted")]
-    fall, std = gain.get("value"), gain.get("std")
-    if not idle or None in (fall, std) or not fall > std:
+    idle = {str(name): entry["gain"] for name, entry in by_effect.items() if not entry["accepted"]}
+    if not idle or not _finite(gain) or not gain["value"] > gain["std"]:
         return ""
-    if len(idle) == 1:
-        return f"{idle[0]} adds nothing to what the others bring: leave it out"
-    return f"{', '.join(idle)} each add nothing to what the others bring: leave one of them out"
+    unjudged = [name for name, own in idle.items() if not _finite(own)]
+    if unjudged:
+        return f"what {', '.join(unjudged)} would add to the others could not be judged"
+    if len(idle) > 1:
+        return f"{', '.join(idle)} do not add to what the others bring: leave one of them out"
+    ((name, own),) = idle.items()
+    does = (
+        "makes the prediction worse"
+        if own["value"] < -own["std"]
+        else "adds nothing to what the others bring"
+    )
+    return f"{name} {does}: leave it out"
+
+
+def _finite(gain: Any) -> bool:
+    return all(x is not None and math.isfinite(x) for x in (gain.get("value"), gain.get("std")))
 
 
 def _safe(text: Any) -> str:

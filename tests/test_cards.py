@@ -75,6 +75,16 @@ def test_answers_of_the_fits_say_themselves(model, made):
     assert "accepted" in repr(better) and "95 % interval" in better._repr_html_()
     for answer in (diagnosis, better):
         assert isinstance(answer.plot(), Figure) and len(repr(answer)) < 200
+    own = {
+        "a": {"gain": {"value": 0.1, "std": 0.01}, "accepted": True},
+        "b": {"gain": {"value": 0.0, "std": 0.01}},
+    }
+    idle = replace(
+        better,
+        gain={"value": 0.1, "std": 0.01},
+        by_effect={k: {"accepted": False, **v} for k, v in own.items()},
+    )
+    assert "b adds nothing to what the others bring: leave it out" in idle._repr_html_()
     # What was fitted says how sure it is, also of the model that is handed on.
     assert "±" in better.model._repr_html_()
 
@@ -196,20 +206,21 @@ def test_a_neutral_vehicle_is_called_neutral(model):
 @pytest.mark.parametrize(
     ("fall", "bring", "words"),
     [
-        (0.1, {"a": True, "b": True}, ""),
-        (0.1, {"a": True, "b": False}, "b adds nothing to what the others bring: leave it out"),
-        (
-            0.1,
-            {"a": False, "b": False},
-            "a, b each add nothing to what the others bring: leave one of them out",
-        ),
-        (0.005, {"a": True, "b": False}, ""),
-        (None, {"a": True, "b": False}, ""),
+        (0.1, {"a": 0.1, "b": 0.1}, ""),
+        (0.1, {"a": 0.1, "b": 0.002}, "b adds nothing to what the others bring: leave it out"),
+        (0.1, {"a": 0.1, "b": -0.002}, "b adds nothing to what the others bring: leave it out"),
+        (0.1, {"a": 0.1, "b": -0.05}, "b makes the prediction worse: leave it out"),
+        # Two that do not add may be two names of one thing: one of them is left out, not both.
+        (0.1, {"a": 0.0, "b": 0.0}, "a, b do not add to what the others bring: leave one of them out"),
+        (0.1, {"a": 0.1, "b": None}, "what b would add to the others could not be judged"),
+        (0.1, {"a": 0.1, "b": float("nan")}, "what b would add to the others could not be judged"),
+        (0.005, {"a": 0.1, "b": 0.0}, ""),
+        (None, {"a": 0.1, "b": 0.0}, ""),
     ],
 )
-def test_an_effect_that_adds_nothing_is_told_where_all_together_lower_the_error(fall, bring, words):
-    """Two that each add nothing may be two names of one thing: one of them is left out, not both."""
-    assert (
-        not_needed({"value": fall, "std": 0.01}, {n: {"accepted": pays} for n, pays in bring.items()})
-        == words
-    )
+def test_an_effect_that_does_not_add_is_told_where_all_together_lower_the_error(fall, bring, words):
+    own = {
+        name: {"gain": {"value": value, "std": 0.01}, "accepted": value is not None and value > 0.01}
+        for name, value in bring.items()
+    }
+    assert not_needed({"value": fall, "std": 0.01}, own) == words

@@ -113,10 +113,13 @@ def words(layout: Layout, found: FittedHypothesis, judged: Judged) -> list[str]:
         for name, entry in judged.by_effect.items():
             if not entry["accepted"]:
                 own = entry["gain"]
-                out.append(
-                    f"{name} does not improve the prediction: in addition to the others it lets the held-out error "
-                    f"fall by {own['value']:.3g}, with an uncertainty of {own['std']:.3g}; leave it out"
+                fall = (
+                    f"in addition to the others it lets the held-out error fall by {own['value']:.3g}, with an "
+                    f"uncertainty of {own['std']:.3g}"
                 )
+                if not np.isfinite(own["value"]):
+                    fall = "without it free running grows without bound, so that its share cannot be judged"
+                out.append(f"{name} is not known to improve the prediction: {fall}")
     out += reservations(layout, found, found.names)
     covariance = found.fitted.covariance()
     size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))

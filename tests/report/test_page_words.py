@@ -87,7 +87,7 @@ def test_improvement_says_whether_it_was_accepted(unseen, accepted, words):
         ),
         (
             ["fin_gain", "body_lift"],
-            "fin_gain, body_lift each add nothing to what the others bring: leave one",
+            "fin_gain, body_lift do not add to what the others bring: leave one",
         ),
         ([], "no more than chance could: not accepted."),
     ],
@@ -95,7 +95,9 @@ def test_improvement_says_whether_it_was_accepted(unseen, accepted, words):
 def test_an_effect_that_adds_nothing_is_said_to_be_what_is_not_accepted(unseen, idle, words):
     """The error falls by far more than chance could; only one of the effects has no part in that."""
     names = ["ocean_current", "fin_gain", "body_lift"]
-    own = {n: {"gain": {"value": 0.1, "std": 0.01}, "accepted": n not in idle} for n in names}
+    own = {
+        n: {"gain": {"value": 0.1 * (n not in idle), "std": 0.01}, "accepted": n not in idle} for n in names
+    }
     fall = {"value": 0.1, "std": 0.01}
     answer = improvement(60, accepted=False, effects=names, gain=fall, by_effect=own)
     assert words in PageText(drawer("improvement").page(answer)).text

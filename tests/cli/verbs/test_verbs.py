@@ -172,6 +172,23 @@ def test_add_then_remove(report, auvnn, made):
     assert after.rollout["5"]["total"] < 0.1
 
 
+def test_add_says_which_effect_adds_nothing(auvnn, made, monkeypatch, tmp_path):
+    """All together lower the error by far: it is one of them that is not accepted."""
+    monkeypatch.chdir(tmp_path)
+    words = ["model=rov95", f"log={made / 'log.parquet'}", "effect=[ocean_current,gyro_bias]", "out=both"]
+    status, out, _ = auvnn("add", *words)
+    assert status == 0
+    (verdict,) = (line for line in out.splitlines() if line.startswith("result "))
+    answer = json.loads(Path("both/improvement.json").read_text())
+    assert (
+        answer["by_effect"]["ocean_current"]["accepted"] and not answer["by_effect"]["gyro_bias"]["accepted"]
+    )
+    assert answer["gain"]["value"] > answer["gain"]["std"] and not answer["accepted"]
+    assert "not accepted: gyro_bias" in verdict and "leave it out" in verdict
+    assert "does not fall enough" not in verdict
+    assert "gyro_bias is not known to improve the prediction" in out
+
+
 def test_train(report, made):
     answer = report("train", "model=rov95", f"log={made / 'log.parquet'}", "damping=polynomial")
     assert answer["schema"] == "auvnn/training/1" and answer["metrics"]
