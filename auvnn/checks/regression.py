@@ -74,7 +74,7 @@ def _of_run(model: GreyBox, run: Run, how: Derivative) -> tuple[Array, Array, Ar
     with torch.no_grad():
         effects = [e for e in model.before_thrust if "delay" not in e.hooks()]
         times, held = torch.tensor(run.t), torch.tensor(np.nan_to_num(command))
-        thrust = torch.stack(model.actuators.drive(held, times, effects).start).numpy()
+        thrust = model.actuators.drive(held, times, effects).starts.numpy()
     down = rotate(conjugate(run.quaternion), np.broadcast_to([0.0, 0.0, 1.0], (run.samples, 3)))
     nu = run.nu
     velocity = np.concatenate([nu, np.abs(nu) * nu], axis=1)

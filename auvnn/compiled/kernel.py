@@ -141,8 +141,8 @@ class Kernel:
         Raises:
             CannotCompile: the code was made for inputs of other sizes, and would read beyond them.
         """
-        (_, first), *_, _ = self.layout.inputs
-        if (mean.shape[-1], 1 + row.shape[-1]) != (first, self.layout.width - (first or 1)):
+        first, *held, _ = (1 if size is None else size for _, size in self.layout.inputs)
+        if (mean.shape[-1], row.shape[-1]) != (first, sum(held)):
             raise CannotCompile(
                 f"{mean.shape[-1]} and {row.shape[-1]} numbers as inputs of {self.layout.inputs}"
             )

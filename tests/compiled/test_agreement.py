@@ -190,7 +190,7 @@ def test_a_diverging_run_is_reported_as_by_torch(compiler):
     assert one.diverged
 
 
-@pytest.mark.parametrize("more", [(1, 0), (0, 1)])
+@pytest.mark.parametrize("more", [(1, 0), (0, 1), (-1, 0), (0, -1)])
 def test_inputs_of_other_sizes_are_refused_and_not_read_from_elsewhere(compiler, more):
     """The code steps through memory by the sizes that it was made for."""
     model = GreyBox(load_vehicle("rov95"), actuation="wrench")

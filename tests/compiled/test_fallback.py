@@ -11,6 +11,7 @@ import torch
 
 import auvnn
 from auvnn.compiled import toolchain
+from auvnn.compiled.kernel import LANES
 from auvnn.compiled.known_code import KnownCode
 from auvnn.damping.bank import DampingBank
 from auvnn.effects.base import Effect
@@ -156,10 +157,15 @@ def test_a_diagnosis_by_plain_torch_says_so_and_why(monkeypatch):
     assert engines.slower(model, inputs, 2) == []
 
 
-def test_nothing_is_said_where_it_compiles(compiler, monkeypatch):
+def test_nothing_is_said_where_it_compiles_and_only_what_will_run_is_compiled(compiler, monkeypatch):
     monkeypatch.setenv("AUVNN_ENGINE", "auto")
+    monkeypatch.setattr(model_kernels, "_MADE", KnownCode(4))
+    monkeypatch.setattr(model_kernels, "_KERNELS", {})
     model = GreyBox(load_vehicle("rov95"))
     assert engines.slower(model, Inputs(torch.zeros(1, model.actuators.size, dtype=DOUBLE)), 2) == []
+    (kernel,) = model_kernels._KERNELS.values()
+    # The code for many trajectories is another one than that for one.
+    assert list(kernel._loaded) == [LANES]
 
 
 @pytest.mark.parametrize("single", [True, False])
