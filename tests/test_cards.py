@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -197,8 +199,6 @@ def test_a_run_that_is_not_there_is_named(made):
 
 def test_a_neutral_vehicle_is_called_neutral(model):
     """10 kg times 9.81 m/s2 is 98.1 N but for the last digit."""
-    from dataclasses import replace
-
     v = replace(model.vehicle, mass=10.0, gravity=9.81, buoyancy=98.1)
     assert v.weight != v.buoyancy and "+0 N, neutral" in v.summary()
 
