@@ -43,6 +43,7 @@ EFFECTS = Catalogue(
         "thrust_polynomial": "auvnn.effects.thrust_polynomial:ThrustPolynomial",
         "thruster_deadband": "auvnn.effects.thruster_deadband:ThrusterDeadband",
         "thruster_lag": "auvnn.effects.thruster_lag:ThrusterLag",
+        "propeller_lag": "auvnn.effects.propeller_lag:PropellerLag",
         "thrust_overshoot": "auvnn.effects.thrust_overshoot:ThrustOvershoot",
         "turning_forces": "auvnn.effects.turning_forces:TurningForces",
         "tilted_vertical": "auvnn.effects.tilted_vertical:TiltedVertical",

@@ -22,7 +22,7 @@ class ActuationDelay(Effect):
     cause = "the thrust comes a fixed time after its command"
     symbol = "T_d"
     reference = "Ljung (1999), System Identification, section 4.2"
-    confused_with = ("thruster_lag", "added_mass", "fin_lag")
+    confused_with = ("thruster_lag", "propeller_lag", "added_mass", "fin_lag")
     manoeuvre = "chirp"
     told_apart_by = "steps and swept sines"
     plainer = ("thruster_lag",)

@@ -27,11 +27,11 @@ class ThrustOvershoot(Effect):
     cause = "thrust is larger at first and falls back as the flow develops"
     symbol = "kappa_T"
     reference = "Healey, Rock, Cody, Miles and Brown (1995), IEEE JOE 20(4)"
-    confused_with = ("thruster_lag", "added_mass")
+    confused_with = ("thruster_lag", "propeller_lag", "added_mass")
     manoeuvre = "pulses"
     told_apart_by = "steps from rest, held for several seconds"
-    plainer = ("thruster_lag",)
-    contains: ClassVar = {"thruster_lag": ("time_constant",)}
+    plainer = ("thruster_lag", "propeller_lag")
+    contains: ClassVar = {"thruster_lag": ("time_constant",), "propeller_lag": ("time_constant",)}
     remembers = True
 
     @classmethod

@@ -24,7 +24,7 @@ class ThrusterLag(Effect):
     cause = "the thrust follows its demand with a lag"
     symbol = "tau_T"
     reference = "Yoerger, Cooke and Slotine (1990), IEEE JOE 15(3)"
-    confused_with = ("actuation_delay", "added_mass", "thrust_overshoot")
+    confused_with = ("actuation_delay", "propeller_lag", "added_mass", "thrust_overshoot")
     manoeuvre = "chirp"
     told_apart_by = "steps and swept sines"
 

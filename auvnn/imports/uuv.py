@@ -76,10 +76,7 @@ class UuvSource:
             data["thrusters"] = thrusters
             lags = [self._lag(p, reader) for p in root.iter("plugin") if p.find("dynamics") is not None]
             if lags and all(lag == lags[0] and lag > 0 for lag in lags):
-                data["effects"] = {"thruster_lag": {"time_constant": lags[0]}}
-                reader.unread.append(
-                    "rotor dynamics: the time constant of the rotors is taken as one of the thrust"
-                )
+                data["effects"] = {"propeller_lag": {"time_constant": lags[0]}}
             elif any(lags):
                 reader.unread.append("rotor dynamics: time constants that differ between thrusters")
         return data

@@ -13,6 +13,7 @@ from auvnn.testing import example_vehicle
 
 LAG = {"thruster_lag": {"time_constant": 0.15}}
 LATE = {"actuation_delay": {"delay": 0.13}}
+TURNING = {"propeller_lag": {"time_constant": 0.2}}
 OVER = {"thrust_overshoot": {"time_constant": 0.8, "thruster_1": 0.4, "thruster_3": -0.2}}
 VEHICLES = ("bluerov2", "bluerov2_heavy", "remus100", "rov90", "rov95")
 OTHERS = ("networks", "actuators", "everything", "payload")
@@ -43,7 +44,7 @@ def model(name):
             "thrust_curve": {"thruster_1_positive": 0.8},
             "thrust_polynomial": {"thruster_2_degree_2": 0.1, "thruster_3_degree_3": -0.1},
         }
-        return load("bluerov2").with_effects({**LAG, **LATE, **OVER, **more})
+        return load("bluerov2").with_effects({**LAG, **LATE, **TURNING, **OVER, **more})
     if name == "payload":
         held = {"time": 10.0, "mass": 2.0, "x": 0.2, "buoyancy": 5.0, "X": 1.3}
         return load("rov90").with_effects(

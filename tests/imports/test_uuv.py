@@ -85,7 +85,7 @@ def test_geometry_is_turned_and_derivatives_are_not(put):
     assert np.allclose(one.position, [-0.5, -0.3, -0.1]) and np.allclose(one.direction, [0, -1, 0])
     assert (one.max_forward, one.max_reverse) == (pytest.approx(100.0), pytest.approx(25.0))
     assert np.allclose(two.direction, [0, 0, -1]) and two.curve.thrust.tolist() == [-30, 0, 40]
-    assert v.effects == {"thruster_lag": {"time_constant": 0.2}}
+    assert v.effects == {"propeller_lag": {"time_constant": 0.2}}
     said = " ".join(found.unread)
     assert "linear_damping_forward_speed" in said and "two_joint: without clampMax" in said
     found.model.linearise(torch.zeros(12, dtype=torch.float64), torch.zeros(2, dtype=torch.float64))

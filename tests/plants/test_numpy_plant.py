@@ -24,7 +24,7 @@ VEHICLES = ("rov95", "bluerov2_heavy", "remus100")
 NEEDS = {"voltage_droop": "bluerov2", "fin_stall": "remus100", "fin_gain": "remus100", "fin_offset": "remus100",
          "fin_drag": "remus100", "fin_lag": "remus100"}  # fmt: skip
 # Compared on their own below: the model takes sums (over strips, over rows) where this plant has integrals.
-SUMMED = ("cross_flow_drag", "thrust_overshoot")
+SUMMED = ("cross_flow_drag", "thrust_overshoot", "propeller_lag")
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES)
@@ -136,6 +136,29 @@ def test_overshoot_of_the_model_is_the_mean_over_each_row():
         own, other = move("own", what), move("numpy", what)
         off.append(np.abs(own.nu - other.nu).max())
     assert off[0] < 2e-3 and 11 < off[0] / off[1] < 21
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"propeller_lag": {"time_constant": 0.15}},
+        {"propeller_lag": {"time_constant": 0.15}, "thruster_lag": {"time_constant": 0.1}},
+        {
+            "propeller_lag": {"time_constant": 0.15},
+            "thrust_overshoot": {"time_constant": 0.4, "thruster_1": 0.5, "thruster_4": -0.3},
+        },
+    ],
+    ids=["alone", "with a lag of the thrust", "with an overshoot"],
+)
+def test_a_lag_of_propellers_in_the_model_is_that_of_the_mean_speed_of_each_row(effects):
+    # Its square is not the mean of the square. With four times as many rows, and the same commands, both come closer.
+    off = []
+    for finer in (1, 4):
+        what = task("rov95", effects, rows=10 * finer + 1, rate=20.0 * finer, every=2 * finer)
+        own, other = move("own", what), move("numpy", what)
+        off.append(np.abs(own.nu - other.nu).max())
+    assert off[0] < 3e-3 and 6 < off[0] / off[1] < 24
+    assert np.abs(other.nu - move("numpy", dataclasses.replace(what, effects={})).nu).max() > 0.02
 
 
 def test_momentum_and_energy_are_kept_without_forces():

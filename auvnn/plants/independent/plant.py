@@ -13,8 +13,9 @@ _OTHERS = ("biofouling", "payload", "flooding", "bottom_proximity", "surface_pro
            "fin_gain", "fin_offset", "fin_drag", "fin_lag", "drag_curve", "added_mass_coriolis",
            "drag_only_current", "body_lift_stall")  # fmt: skip
 _DRIVING = (
-    "thruster_gain", "thruster_deadband", "thruster_lag", "thrust_overshoot", "actuation_delay", "thrust_asymmetry",
-    "thrust_curve", "thrust_polynomial", "thrust_inflow_loss", "thrust_advance", "voltage_droop", "propeller_torque",
+    "thruster_gain", "thruster_deadband", "thruster_lag", "propeller_lag", "thrust_overshoot", "actuation_delay",
+    "thrust_asymmetry", "thrust_curve", "thrust_polynomial", "thrust_inflow_loss", "thrust_advance", "voltage_droop",
+    "propeller_torque",
 )  # fmt: skip
 SUPPORTED = frozenset((*CHANGES, *WATERS, *LOADS, *SENSORS, *_OTHERS, *_DRIVING))
 

@@ -21,8 +21,8 @@ Signal = Callable[[float], Array]
 class Actuators:
     """Thrusters, or the axes of a commanded wrench, with their history.
 
-    The thrust is a function of continuous time: the overshoot's flow and the lag's gap fade by exponentials
-    between commands, and a delay looks back into the pieces before. Nothing is averaged over a row.
+    The thrust is a function of continuous time: the overshoot's flow, the propellers' speed and the lag's gap fade by
+    exponentials between commands, and a delay looks back into the pieces before. Nothing is averaged over a row.
 
     Args:
         vehicle: whose thrusters.
@@ -50,6 +50,7 @@ class Actuators:
         self.begins: list[float] = []
         self.pieces: list[Signal] = []
         self.flow: Array | None = None
+        self.speed: Array | None = None
         self.last: Array | None = None
 
     def names(self) -> list[str]:
@@ -89,7 +90,11 @@ class Actuators:
             elif name == "thrust_polynomial":
                 wanted = self._polynomial(wanted, values)
             elif name == "thrust_overshoot":
-                wanted, constant = self._overshoot(wanted, values, begin, end), False
+                wanted, constant = self._overshoot(wanted, values, begin, end, constant), False
+            elif name == "propeller_lag" and values["time_constant"] > 0.0:
+                speed = wanted(begin) if self.speed is None else self.speed
+                wanted = _following(wanted, speed, begin, end, values["time_constant"], constant)
+                self.speed, constant = wanted(end), False
 
         def demand(t: float) -> Array:
             return self.settled(wanted(t))
@@ -97,10 +102,7 @@ class Actuators:
         piece = demand if not constant else _always(demand(begin))
         if self.lag > 0.0:
             first = piece(begin) if self.last is None else self.last
-            if constant:
-                piece = _fading(piece(begin), first, begin, self.lag)
-            else:
-                piece = self._chasing(demand, first, begin, end)
+            piece = _following(piece, first, begin, end, self.lag, constant)
         self.begins.append(begin)
         self.pieces.append(piece)
         self.last = piece(end)
@@ -134,28 +136,12 @@ class Actuators:
 
         return out
 
-    def _overshoot(self, wanted: Signal, values: Values, begin: float, end: float) -> Signal:
-        # A dead band or a curve before it only maps held commands to held ones, so that the flow's equation is linear.
-        command, tau = wanted(begin), values["time_constant"]
+    def _overshoot(self, wanted: Signal, values: Values, begin: float, end: float, constant: bool) -> Signal:
+        first = wanted(begin) if self.flow is None else self.flow
+        flow = _following(wanted, first, begin, end, values["time_constant"], constant)
+        self.flow = flow(end)
         excess = np.array([values[n] for n in self.names()])
-        flow = command if self.flow is None else self.flow
-        self.flow = command + (flow - command) * np.exp(-(end - begin) / tau)
-        gap = excess * (command - flow)
-        return lambda t: command + gap * np.exp(-(t - begin) / tau)
-
-    def _chasing(self, demand: Signal, first: Array, begin: float, end: float) -> Signal:
-        """Solve the lag behind a demand that changes between commands."""
-        shape = first.shape
-
-        def rate(t: float, y: Array) -> Array:
-            return ((demand(t) - y.reshape(shape)) / self.lag).ravel()
-
-        if end <= begin:
-            return _always(first)
-        found = solve_ivp(
-            rate, (begin, end), first.ravel(), "LSODA", rtol=1e-10, atol=1e-10, dense_output=True
-        )
-        return lambda t: found.sol(min(t, end)).reshape(shape)
+        return lambda t: wanted(t) + excess * (wanted(t) - flow(t))
 
     def breaks(self, begin: float, end: float) -> list[float]:
         """Return the moments between `begin` and `end` at which the thrust may jump."""
@@ -222,6 +208,27 @@ def _always(value: Array) -> Signal:
     return lambda t: value
 
 
-def _fading(goal: Array, first: Array, begin: float, tau: float) -> Signal:
-    gap = first - goal
-    return lambda t: goal + gap * np.exp(-(t - begin) / tau)
+def _following(goal: Signal, first: Array, begin: float, end: float, tau: float, constant: bool) -> Signal:
+    """Return what goes towards a goal with a first-order lag between two commands, from where it was.
+
+    Args:
+        goal: as a function of time.
+        first: where it is at `begin`, (R, n).
+        begin: s.
+        end: s.
+        tau: time constant, s.
+        constant: whether the goal stays where it is; else the equation is solved by scipy.
+    """
+    if constant:
+        aim = goal(begin)
+        gap = first - aim
+        return lambda t: aim + gap * np.exp(-(t - begin) / tau)
+    if end <= begin:
+        return _always(first)
+    shape = first.shape
+
+    def rate(t: float, y: Array) -> Array:
+        return ((goal(t) - y.reshape(shape)) / tau).ravel()
+
+    found = solve_ivp(rate, (begin, end), first.ravel(), "LSODA", rtol=1e-10, atol=1e-10, dense_output=True)
+    return lambda t: found.sol(min(t, end)).reshape(shape)

@@ -25,7 +25,7 @@ STEP = 1e-4
 # The filter's own step, s: a log with rare rows is filtered in between.
 FINE = 0.05
 # Effects by which the thrust changes while a command is held.
-REMEMBERING = ("thruster_lag", "thrust_overshoot", "actuation_delay")
+REMEMBERING = ("thruster_lag", "propeller_lag", "thrust_overshoot", "actuation_delay")
 
 
 @dataclass(frozen=True)

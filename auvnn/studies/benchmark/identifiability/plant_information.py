@@ -25,7 +25,7 @@ SHARE, STATE = 1e-3, 1e-4
 # Longest step of the plant, s: differences do not see what both runs err by alike.
 STEP = 0.025
 # Effects that count the time since the run began, which a window does not know, or remember commands before it.
-REMEMBERING = ("biofouling", "flooding", "payload", "waves", "thrust_overshoot")
+REMEMBERING = ("biofouling", "flooding", "payload", "waves")
 
 
 class PlantOutputs:
@@ -107,7 +107,10 @@ def covers(plant: str, names: Sequence[str]) -> bool:
     from auvnn.plants import PLANTS
 
     remembering = any(
-        n in REMEMBERING or {"delay", "respond", "steer"} & set(effect_class(n).hooks()) for n in names
+        n in REMEMBERING
+        or effect_class(n).remembers
+        or {"delay", "respond", "steer"} & {*effect_class(n).hooks()}
+        for n in names
     )
     return not remembering and not any(PLANTS.get(plant)().refuses(n) for n in names)
 
