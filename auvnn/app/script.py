@@ -49,9 +49,16 @@ def commands(told: Told, folder: Path) -> str:
             continue
         out = f"again/add_{number}"
         effect = effects[0] if len(effects) == 1 else quote(f"[{','.join(effects)}]")
-        lines.append(f"auvnn add model={quote(model)} log=log.parquet{test} effect={effect} out={out}")
+        again = " refit=true" if _may_be_there(told, number) else ""
+        lines.append(f"auvnn add model={quote(model)} log=log.parquet{test} effect={effect}{again} out={out}")
         model = f"{out}/model"
     return "\n".join(lines) + "\n"
+
+
+def _may_be_there(told: Told, number: int) -> bool:
+    """Whether the model may have an effect already that a step fits: from its file, or from an earlier step."""
+    earlier = {e for effects in told.steps[: number - 1] for e in effects}
+    return Path(told.model).exists() or bool(earlier & {*told.steps[number - 1]})
 
 
 def python(told: Told) -> str:
@@ -78,10 +85,11 @@ def python(told: Told) -> str:
     if told.diagnosed:
         lines += ["", "diagnosis = auvnn.diagnose(model, log)", 'print("\\n".join(diagnosis.story))']
     test = ", test=test" if told.separate else ""
-    for effects in told.steps:
+    for number, effects in enumerate(told.steps, 1):
+        again = ", refit=True" if _may_be_there(told, number) else ""
         lines += [
             "",
-            f"better = auvnn.add(model, log, {list(effects)!r}{test})"
+            f"better = auvnn.add(model, log, {list(effects)!r}{test}{again})"
             if effects
             else f"better = auvnn.improve(model, log{test})",
             "print(better.waterfall)",

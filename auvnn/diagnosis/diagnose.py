@@ -160,7 +160,7 @@ def searched(
     if max_effects < 1:
         raise ConfigError(f"max_effects={max_effects} must be at least 1")
     log = completed(model, log)
-    usable, needs = candidates_for(model, log, effects)
+    usable, needs = candidates_for(model, log, effects, stated=True)
     log.quality().refuse_contradictions(force)
     allowed = Tolerance.of(tolerance)
     # What subnetworks have absorbed leaves no residual: only what drag can be is kept of them.

@@ -10,7 +10,7 @@ from auvnn.catalogue import unknown_name
 from auvnn.comparison.baseline import compare_with_baseline
 from auvnn.comparison.compare import floor_of
 from auvnn.comparison.predictions import stitch
-from auvnn.diagnosis.answers.answer import OneOf
+from auvnn.diagnosis.answers.answer import Names, OneOf
 from auvnn.diagnosis.answers.table import values
 from auvnn.diagnosis.cross_validation.fitters import OBJECTIVES
 from auvnn.diagnosis.one_step.fit import left_out_gain
@@ -32,6 +32,8 @@ from auvnn.models.load_arguments import GivenLog, GivenModel, as_log, as_model
 from auvnn.progress import Progress
 from auvnn.threads import on_one_thread
 
+THERE = "the model has {0} already: refit=true fits it anew; or remove it first, or name another effect"
+
 
 @on_one_thread
 def add(
@@ -45,6 +47,7 @@ def add(
     force: bool = False,
     objective: str = "rollout",
     horizons: Sequence[str] = HORIZONS,
+    refit: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Improvement:
     """Add effects, fit them jointly with the uncertain coefficients on `log`, and judge on held-out data.
@@ -60,6 +63,8 @@ def add(
         objective: "rollout" fits the error of free-running windows; "one_step" that of the acceleration one
             step ahead, which is better where lasting disturbances, not sensors, limit the prediction.
         horizons: of free running on the held-out data, s, "5" among them; fewer take less time.
+        refit: whether effects that the model has already may be among them: they are fitted anew, whatever was stated of
+            them. What a diagnosis has found to contradict the model (`Diagnosis.missing`) may be.
         progress: called with what is being done, in words.
 
     Raises:
@@ -79,7 +84,7 @@ def add(
     test = None if test is None else as_log(test, "test")
     say = progress or (lambda words: None)
     names, notes = _wanted(names_of(effects))
-    _check_request(model, names)
+    _check_request(model, names, refit or (isinstance(effects, Names) and effects.refit))
     held_out = f"{test.name} is held out" if test is not None else ""
     log, test = completed(model, log), None if test is None else completed(model, test)
     if test is None:
@@ -201,15 +206,15 @@ def _assembled(
     )
 
 
-def _check_request(model: GreyBox, names: list[str]) -> None:
+def _check_request(model: GreyBox, names: list[str], refit: bool) -> None:
     if not names:
         raise ConfigError("no effect to add: name one, for example effect=ocean_current")
     for name in names:
         effect_class(name)
         if names.count(name) > 1:
             raise ConfigError(f"effect {name} is named twice: name it once")
-        if name in model.effect_names:
-            raise ConfigError(f"the model has {name} already: remove it first, or name another effect")
+        if name in model.effect_names and not refit:
+            raise ConfigError(THERE.format(name))
         needed = needed_beside(name, (*names, *model.effect_names))
         if needed:
             raise ConfigError(f"{name} does nothing by itself: add {in_words(needed)} with it")

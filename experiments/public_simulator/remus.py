@@ -16,6 +16,8 @@ STEP, RATE, RUNS, DURATION = 0.01, 20, 3, 60.0
 COMMIT = "25b1e153fd4b694706f7059e4662eaab97c39ee0"
 # The class has lags of 1 s on fins and propeller; newer versions of its MATLAB original have a tenth of that.
 LAG = 0.1
+# The class has fins whose lift is linear in their angle; with a stall so late, the model's are to 1e-3 up to 0.5 rad.
+STALL = 1.5
 # Propeller of the class, whose numbers stand inside its `dynamics`: diameter, K_T at J = 0 and 0.6632, wake, deduction.
 DIAMETER, KT, KT_MAX, J_MAX, KQ, WAKE, DEDUCTION = 0.14, 0.4566, 0.1798, 0.6632, 0.07, 0.944, 0.1
 NOISE = {
@@ -206,9 +208,9 @@ def description(vehicle: Any) -> dict[str, Any]:
         ],
         "fins": [
             {"position": [-half, 0.0, 0.0], "axis": [0.0, 0.0, -1.0], "area": vehicle.A_r,
-             "lift_slope": vehicle.CL_delta_r, "stall": 0.6},
+             "lift_slope": vehicle.CL_delta_r, "stall": STALL},
             {"position": [half, 0.0, 0.0], "axis": [0.0, 1.0, 0.0], "area": vehicle.A_s,
-             "lift_slope": vehicle.CL_delta_s, "stall": 0.6},
+             "lift_slope": vehicle.CL_delta_s, "stall": STALL},
         ],
         "effects": {
             "thrust_inflow_loss": {"coefficient": inflow * (KT - KT_MAX) / J_MAX * WAKE / DIAMETER * revolutions},
@@ -227,7 +229,7 @@ def description(vehicle: Any) -> dict[str, Any]:
                 "Nur": half**2 * rudder,
             },
             "cross_flow_drag": {"share": 1.0},
-            "thruster_lag": {"time_constant": LAG},
+            "propeller_lag": {"time_constant": LAG},
             "fin_lag": {"time_constant": LAG},
             # The class has drag with the angle's square, by the lift's slope; this effect, by the lift's square.
             "fin_drag": {"zero_lift": 0.0, "induced": slopes, "uncertainty": {"induced": 0.2 * slopes}},

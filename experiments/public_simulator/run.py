@@ -80,7 +80,7 @@ CHANGES: dict[str, dict[str, Any]] = {
     "fin_gain": {"change": _weak_fins},
     "fin_offset": {"command": lambda given: given + np.array([0.05, 0.0, 0.0])},
     "fin_lag": {"change": _set(T_delta=0.4)},
-    "thruster_lag": {"change": _set(T_n=0.6)},
+    "propeller_lag": {"change": _set(T_n=0.6)},
     "payload": {"later": _load},
     "gyro_bias": {"sensors": lambda nu: nu + np.array([0, 0, 0, 0, 0, 0.01])},
     "velocity_scale": {"sensors": lambda nu: nu * [1.03, 1.03, 1.03, 1, 1, 1]},
@@ -95,7 +95,7 @@ def fitted(module: Any, out: Path) -> Path:
         given = description(vehicle)
         (out / "given.yaml").write_text(yaml.safe_dump(given, sort_keys=False))
         plain = auvnn.load(str(out / "given.yaml")).without_absent()
-        effects = [e for e in plain.copied_effects() if e.name not in ("thruster_lag", "fin_lag")]
+        effects = [e for e in plain.copied_effects() if e.name not in ("propeller_lag", "fin_lag")]
         shares = zip("XYZKMN", disagreement(vehicle, plain.rebuilt(effects)), strict=True)
         print(
             "forces of the model, off by: " + ", ".join(f"{k} {100 * x:.0f} %" for k, x in shares), flush=True

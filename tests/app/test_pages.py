@@ -251,3 +251,17 @@ def test_the_saved_script_is_python_and_names_what_was_done():
     lines = commands(told, Path("/data/a dive"))
     assert "cd '/data/a dive'" in lines and "effect='[net_buoyancy,thruster_lag]'" in lines
     assert "model='my rov.yaml'" in lines and "model=again/add_1/model" in lines
+    assert "refit" not in lines and "refit" not in python(told)
+
+
+def test_the_saved_script_fits_anew_what_the_model_may_have(tmp_path):
+    from auvnn.app.script import Told, commands, python
+
+    twice = Told("rov95", "thrusters", (("ocean_current",), ("waves",), ("ocean_current",)), True, False)
+    first, second, third = (x for x in commands(twice, Path("there")).splitlines() if "auvnn add" in x)
+    assert "refit" not in first + second and "effect=ocean_current refit=true" in third
+    assert python(twice).count("refit=True") == 1
+    own = tmp_path / "own.yaml"
+    own.write_text("effects: {ocean_current: {v_north: 0.1}}\n")
+    of_a_file = Told(str(own), "thrusters", (("ocean_current",),), True, False)
+    assert "refit=true" in commands(of_a_file, Path("there")) and "refit=True" in python(of_a_file)

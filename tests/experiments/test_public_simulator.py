@@ -132,7 +132,7 @@ def test_what_is_hidden_shows_in_the_motion_and_not_in_the_commands_that_are_log
         "added_mass",
         "fin_offset",
         "fin_lag",
-        "thruster_lag",
+        "propeller_lag",
         "payload",
     ):
         other = remus.Plant(module, **run.CHANGES[name]).run(3)

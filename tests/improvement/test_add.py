@@ -195,7 +195,9 @@ def test_what_cannot_be_added_is_refused(model, logs):
         add(model, log, ["ocean_current", "ocean_current"], test=test)
     with pytest.raises(ConfigError, match=r"no effect called 'curent'"):
         add(model, log, "curent", test=test)
-    with pytest.raises(ConfigError, match="the model has ocean_current already: remove it first"):
+    with pytest.raises(
+        ConfigError, match="the model has ocean_current already: refit=true fits it anew; or remove"
+    ):
         add(model.with_effects(["ocean_current"]), log, "ocean_current", test=test)
     with pytest.raises(ConfigError, match="no effect to add"):
         add(model, log, [], test=test)

@@ -58,6 +58,19 @@ def test_diagnosis_says_its_verdict(unseen, verdict, words):
     assert "not judged: needs altitude" in page.text
 
 
+def test_a_value_other_than_stated_is_no_effect_that_lacks(unseen):
+    answer = diagnosis("named")
+    answer.stated = {"ocean_current": {"v_north": 0.1, "v_east": 0.0, "v_down": 0.0}}
+    answer.next_experiment = None
+    text = PageText(drawer("diagnosis").page(answer)).text
+    assert "What the model has at other values: ocean_current" in text
+    assert "The model has ocean_current at other values than the log." in text and "lacks" not in text
+    assert "auvnn add with effect=ocean_current and refit=true fits it" in text
+    answer.missing = [*answer.missing, "net_buoyancy"]
+    text = PageText(drawer("diagnosis").page(answer)).text
+    assert "The model lacks net_buoyancy and has ocean_current at other values than the log." in text
+
+
 def test_inputs_that_the_log_cannot_tell_apart_are_said_together(unseen):
     depends = {"Z": {"u": 0.295, "fin_3": 0.293, "fin_4": 0.292}}
     answer = diagnosis("unknown", depends_on=depends, inseparable={"Z": [["u", "fin_3", "fin_4"]]})

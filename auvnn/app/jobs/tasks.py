@@ -134,7 +134,10 @@ class Tasks:
         model = self._model(order, log)
         if test is None:
             raise AuvnnError("the log is too short to hold a part of it out: name a further log to judge by")
-        better = add(model, log, order["effects"], test=test, progress=say, force=bool(order.get("force")))
+        # On the page it is seen which effects the model has.
+        better = add(
+            model, log, order["effects"], test=test, refit=True, progress=say, force=bool(order.get("force"))
+        )
         better.model.save(out / "model")
         more = {"held_out_words": order["log"]["words"], "effects_in_model": better.model.effect_names}
         _write(better, out, more)

@@ -69,8 +69,11 @@ def _names(job: Job, key: str, model: Any) -> None:
         kind = effect_class(str(name))
         if model is None:
             continue
-        if key == "effect" and "log" in job.options and name in model.effect_names:
-            raise ConfigError(f"the model has {name} already: remove it first, or name another effect")
+        there = key == "effect" and "log" in job.options and name in model.effect_names
+        if there and not job.options.get("refit"):
+            from auvnn.improvement.add import THERE
+
+            raise ConfigError(THERE.format(name))
         lacking = kind.lacks(model.vehicle, model.actuation)
         if lacking and key != "effects":
             raise ConfigError(

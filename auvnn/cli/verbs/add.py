@@ -17,7 +17,7 @@ def _run(job: Job) -> Answering:
     better = add(
         model, log, effects,
         test=test, derivative=job["derivative"], window=job["window"], objective=job["objective"]["objective"],
-        force=job["force"], progress=say.progress,
+        force=job["force"], refit=job["refit"], progress=say.progress,
     )  # fmt: skip
     better.model.save(job.folder / "model")
     better.write(job.folder)

@@ -24,7 +24,17 @@ from auvnn.training.confounding.confounding import Confounding
 Array = NDArray[np.float64]
 
 
-class OneOf(list[str]):
+class Names(list[str]):
+    """Names for `add`.
+
+    Attributes:
+        refit: whether some are of effects that the model has, at values that the log contradicts: `add` fits them anew.
+    """
+
+    refit: bool = False
+
+
+class OneOf(Names):
     """Names of which one is missing, and the log cannot tell which; `add` takes the first of them."""
 
 
@@ -35,6 +45,7 @@ class Diagnosis(Answer):
     Attributes:
         verdict: named, ambiguous, partial, unknown or adequate.
         missing: names to add, those that matter first; of an ambiguous verdict the rivals, as `OneOf`.
+        stated: of these, such as the model has already, with the values that it states, which the log contradicts.
         matters: name to what it costs, how large its force is, and whether that is beyond the tolerance.
         nearest: names that explain a part and are not the cause; of a partial verdict those that predict.
         joint: of a partial verdict, what each of these does in addition to the others.
@@ -77,6 +88,7 @@ class Diagnosis(Answer):
     baseline: dict[str, Any] = field(default_factory=dict)
     stochastic: dict[str, Any] = field(default_factory=dict)
     inseparable: dict[str, list[list[str]]] = field(default_factory=dict)
+    stated: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @property
     def surfaces(self) -> list[dict[str, Any]]:
@@ -130,6 +142,7 @@ class Diagnosis(Answer):
             "derivative",
             "verdict",
             "missing",
+            "stated",
             "steps",
             "candidates",
             "unexplained",

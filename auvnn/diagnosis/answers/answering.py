@@ -10,7 +10,7 @@ import numpy as np
 
 from auvnn.answer_types import Candidate, NextExperiment
 from auvnn.diagnosis.advise import advise
-from auvnn.diagnosis.answers.answer import Diagnosis, OneOf
+from auvnn.diagnosis.answers.answer import Diagnosis, Names, OneOf
 from auvnn.diagnosis.answers.bounds import reservations
 from auvnn.diagnosis.answers.effect_costs import Worth, names_by_worth, worth
 from auvnn.diagnosis.answers.joint import joint
@@ -46,7 +46,9 @@ def answer(asked: Setting, state: State) -> Diagnosis:
     depends = _depends(asked, state, verdict, notes)
     given = names_by_worth(given, found.names)
     # Of a leading group one member is to be added; what was found after it stands in the steps.
-    missing = OneOf(leading["effects"]) if verdict == "ambiguous" else given
+    missing = OneOf(leading["effects"]) if verdict == "ambiguous" else Names(given)
+    stated = {n: asked.model.effect(n).values() for n in missing if n in asked.model.effect_names}
+    missing.refit = bool(stated)
     return Diagnosis(
         model=asked.model.vehicle.name,
         log=asked.log.name,
@@ -77,6 +79,7 @@ def answer(asked: Setting, state: State) -> Diagnosis:
         moved=moved(asked.layout, state.current),
         tolerance=asked.tolerance.to_dict(),
         judged_by=found.words,
+        stated=stated,
     )
 
 

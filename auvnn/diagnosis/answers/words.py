@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -64,12 +65,13 @@ def tell(diagnosis: Diagnosis) -> list[str]:
     for step in diagnosis.steps:
         if step["verdict"] == "named":
             for name in [e for e in step["effects"] if e not in gone]:
-                lines.append(
-                    f"Missing: {name} ({EFFECTS.get(name).cause}): {parameters(by_name[name]['parameters'])}."
-                )
+                lines.append(_named(name, by_name[name]["parameters"], diagnosis.stated.get(name)))
         elif step["verdict"] == "ambiguous":
+            missing = (
+                "missing, or has another value," if {*step["effects"]} & {*diagnosis.stated} else "missing,"
+            )
             lines.append(
-                "One of these is missing, and this log cannot tell which: " + ", ".join(step["effects"]) + "."
+                f"One of these is {missing} and this log cannot tell which: {', '.join(step['effects'])}."
             )
         elif step["verdict"] == "withdrawn":
             lines.append(
@@ -102,6 +104,18 @@ def tell(diagnosis: Diagnosis) -> list[str]:
         *_dependence(diagnosis),
         *moved_words(diagnosis.moved),
     ]
+
+
+def _named(name: str, values: Parameters, stated: Mapping[str, float] | None) -> str:
+    """Say that an effect is missing, or, where the model has it, that it has other values there."""
+    what = f"{name} ({EFFECTS.get(name).cause})"
+    if stated is None:
+        return f"Missing: {what}: {parameters(values)}."
+    told = ", ".join(
+        f"{n} {number(p['value'], p['std'], p['unit'])}, where the model has {number(stated[n], None, p['unit'])}"
+        for n, p in values.items()
+    )
+    return f"Other than the model states: {what}: {told}."
 
 
 def _adequate(diagnosis: Diagnosis) -> str:

@@ -22,7 +22,7 @@ STEPS = 0.25
 
 
 def candidates_for(
-    model: GreyBox, log: Log, wanted: str | Sequence[str] | None
+    model: GreyBox, log: Log, wanted: str | Sequence[str] | None, *, stated: bool = False
 ) -> tuple[list[str], dict[str, list[str]]]:
     """Return the effects that can be asked for, and for the others which channels they lack.
 
@@ -30,6 +30,8 @@ def candidates_for(
         model: for its vehicle and actuation.
         log: for the channels that it has.
         wanted: one name or several; the whole catalogue where None.
+        stated: whether effects that the model has are asked for too, for values other than it states. Not those with a
+            shape: their tests hold where the effect is absent.
     """
     wanted = names_of(wanted)
     if isinstance(wanted, str):
@@ -46,7 +48,10 @@ def candidates_for(
         if model.vehicle.glides and of_actuators & {*kind.hooks()}:
             absent += ["thrusters"]
         needs[name] = absent
-        if not absent and (name not in model.effect_names):
+        there = name in model.effect_names
+        if not absent and (
+            not there or (stated and not any(p.shape for p in model.effect(name).parameters_of))
+        ):
             usable.append(name)
     return usable, needs
 

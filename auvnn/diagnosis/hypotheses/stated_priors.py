@@ -138,6 +138,7 @@ def lay_out(model: GreyBox, candidates: Sequence[str], learned: Array | None = N
         # What the model has was fitted or stated: were it all but free, it would absorb what is missing.
         if str(effect.name) not in spreads and str(effect.name) in EFFECTS:
             spreads[str(effect.name)] = effect.standard_deviations()
+            groups.append(str(effect.name))
     return Layout(full, tuple(columns), columns, tuple(groups), means, spreads, model.joint)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.estimation.priors import set_parameters
 from auvnn.estimation.window_simulation import Thrust, substeps_of
 from auvnn.metrics.free_run import predict
 from auvnn.metrics.windows import Windows
@@ -25,7 +26,12 @@ LEAST = 0.1
 MOST = 0.5
 
 
-def forces_of(found: FittedHypothesis, windows: Windows, names: Sequence[str]) -> dict[str, Array]:
+def forces_of(
+    found: FittedHypothesis,
+    windows: Windows,
+    names: Sequence[str],
+    stated: Mapping[str, Array] | None = None,
+) -> dict[str, Array]:
     """Return the root mean square force of each effect along the fitted motion, (6,), N and N m.
 
     It is what the equations of motion lose without the effect, nothing else changed: M (nu_dot with - nu_dot without)
@@ -35,6 +41,7 @@ def forces_of(found: FittedHypothesis, windows: Windows, names: Sequence[str]) -
         found: the fit.
         windows: those it was fitted to.
         names: effects in it.
+        stated: of effects that the model has with other values, these: what is lost then is the change.
     """
     model = found.fitted.model
     with torch.no_grad():
@@ -44,7 +51,12 @@ def forces_of(found: FittedHypothesis, windows: Windows, names: Sequence[str]) -
         whole = _rate(lean, windows, eta, nu)
         out = {}
         for name in names:
-            less = model.sharing([e for e in model.members if e.name != name]).without_absent()
+            if stated is not None and name in stated:
+                less = model.rebuilt(model.copied_effects())
+                set_parameters(less, [name], stated[name])
+                less = less.without_absent()
+            else:
+                less = model.sharing([e for e in model.members if e.name != name]).without_absent()
             change = whole - _rate(less, windows, eta, nu)
             wrench = (change @ _inertia(model).mT)[seen]
             finite = torch.isfinite(wrench).all(-1)

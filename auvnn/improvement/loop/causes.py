@@ -93,7 +93,7 @@ class Causes(Trials):
             asked = (
                 None
                 if self.effects is None
-                else [n for n in self.effects if n not in self.state.model.effect_names]
+                else [n for n in self.effects if n not in self.state.recipe.effects]
             )
             if asked is not None and not asked:
                 return

@@ -95,7 +95,7 @@ def improve(
         leakage(log, test)
         test.quality().refuse_contradictions(force)
     log.quality().refuse_contradictions(force)
-    names = None if effects is None else candidates_for(model, log, effects)[0]
+    names = None if effects is None else candidates_for(model, log, effects, stated=True)[0]
     walk = Walk(model, log, derivative, names, max_effects, seconds, progress, tell)
     walk.check()
     walk.compare()

@@ -43,6 +43,8 @@ class Promise:
 def wanted(base: GreyBox, judge: Judge, recipe: Recipe) -> list[str]:
     """Return the effects that may be asked for: those of the catalogue that can be judged with the log and the vehicle.
 
+    One that the model has is asked for with other values than it states.
+
     What goes by the time since the start of a run tells a course of events. Where the diagnosis does not name it,
     there is no reason why another run should follow the same course: it is not taken for its prediction alone.
 
@@ -51,8 +53,8 @@ def wanted(base: GreyBox, judge: Judge, recipe: Recipe) -> list[str]:
         judge: with the log.
         recipe: what has been added already.
     """
-    usable, _ = candidates_for(base, judge.log, None)
-    return [n for n in usable if n not in recipe.effects and n not in base.effect_names and n not in COURSES]
+    usable, _ = candidates_for(base, judge.log, None, stated=True)
+    return [n for n in usable if n not in recipe.effects and n not in COURSES]
 
 
 def promises(

@@ -98,12 +98,7 @@ class Trials:
         """Fit each of a group, take the one that predicts best if it pays, and say so."""
         found = []
         for name in group:
-            if (
-                name in self.state.recipe.effects
-                or name in self.model.effect_names
-                or self._full()
-                or self.late()
-            ):
+            if name in self.state.recipe.effects or self._full() or self.late():
                 continue
             recipe = self._recipe(name)
             state = self._try(

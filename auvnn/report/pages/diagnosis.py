@@ -39,6 +39,8 @@ class DiagnosisPage(Page):
     def title(self, view: View) -> str:
         """Return the verdict as heading."""
         missing, verdict = view.texts("missing"), view.text("verdict")
+        if verdict == "named" and missing and {*missing} <= {*view.mapping("stated")}:
+            return f"What the model has at other values: {listing(missing)}"
         if verdict == "named" and missing:
             return f"What is missing: {listing(missing)}"
         return {
@@ -59,7 +61,7 @@ class DiagnosisPage(Page):
         by_name = {str(c.get("effect")): c for c in candidates}
         leading = [by_name[m] for m in missing if m in by_name]
         left = finite(view.get("unexplained"))
-        out = [_first_sentence(verdict, missing), *common.baseline_words(view)[1:]]
+        out = [_first_sentence(verdict, missing, view.mapping("stated")), *common.baseline_words(view)[1:]]
         if verdict in ("named", "ambiguous"):
             out += [_candidate_words(c) for c in leading[:3]]
             out += _rival_words(candidates, missing)
@@ -88,8 +90,9 @@ class DiagnosisPage(Page):
         if after.get("words"):
             out.append(f"Next: {str(after['words']).rstrip('.')}.")
         elif verdict == "named":
+            again = " and refit=true" if view.mapping("stated") else ""
             out.append(
-                f"Next: auvnn add with effect={','.join(missing)} fits it and compares before and after."
+                f"Next: auvnn add with effect={','.join(missing)}{again} fits it and compares before and after."
             )
         return out
 

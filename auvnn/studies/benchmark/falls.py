@@ -73,7 +73,7 @@ def fall(model: GreyBox, true: GreyBox, log: Log, held_out: Log, names: Sequence
 def _fitted(model: GreyBox, log: Log, held_out: Log, names: Sequence[str]) -> tuple[GreyBox, GreyBox]:
     """Return the nominal model with its coefficients refitted, and the one with the effects in it."""
     if names:
-        improved = add(model, log, list(names), test=held_out, horizons=(HORIZON,))
+        improved = add(model, log, list(names), test=held_out, horizons=(HORIZON,), refit=True)
         return improved.refitted_model, improved.model
     layout = lay_out(model, [])
     alone = with_fitted_parameters(

@@ -81,7 +81,7 @@ def dense(world, errors, names):
 
 def test_evidence_and_what_is_left_out_are_those_of_the_joint_normal():
     world = World.random(lay_out(known(), []), windows=12, samples=6, strength=6.0, runs=3)
-    names = [*world.layout.nuisance, *BOTH]
+    names = list(dict.fromkeys([*world.layout.nuisance, *BOTH]))
     found = []
     for seed in (0, 1):
         random = np.random.default_rng(seed)

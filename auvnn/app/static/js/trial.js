@@ -93,7 +93,7 @@ export class TryScreen {
       h("div", { class: "row" },
         h("input", { type: "checkbox", role: "switch", class: "switch", id, checked: entry.on, disabled: lacks, onchange: (e) => { entry.on = e.target.checked; this.toggles(); const again = document.getElementById(id); if (again) again.focus(); this.follow(); } }),
         h("label", { for: id }, h("b", {}, effect.name), h("span", { class: "soft" }, ` ${effect.cause}`)),
-        effect.present && h("span", { class: "badge" }, "in the model")),
+        effect.present && h("span", { class: "badge" }, this.diagnosis && effect.name in (this.diagnosis.stated || {}) ? "in the model, at other values than the log" : "in the model")),
       lacks && h("p", { class: "soft" }, `needs ${effect.lacks.join(", ")}`),
       entry.on && effect.parameters.map((p) => this.slider(entry, p)));
   }
@@ -193,7 +193,9 @@ export class TryScreen {
   }
 
   fit(button) {
-    const fresh = this.chosen().filter((e) => !e.effect.present).map((e) => e.effect.name);
+    // Of those that the model has, such as the log contradicts are fitted anew.
+    const other = (this.diagnosis && this.diagnosis.stated) || {};
+    const fresh = this.chosen().filter((e) => !e.effect.present || e.effect.name in other).map((e) => e.effect.name);
     this.app.start("add", fresh, button);
   }
 

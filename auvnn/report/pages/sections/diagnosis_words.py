@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from typing import Any
 
 import numpy as np
@@ -67,8 +67,13 @@ def _whole_log(view: View) -> list[HtmlTable]:
     ]
 
 
-def _first_sentence(verdict: str, missing: list[str]) -> str:
+def _first_sentence(verdict: str, missing: list[str], stated: Container[str] = ()) -> str:
     several = len(missing) > 1
+    other = [n for n in missing if n in stated]
+    if other and verdict == "named":
+        rest = [n for n in missing if n not in stated]
+        lacks = [f"lacks {listing(rest)}"] if rest else []
+        return f"The model {' and '.join([*lacks, f'has {listing(other)} at other values than the log'])}."
     return {
         "named": f"The model lacks {listing(missing)}.",
         "ambiguous": f"The model lacks something, and this log cannot tell which: {listing(missing, 'or')}.",
