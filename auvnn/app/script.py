@@ -58,7 +58,8 @@ def commands(told: Told, folder: Path) -> str:
 def _may_be_there(told: Told, number: int) -> bool:
     """Whether the model may have an effect already that a step fits: from its file, or from an earlier step."""
     earlier = {e for effects in told.steps[: number - 1] for e in effects}
-    return Path(told.model).exists() or bool(earlier & {*told.steps[number - 1]})
+    whole_loop = any(not effects for effects in told.steps[: number - 1])
+    return Path(told.model).exists() or whole_loop or bool(earlier & {*told.steps[number - 1]})
 
 
 def python(told: Told) -> str:

@@ -163,7 +163,9 @@ def _assembled(
         gain={"value": judged.gain[0], "std": judged.gain[1]},
         waterfall=waterfall,
         parameters=values(layout, best, names),
-        coefficients=values(layout, best, [n for n in layout.nuisance if n not in names]),
+        coefficients=values(
+            layout, best, [n for n in layout.nuisance if n not in (*names, *model.effect_names)]
+        ),
         held_out=held_out,
         model=fits.final,
         refitted_model=fits.steps[1][1],

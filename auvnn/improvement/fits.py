@@ -127,8 +127,8 @@ def _fitted_by(fitter: Fitter, model: GreyBox, names: Sequence[str], say: Callab
     without: dict[str, GreyBox] = {}
     for name in names if len(names) > 1 else ():
         others = [n for n in names if n != name]
-        if name == names[-1]:
-            # The last step but one is just that.
+        if name == names[-1] and name not in layout.nuisance:
+            # The last step but one is just that; but what is uncertain anyway is free in it, within what is stated.
             without[name] = steps[-2][1]
             continue
         say(f"fitting without {name}")

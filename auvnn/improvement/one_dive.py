@@ -100,7 +100,9 @@ def _fitted(question: Question, path: Path) -> Dive:
         "cv": found.cv,
         "settled": found.fitted.converged,
         "parameters": values(layout, found, names),
-        "coefficients": values(layout, found, [n for n in layout.nuisance if n not in names]),
+        "coefficients": values(
+            layout, found, [n for n in layout.nuisance if n not in (*names, *known.effect_names)]
+        ),
         # Its place among the others is known once all are fitted.
         "dive": 0,
         "days": None,

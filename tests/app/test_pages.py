@@ -261,6 +261,8 @@ def test_the_saved_script_fits_anew_what_the_model_may_have(tmp_path):
     first, second, third = (x for x in commands(twice, Path("there")).splitlines() if "auvnn add" in x)
     assert "refit" not in first + second and "effect=ocean_current refit=true" in third
     assert python(twice).count("refit=True") == 1
+    looped = Told("rov95", "thrusters", ((), ("waves",)), True, False)
+    assert "effect=waves refit=true" in commands(looped, Path("there"))
     own = tmp_path / "own.yaml"
     own.write_text("effects: {ocean_current: {v_north: 0.1}}\n")
     of_a_file = Told(str(own), "thrusters", (("ocean_current",),), True, False)

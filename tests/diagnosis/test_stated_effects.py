@@ -7,8 +7,10 @@ import pytest
 
 import auvnn
 from auvnn.diagnosis import diagnose
-from auvnn.diagnosis.hypotheses.candidates import candidates_for
-from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.hypotheses.candidates import candidates_for, windows_for
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
+from auvnn.diagnosis.hypotheses.stated_priors import initial_guess, lay_out
+from auvnn.diagnosis.score_tests.shape_search import searched_start
 from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
@@ -95,6 +97,43 @@ def test_the_force_of_a_change_is_that_of_the_change_alone():
     force = found.matters["net_buoyancy"]["force"]
     total = np.sqrt(sum(force[a] ** 2 for a in "XYZ"))
     assert total == pytest.approx(5.0, rel=0.1)
+
+
+def test_the_costs_are_told_as_those_of_the_change(changed):
+    told = next(x for x in changed[1].story if x.startswith("ocean_current: "))
+    assert told.startswith("ocean_current: as the model has it the error of free running")
+    assert "the force of the change is" in told and "without it" not in told
+
+
+def test_what_each_of_several_adds_does_not_depend_on_their_order():
+    """What is uncertain anyway takes up a change that is not large, while it has not been asked for."""
+    loose = {
+        "ocean_current": {"v_north": 0.1, "uncertainty": {"v_north": 0.05, "v_east": 0.05, "v_down": 0.05}}
+    }
+    log = log_of({"ocean_current": {"v_north": 0.2}, "net_buoyancy": {"force": 5.0}})
+    for names in (["net_buoyancy", "ocean_current"], ["ocean_current", "net_buoyancy"]):
+        better = auvnn.add(model(loose), log, names, refit=True, horizons=("5",))
+        assert better.accepted and all(entry["accepted"] for entry in better.by_effect.values()), names
+        assert "ocean_current" not in better.coefficients
+
+
+@pytest.mark.parametrize(
+    ("stated", "estimate", "begin"), [(0.3, 0.1, 0.1), (0.3, -0.1, 0.1), (0.1, np.nan, 0.1)]
+)
+def test_a_stated_lag_is_fitted_from_where_its_test_points(stated, estimate, begin):
+    layout = lay_out(model({"thruster_lag": {"time_constant": stated}}), ["thruster_lag"])
+    assert initial_guess(layout, "thruster_lag", np.array([estimate])) == pytest.approx([begin])
+
+
+def test_the_fit_of_a_stated_effect_with_a_shape_has_a_beginning():
+    """The stand-ins of what is asked for are in its place, and it is not free beside them."""
+    known = model({"thrust_advance": {"loss": 0.3}})
+    log = log_of({})
+    layout, windows = lay_out(known, ["thrust_advance"]), windows_for(known, log)
+    base = [n for n in layout.names if n in layout.nuisance]
+    found = fit_hypothesis(layout, windows, [n for n in base if n != "thrust_advance"], ())
+    assert "thrust_advance" in base
+    assert searched_start(layout, windows, found, base, "thrust_advance") is not None
 
 
 def test_what_is_asked_for():

@@ -47,8 +47,9 @@ def answer(asked: Setting, state: State) -> Diagnosis:
     given = names_by_worth(given, found.names)
     # Of a leading group one member is to be added; what was found after it stands in the steps.
     missing = OneOf(leading["effects"]) if verdict == "ambiguous" else Names(given)
-    stated = {n: asked.model.effect(n).values() for n in missing if n in asked.model.effect_names}
-    missing.refit = bool(stated)
+    told = dict.fromkeys([*missing, *given, *state.nearest])
+    stated = {n: asked.model.effect(n).values() for n in told if n in asked.model.effect_names}
+    missing.refit = any(n in stated for n in missing)
     return Diagnosis(
         model=asked.model.vehicle.name,
         log=asked.log.name,
@@ -117,6 +118,8 @@ def _candidates(
     for name, reason in state.failed.items():
         if name not in state.current.effects:
             table[name] = replace(table[name], reason=reason)
+    for name in {*table} & {*asked.model.effect_names} - {*asked.usable}:
+        table[name] = replace(table[name], reason="the model has it, and it has a shape: not asked for")
     names = [*given, *(n for n in state.nearest if n not in given)] if state.partial else given
     rows = sorted(
         table.values(),

@@ -89,8 +89,7 @@ def worth(asked: Setting, state: State, without: Mapping[str, FittedHypothesis])
     # Where nothing is there and nothing is left, there is nothing to work out.
     asked_for = asked.costs and bool(without or state.left is not None)
     whole = _errors(asked, state, found) if asked_for else None
-    stated = {n: m for n, m in asked.layout.means.items() if n in asked.model.effect_names}
-    forces = forces_of(found, state.windows, list(without), stated)
+    forces = forces_of(found, state.windows, list(without), asked.stated)
     for name, other in without.items():
         asked.say(f"asking what {name} costs")
         fall = None

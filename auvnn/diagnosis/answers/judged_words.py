@@ -21,16 +21,20 @@ def costs(diagnosis: Diagnosis) -> list[str]:
         entry = diagnosis.matters.get(name)
         if entry is None:
             continue
+        there = name in diagnosis.stated
+        without, whose = (
+            ("as the model has it", "the force of the change") if there else ("without it", "its force")
+        )
         parts = []
         if _known(entry["cost"]):
-            parts.append(f"without it the error of free running on runs left out is {_change(entry['cost'])}")
+            parts.append(f"{without} the error of free running on runs left out is {_change(entry['cost'])}")
         worst = entry.get("worst")
         if worst and _known(worst["cost"]):
             parts.append(f"in {worst['velocity']} it is {_change(worst['cost'])}")
         strongest = _largest(entry["force"])
         if strongest:
             share = f", up to {_share(entry['share'])} of the actuators'" if _known(entry["share"]) else ""
-            parts.append(f"its force is {strongest} (rms){share}")
+            parts.append(f"{whose} is {strongest} (rms){share}")
         if not parts:
             continue
         verdict = "" if entry["matters"] else " It is there and does not matter within the tolerance."

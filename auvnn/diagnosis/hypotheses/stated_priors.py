@@ -217,7 +217,7 @@ def one_sided(layout: Layout, name: str) -> NDArray[np.bool_]:
 
 
 def initial_guess(layout: Layout, name: str, estimate: Array) -> Array:
-    """Return where to begin the fit of an absent effect, (p,): what its test estimates, on the side that there is.
+    """Return where to begin the fit of an effect, (p,): what its test estimates, on the side of its null that there is.
 
     A lag, however short, holds back the acceleration that is measured at the instant of a new command. The slope at the
     null knows nothing of that, and may point to where there is no lag: what matters is to leave the null.
@@ -227,8 +227,8 @@ def initial_guess(layout: Layout, name: str, estimate: Array) -> Array:
         name: the effect.
         estimate: (p,) of its test at the null; NaN where it has none.
     """
-    null = layout.means[name]
-    finite = np.where(np.isfinite(estimate), estimate, null)
+    null = np.array([p.null for p in layout.described(name)])
+    finite = np.where(np.isfinite(estimate), estimate, layout.means[name])
     return np.where(one_sided(layout, name), null + np.abs(finite - null), finite)
 
 

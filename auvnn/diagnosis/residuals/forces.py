@@ -91,7 +91,13 @@ def fins_of(model: GreyBox, windows: Windows) -> Tensor:
     return fin_force(windows.nu, angles[:, windows.warmup :], place, axis, area, slope, stall, density)
 
 
-def exerts_less(found: FittedHypothesis, windows: Windows, further: str, names: Sequence[str]) -> bool:
+def exerts_less(
+    found: FittedHypothesis,
+    windows: Windows,
+    further: str,
+    names: Sequence[str],
+    stated: Mapping[str, Array] | None = None,
+) -> bool:
     """Whether an effect exerts less than others together, where it acts most.
 
     What the form of an effect gets wrong is less than what the effect does itself, in the degrees of freedom in which it
@@ -102,8 +108,9 @@ def exerts_less(found: FittedHypothesis, windows: Windows, further: str, names: 
         windows: those it was fitted to.
         further: the effect.
         names: the others; all are in the fit.
+        stated: of effects that the model has with other values, these: what counts then is the change.
     """
-    forces = forces_of(found, windows, [further, *names])
+    forces = forces_of(found, windows, [further, *names], stated)
     own, others = forces[further], np.sqrt(sum(forces[name] ** 2 for name in names))
     share = np.nan_to_num(share_of(own, actuators_of(found.fitted.model, windows)))
     acts = (share > 0.0) & (share >= MOST * share.max())

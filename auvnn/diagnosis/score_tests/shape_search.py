@@ -160,7 +160,9 @@ def searched_start(
     """
     if not null_is_no_start(layout, name):
         return None
-    return search_shapes(layout, windows, found, base).start(name)
+    # One that the model has is among those that are uncertain anyway: here it is the one that is asked for.
+    others = [n for n in base if n != name]
+    return search_shapes(layout, windows, found, others).start(name)
 
 
 def best_of(seen: Sequence[OnLevers]) -> OnLevers:

@@ -72,7 +72,7 @@ def search_round(
     chooser = asked.chooser(state.windows)
     choice = chooser.choose(tested.scores, tested.at, base, chosen, state.current)
     others = tested.scores
-    while passed := _what_others_leave(state, choice.best):
+    while passed := _what_others_leave(asked, state, choice.best):
         others = {n: s for n, s in others.items() if n not in passed}
         choice = chooser.choose(others, tested.at, base, chosen, state.current)
     state = state.but(failed={**state.failed, **choice.failed}, tried=(*state.tried, *choice.tried))
@@ -110,12 +110,13 @@ def search_round(
     return state.but(current=current, windows=windows, chosen=tuple(chosen), tried=tried, path=path)
 
 
-def _what_others_leave(state: State, further: FittedHypothesis | None) -> list[str]:
+def _what_others_leave(asked: Setting, state: State, further: FittedHypothesis | None) -> list[str]:
     """Return further effects that are known to look like what the form of an earlier one gets wrong, and are no more.
 
     Such an effect explains little beside the earlier ones, or exerts less than those do whose form is in question.
 
     Args:
+        asked: for what the model states of its effects.
         state: with the names before them.
         further: the explanation with them; None where there is none.
     """
@@ -127,7 +128,7 @@ def _what_others_leave(state: State, further: FittedHypothesis | None) -> list[s
     first, current, after = (e.squared_error(state.first.fitted.sigma) for e in explanations)
     if current - after < LITTLE * (first - current) / len(state.chosen):
         return [*forms]
-    return [n for n, of in forms.items() if exerts_less(further, state.windows, n, of)]
+    return [n for n, of in forms.items() if exerts_less(further, state.windows, n, of, asked.stated)]
 
 
 def regroup(asked: Setting, state: State) -> State:

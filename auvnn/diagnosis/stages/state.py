@@ -68,6 +68,11 @@ class Setting:
     say: Callable[[str], None]
     pool: Executor = SERIAL
 
+    @property
+    def stated(self) -> dict[str, Array]:
+        """The values of the parameters of effects that the model has, by effect."""
+        return {n: m for n, m in self.layout.means.items() if n in self.model.effect_names}
+
     def chooser(self, windows: Windows) -> Chooser:
         """Return who weighs explanations of these windows."""
         return Chooser(self.layout, windows, self.say, self.pool)

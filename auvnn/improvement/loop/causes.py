@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 
 from auvnn.diagnosis.diagnose import diagnose
+from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.improvement.loop.answer import CAUSE, REFITTED
 from auvnn.improvement.loop.excerpt import liveliest
 from auvnn.improvement.loop.state import (
@@ -90,12 +91,10 @@ class Causes(Trials):
                 return
             self.say(f"diagnosing what is missing ({number + 1})")
             patience = max(self.limit * PATIENCE - (time.monotonic() - self.began), 0.0)
-            asked = (
-                None
-                if self.effects is None
-                else [n for n in self.effects if n not in self.state.recipe.effects]
-            )
-            if asked is not None and not asked:
+            # What this loop has put in was fitted to this log.
+            usable = candidates_for(self.model, self.log, self.effects, stated=True)[0]
+            asked = [n for n in usable if n not in self.state.recipe.effects]
+            if not asked:
                 return
             try:
                 found = diagnose(

@@ -67,7 +67,10 @@ class DiagnosisPage(Page):
             out += _rival_words(candidates, missing)
         further = _further(view, missing)
         if further:
-            out.append(f"Besides, it lacks {listing(further)}.")
+            lacks = [n for n in further if n not in view.mapping("stated")]
+            other = [n for n in further if n in view.mapping("stated")]
+            out += [f"Besides, it lacks {listing(lacks)}."] if lacks else []
+            out += [f"Besides, it has {listing(other)} at other values than the log."] if other else []
             out += [_candidate_words(by_name[m]) for m in further[:3] if m in by_name]
         told = [str(w) for w in view.texts("judged_words")]
         out += told
@@ -90,7 +93,7 @@ class DiagnosisPage(Page):
         if after.get("words"):
             out.append(f"Next: {str(after['words']).rstrip('.')}.")
         elif verdict == "named":
-            again = " and refit=true" if view.mapping("stated") else ""
+            again = " and refit=true" if {*missing} & {*view.mapping("stated")} else ""
             out.append(
                 f"Next: auvnn add with effect={','.join(missing)}{again} fits it and compares before and after."
             )

@@ -43,7 +43,8 @@ export class MissingScreen {
 
   draw(state, done) {
     const answer = this.answer, missing = answer.missing || [];
-    const [tone, words] = VERDICTS[answer.verdict] || ["warn", answer.verdict];
+    let [tone, words] = VERDICTS[answer.verdict] || ["warn", answer.verdict];
+    if (answer.verdict === "named" && missing.some((n) => n in (answer.stated || {}))) words = missing.every((n) => n in answer.stated) ? "The model has this at other values" : "The model lacks this, or has it at other values";
     // Of a partial verdict nothing is named as the cause; what predicts a part stands first anyway.
     const named = missing.length ? missing : answer.verdict === "partial" ? answer.nearest || [] : [];
     const candidates = bestFirst(answer.candidates, [...named, ...(answer.nearest || [])]);

@@ -35,6 +35,8 @@ export class TryScreen {
     if (!found) return;
     this.model = model;
     [this.effects, this.log, this.diagnosis] = found;
+    // Of an earlier model's diagnosis it is not known what the log says of this model's values.
+    this.other = (this.diagnosis && !state.answers.diagnosis.stale && this.diagnosis.stated) || {};
     this.draw();
   }
 
@@ -45,7 +47,7 @@ export class TryScreen {
       const values = {};
       for (const p of effect.parameters) {
         const guess = seen && seen.parameters && seen.parameters[p.name];
-        values[p.name] = effect.present ? p.value : own && Number.isFinite(own[p.name]) ? own[p.name] : guess && Number.isFinite(guess.value) ? guess.value : p.null;
+        values[p.name] = own && Number.isFinite(own[p.name]) ? own[p.name] : effect.present ? p.value : guess && Number.isFinite(guess.value) ? guess.value : p.null;
       }
       return { effect, seen, values, on: effect.present || Boolean(own) };
     });
@@ -93,7 +95,7 @@ export class TryScreen {
       h("div", { class: "row" },
         h("input", { type: "checkbox", role: "switch", class: "switch", id, checked: entry.on, disabled: lacks, onchange: (e) => { entry.on = e.target.checked; this.toggles(); const again = document.getElementById(id); if (again) again.focus(); this.follow(); } }),
         h("label", { for: id }, h("b", {}, effect.name), h("span", { class: "soft" }, ` ${effect.cause}`)),
-        effect.present && h("span", { class: "badge" }, this.diagnosis && effect.name in (this.diagnosis.stated || {}) ? "in the model, at other values than the log" : "in the model")),
+        effect.present && h("span", { class: "badge" }, effect.name in this.other ? "in the model, at other values than the log" : "in the model")),
       lacks && h("p", { class: "soft" }, `needs ${effect.lacks.join(", ")}`),
       entry.on && effect.parameters.map((p) => this.slider(entry, p)));
   }
@@ -194,8 +196,7 @@ export class TryScreen {
 
   fit(button) {
     // Of those that the model has, such as the log contradicts are fitted anew.
-    const other = (this.diagnosis && this.diagnosis.stated) || {};
-    const fresh = this.chosen().filter((e) => !e.effect.present || e.effect.name in other).map((e) => e.effect.name);
+    const fresh = this.chosen().filter((e) => !e.effect.present || (e.effect.name in this.other && e.effect.name in this.app.tried)).map((e) => e.effect.name);
     this.app.start("add", fresh, button);
   }
 
@@ -233,6 +234,6 @@ export class TryScreen {
 
   close() {
     if (this.group) this.group.destroy();
-    if (this.entries) { this.app.tried = {}; for (const e of this.chosen()) if (!e.effect.present) this.app.tried[e.effect.name] = { ...e.values }; }
+    if (this.entries) { const before = this.app.tried; this.app.tried = {}; for (const e of this.chosen()) if (!e.effect.present || e.effect.name in before) this.app.tried[e.effect.name] = { ...e.values }; }
   }
 }

@@ -296,5 +296,5 @@ class NameAfterName(UnderLaw):
         little = further.evidence - path.current.evidence < LITTLE * one_of_them
         if forms and not little:
             about = self.about(further.explanation)
-            return exerts_less(further.explanation, about, further.name, forms)
+            return exerts_less(further.explanation, about, further.name, forms, self.asked.stated)
         return little and (bool(forms) or self.predicted(further) is not None)
