@@ -24,7 +24,7 @@ from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.shorter_windows import search_over_shorter
 from auvnn.diagnosis.stages.state import Searched, Setting
 from auvnn.diagnosis.stages.unnamed_effects import beside_unnamed
-from auvnn.diagnosis.stages.what_is_left import settled
+from auvnn.diagnosis.stages.what_is_left import settled, without_stated
 from auvnn.errors import ConfigError, InputError
 from auvnn.estimation.prediction_error import SINGULAR
 from auvnn.estimation.window_normal_equations import TRUST, motion
@@ -195,7 +195,7 @@ def searched(
             asked, state = search_over_shorter(asked, state, search)
         if stochastic:
             state, told, words = answer_with_force(asked, state)
-        state = beside_unnamed(asked, beyond_stated(asked, settled(asked, state)))
+        state = beside_unnamed(asked, beyond_stated(asked, without_stated(asked, settled(asked, state))))
         found = answer(asked, state)
     except (np.linalg.LinAlgError, SINGULAR) as problem:
         raise InputError(

@@ -7,10 +7,12 @@ import pytest
 
 import auvnn
 from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.diagnose import searched
 from auvnn.diagnosis.hypotheses.candidates import candidates_for, windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import initial_guess, lay_out
 from auvnn.diagnosis.score_tests.shape_search import searched_start
+from auvnn.diagnosis.stages.what_is_left import without_stated
 from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
@@ -97,6 +99,21 @@ def test_the_force_of_a_change_is_that_of_the_change_alone():
     force = found.matters["net_buoyancy"]["force"]
     total = np.sqrt(sum(force[a] ** 2 for a in "XYZ"))
     assert total == pytest.approx(5.0, rel=0.1)
+
+
+def test_it_is_no_name_where_a_force_without_a_name_is_left():
+    """Where the model lacks something, the values of its effects are the first to move."""
+    _, found = searched(model(KNOWN), log_of(OTHER), NAMES, advice=False, whiteness=False, costs=False)
+    asked, state = found.setting, found.state
+    first, _ = state.steps
+    assert without_stated(asked, state) is state
+    unknown = {"verdict": "unknown", "effects": [], "p_value": 0.0}
+    given = without_stated(asked, state.but(steps=(first, unknown)))
+    assert [s["verdict"] for s in given.steps] == ["unknown"] and given.nearest == ("ocean_current",)
+    assert given.chosen == () and given.current is state.first and given.refuted is None
+    # One that the model lacks comes first.
+    other = state.but(steps=({**first, "effects": ["net_buoyancy"]}, first, unknown))
+    assert without_stated(asked, other) is other
 
 
 def test_the_costs_are_told_as_those_of_the_change(changed):

@@ -113,6 +113,22 @@ def _not_the_cause(asked: Setting, state: State, given: list[str]) -> State:
     )
 
 
+def without_stated(asked: Setting, state: State) -> State:
+    """Return the state without names, where a force without a name is left and the first ones are of the model's effects.
+
+    What the model says of an effect was seen elsewhere, and where the model lacks something, the values of its effects
+    are the first to move: such a name is given where it leaves nothing that has a cause.
+
+    Args:
+        asked: what is asked.
+        state: where the search ended.
+    """
+    named = [s["effects"] for s in state.steps if s["verdict"] in ("named", "ambiguous")]
+    if not named or state.steps[-1]["verdict"] != "unknown" or not {*named[0]} <= {*asked.stated}:
+        return state
+    return _not_the_cause(asked, state, [e for effects in named for e in effects]).but(refuted=None)
+
+
 def settled(asked: Setting, state: State) -> State:
     """Return the state with names that are no cause kept for what they predict, where each earns its place.
 
