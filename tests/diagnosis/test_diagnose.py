@@ -216,11 +216,14 @@ def test_effects_that_lack_a_channel_are_listed_with_what_they_need(monkeypatch,
     assert found["bottom_pull"]["needs"] == [] and found["bottom_pull"]["p_value"] is not None
 
 
-def test_effects_that_the_model_has_already_are_listed_and_not_tried(current, model):
+def test_effects_that_the_model_has_already_are_asked_for_unless_they_have_a_shape(current, model):
     log, _, _ = current
-    found = diagnose(model.with_effects({"ocean_current": CURRENT}), log, ["ocean_current", "net_buoyancy"])
+    known = model.with_effects({"ocean_current": CURRENT, "waves": {"amplitude": 0.0}})
+    found = diagnose(known, log, ["ocean_current", "waves", "net_buoyancy"])
     assert found.verdict == "adequate"
-    assert by_name(found)["ocean_current"]["p_value"] is None
+    told = by_name(found)
+    assert told["ocean_current"]["p_value"] > 0.01 and told["ocean_current"]["reason"] is None
+    assert told["waves"]["p_value"] is None and "has a shape: not asked for" in told["waves"]["reason"]
 
 
 def test_thrusters_at_neutral_say_nothing_about_thrusters_and_no_number_pretends_they_do(model):

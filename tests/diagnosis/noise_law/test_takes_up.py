@@ -38,10 +38,10 @@ def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_is_no_name(
 ):
     told = None if predicted is None else InputPrediction("X", "u", 0.5, predicted)
     asked: Any = ForceSearch.__new__(ForceSearch)
-    asked.in_closed_loop = True
+    asked.in_closed_loop, asked.asked = True, SimpleNamespace(stated={"waves": None})
     monkeypatch.setattr(under_law, "predicted_by_inputs", lambda *_, **__: told)
     compared = []
-    monkeypatch.setattr(name_after_name, "exerts_less", lambda *given: compared.append(given[3]) or less)
+    monkeypatch.setattr(name_after_name, "exerts_less", lambda *given: compared.append(given[3:]) or less)
     monkeypatch.setattr(asked, "say", lambda _: None, raising=False)
     monkeypatch.setattr(asked, "about", lambda _: None)
     monkeypatch.setattr(asked, "_sums", lambda _: None)
@@ -57,5 +57,5 @@ def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_is_no_name(
     )
     null: Any = SimpleNamespace(evidence=500.0)
     assert asked._takes_up(found, path, null) is expected
-    # With the one that leaves such a thing, not with what else was named.
-    assert all(names == ["thrust_asymmetry"] for names in compared)
+    # With the one that leaves such a thing, not with what else was named; of the model's effects the change counts.
+    assert all(given == (["thrust_asymmetry"], {"waves": None}) for given in compared)

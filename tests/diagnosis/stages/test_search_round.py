@@ -27,6 +27,7 @@ class Asked:
         self.usable, self.base, self.most = USABLE, [], 5
         self.say, self.choices, self.offered = lambda _: None, choices, []
         self.gone: list[str] = []
+        self.stated = {"waves": np.ones(1)}
 
     def tests(self, windows: Any) -> Any:
         def tested(current: Any, remaining: Any, *_: Any, **__: Any) -> Any:
@@ -172,8 +173,8 @@ def test_a_small_constant_force_beside_an_asymmetry_of_the_thrust_is_passed_over
 def test_so_is_one_that_explains_much_and_exerts_less_than_the_form_that_leaves_it(monkeypatch):
     asked_of = []
 
-    def less(found, windows, further, names):
-        asked_of.append((further, names))
+    def less(found, windows, further, names, stated):
+        asked_of.append((further, names, [*stated]))
         return further == "constant_force"
 
     monkeypatch.setattr(module, "exerts_less", less)
@@ -182,7 +183,7 @@ def test_so_is_one_that_explains_much_and_exerts_less_than_the_form_that_leaves_
     asked: Any = Asked([named(bias), named(other)])
     assert search_round(asked, begun(*chosen)).chosen[-1] == "tether"
     # With the one that leaves such a thing, not with what else was named.
-    assert asked_of == [("constant_force", ["thrust_asymmetry"])]
+    assert asked_of == [("constant_force", ["thrust_asymmetry"], ["waves"])]
 
 
 def test_what_comes_in_the_place_of_one_that_is_passed_over_may_be_passed_over_too(monkeypatch):
