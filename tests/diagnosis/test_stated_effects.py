@@ -118,7 +118,7 @@ def test_it_is_no_name_where_a_force_without_a_name_is_left():
 
 def test_the_costs_are_told_as_those_of_the_change(changed):
     told = next(x for x in changed[1].story if x.startswith("ocean_current: "))
-    assert told.startswith("ocean_current: as the model has it the error of free running")
+    assert told.startswith("ocean_current: with the values that the model has, the error of free running")
     assert "the force of the change is" in told and "without it" not in told
 
 

@@ -23,7 +23,9 @@ def costs(diagnosis: Diagnosis) -> list[str]:
             continue
         there = name in diagnosis.stated
         without, whose = (
-            ("as the model has it", "the force of the change") if there else ("without it", "its force")
+            ("with the values that the model has,", "the force of the change")
+            if there
+            else ("without it", "its force")
         )
         parts = []
         if _known(entry["cost"]):
