@@ -45,7 +45,7 @@ class Diagnosis(Answer):
     Attributes:
         verdict: named, ambiguous, partial, unknown or adequate.
         missing: names to add, those that matter first; of an ambiguous verdict the rivals, as `OneOf`.
-        stated: of these, such as the model has already, with the values that it states, which the log contradicts.
+        stated: of the names that are told, such as the model has already, with the values that it states.
         matters: name to what it costs, how large its force is, and whether that is beyond the tolerance.
         nearest: names that explain a part and are not the cause; of a partial verdict those that predict.
         joint: of a partial verdict, what each of these does in addition to the others.

@@ -119,6 +119,8 @@ def _candidates(
         if name not in state.current.effects:
             table[name] = replace(table[name], reason=reason)
     for name in {*table} & {*asked.model.effect_names} - {*asked.usable}:
+        if table[name].needs:
+            continue
         table[name] = replace(table[name], reason="the model has it, and it has a shape: not asked for")
     names = [*given, *(n for n in state.nearest if n not in given)] if state.partial else given
     rows = sorted(

@@ -23,6 +23,7 @@ from auvnn.estimation.prediction_error import FitError
 ALPHA_LEFT = 0.01
 # Names that leave more than this share of what looks like a force have stood in for something without a name.
 PARTIAL = 0.1
+UNASKED = "whether a force without a name is left could not be asked: the sums of its test cannot be solved"
 
 
 def what_is_left(asked: Setting, state: State) -> State:
@@ -31,10 +32,7 @@ def what_is_left(asked: Setting, state: State) -> State:
     try:
         return _asked(asked, state)
     except np.linalg.LinAlgError:
-        note = (
-            "whether a force without a name is left could not be asked: the sums of its test cannot be solved"
-        )
-        return state.but(notes=(*state.notes, note))
+        return state.but(notes=(*state.notes, UNASKED))
 
 
 def _asked(asked: Setting, state: State) -> State:
@@ -126,7 +124,10 @@ def without_stated(asked: Setting, state: State) -> State:
     named = [s["effects"] for s in state.steps if s["verdict"] in ("named", "ambiguous")]
     if not named or state.steps[-1]["verdict"] != "unknown" or not {*named[0]} <= {*asked.stated}:
         return state
-    return _not_the_cause(asked, state, [e for effects in named for e in effects]).but(refuted=None)
+    try:
+        return _not_the_cause(asked, state, [e for effects in named for e in effects]).but(refuted=None)
+    except np.linalg.LinAlgError:
+        return state.but(notes=(*state.notes, UNASKED))
 
 
 def settled(asked: Setting, state: State) -> State:
