@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,8 @@ from auvnn.errors import ConfigError
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
 
+# The module, of which the package's function has the name.
+diagnosing = sys.modules["auvnn.diagnosis.diagnose"]
 NAMES = ["ocean_current", "current_shear", "net_buoyancy", "thruster_gain"]
 # What was fitted on another day, a tenth of a millimetre per second sure.
 KNOWN = {"ocean_current": {"v_north": 0.2, "v_east": -0.1, "uncertainty": {"v_north": 1e-4, "v_east": 1e-4}}}
@@ -114,6 +118,24 @@ def test_it_is_no_name_where_a_force_without_a_name_is_left():
     # One that the model lacks comes first.
     other = state.but(steps=({**first, "effects": ["net_buoyancy"]}, first, unknown))
     assert without_stated(asked, other) is other
+
+
+def test_the_answer_goes_by_it(monkeypatch, changed):
+    """The search of `changed`, as if a force had been left that has no name."""
+    log, found = changed
+    plain = diagnosing.settled
+
+    def unsettled(asked, state):
+        settled = plain(asked, state)
+        unknown = {"verdict": "unknown", "effects": [], "p_value": 0.0}
+        return settled.but(steps=(*(s for s in settled.steps if s["effects"]), unknown))
+
+    monkeypatch.setattr(diagnosing, "settled", unsettled)
+    told = answer(model(KNOWN), log)
+    assert found.verdict == "named" and told.verdict == "unknown"
+    assert told.missing == [] and told.nearest == ["ocean_current"]
+    # Of what is nearest it is told as well that the model has it.
+    assert [*told.stated] == ["ocean_current"] and not told.missing.refit
 
 
 def test_the_costs_are_told_as_those_of_the_change(changed):

@@ -170,6 +170,12 @@ def test_add_then_remove(report, auvnn, made):
     assert status == 2 and "ocean_current" in err
     after = compare(load("out/model"), Log.read(made / "log.parquet"), horizons=[5])
     assert after.rollout["5"]["total"] < 0.1
+    words = ["add", "model=out/model", f"log={made / 'log.parquet'}", "effect=ocean_current", "out=anew"]
+    status, _, err = auvnn(*words)
+    assert status == 2 and "the model has ocean_current already: refit=true fits it anew" in err
+    assert auvnn(*words, "refit=true")[0] == 0
+    there, anew = (load(f"{folder}/model").effect("ocean_current").values() for folder in ("out", "anew"))
+    assert there != anew and all(abs(there[n] - anew[n]) < 0.01 for n in there)
 
 
 def test_add_says_which_effect_adds_nothing(auvnn, made, monkeypatch, tmp_path):

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import pytest
 
 import auvnn
+from auvnn.improvement.loop import causes
 from auvnn.improvement.loop.judge import Judge
 from auvnn.improvement.loop.screen import wanted
 from auvnn.improvement.loop.state import Recipe
@@ -41,3 +45,30 @@ def test_what_the_model_has_is_asked_for_until_it_is_in_the_recipe(log):
     judge = Judge.of(log, given.actuation)
     assert "ocean_current" in wanted(given, judge, Recipe())
     assert "ocean_current" not in wanted(given, judge, Recipe(effects=("ocean_current",)))
+
+
+@pytest.mark.parametrize("effects", [None, ["ocean_current", "net_buoyancy"]])
+def test_the_diagnosis_is_not_asked_for_what_the_loop_has_put_in(log, monkeypatch, effects):
+    """It was fitted to this log; what the model had from elsewhere may be wrong."""
+    asked = []
+
+    def named(model, log, names, **_):
+        asked.append(list(names))
+        missing = ["net_buoyancy"] if len(asked) == 1 else []
+        return SimpleNamespace(
+            verdict="named" if missing else "unknown", missing=missing, nearest=[], story=[], steps=[]
+        )
+
+    monkeypatch.setattr(causes, "diagnose", named)
+    monkeypatch.setattr(causes.Causes, "_add_best", take)
+    walk = causes.Causes(model(0.2, -0.1), log, None, effects, 4, 600.0, None, None)
+    walk.diagnose()
+    assert "ocean_current" in asked[0] and "net_buoyancy" in asked[0]
+    assert asked[1] == [n for n in asked[0] if n != "net_buoyancy"]
+
+
+def take(self, group, *_, **__):
+    self.state = replace(
+        self.state, recipe=replace(self.state.recipe, effects=(*self.state.recipe.effects, *group))
+    )
+    return True

@@ -16,6 +16,7 @@ from auvnn.plants.independent.sensors import Reported, report
 from auvnn.plants.independent.servos import Servos
 from auvnn.plants.independent.thrust import Actuators
 from auvnn.plants.independent.vectors import cross_matrix, matrix_of, orthonormal
+from auvnn.studies.benchmark.identifiability.plant_information import remembers_commands
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Mapping[str, float]]
@@ -24,8 +25,6 @@ Values = Mapping[str, Mapping[str, float]]
 STEP = 1e-4
 # The filter's own step, s: a log with rare rows is filtered in between.
 FINE = 0.05
-# Effects by which the thrust changes while a command is held.
-REMEMBERING = ("thruster_lag", "propeller_lag", "thrust_overshoot", "actuation_delay")
 
 
 @dataclass(frozen=True)
@@ -101,7 +100,7 @@ def accelerations(course: Course, effects: Values, kicks: Array | None = None) -
     changes = np.zeros((1, 12)) if kicks is None else kicks
     turns = Rotation.from_rotvec(changes[:, 3:6]).as_matrix()
     many = len(changes)
-    memory = any(name in REMEMBERING for name in effects)
+    memory = any(remembers_commands(name) for name in effects)
     # The mean over a step is what moves the vehicle, of fins that lag as of thrusters.
     servos = Servos(effects["fin_lag"]["time_constant"]) if "fin_lag" in effects else None
     out = np.empty((many, *speeds.shape))

@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 SHARE, STATE = 1e-3, 1e-4
 # Longest step of the plant, s: differences do not see what both runs err by alike.
 STEP = 0.025
-# Effects that count the time since the run began, which a window does not know, or remember commands before it.
-REMEMBERING = ("biofouling", "flooding", "payload", "waves")
+# Effects that count the time since the run began, which a window does not know.
+BY_TIME = ("biofouling", "flooding", "payload", "waves")
 
 
 class PlantOutputs:
@@ -99,6 +99,17 @@ def state_slopes(outputs: PlantOutputs, states: Array, now: Array, effects: Mapp
     return np.stack([change(now, one) / STATE for one in after], axis=-1)
 
 
+def remembers_commands(name: str, hooks: Sequence[str] = ("delay", "respond")) -> bool:
+    """Whether what an effect does depends on commands before.
+
+    Args:
+        name: the effect.
+        hooks: by which an effect has thrust, or fins, follow commands with time.
+    """
+    kind = effect_class(name)
+    return kind.remembers or bool({*hooks} & {*kind.hooks()})
+
+
 def covers(plant: str, names: Sequence[str]) -> bool:
     """Whether windows of a plant say all of these effects.
 
@@ -106,13 +117,9 @@ def covers(plant: str, names: Sequence[str]) -> bool:
     """
     from auvnn.plants import PLANTS
 
-    remembering = any(
-        n in REMEMBERING
-        or effect_class(n).remembers
-        or {"delay", "respond", "steer"} & {*effect_class(n).hooks()}
-        for n in names
-    )
-    return not remembering and not any(PLANTS.get(plant)().refuses(n) for n in names)
+    if any(n in BY_TIME or remembers_commands(n, ("delay", "respond", "steer")) for n in names):
+        return False
+    return not any(PLANTS.get(plant)().refuses(n) for n in names)
 
 
 def plant_information(

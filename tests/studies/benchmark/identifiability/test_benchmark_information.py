@@ -128,6 +128,7 @@ def test_a_plant_is_asked_only_of_what_it_can_hold_and_windows_can_say():
     assert covers("numpy", ["net_buoyancy", "constant_force"])
     assert not covers("numpy", ["net_buoyancy", "thruster_lag"]), "it remembers commands from before a window"
     # A current is confusable with one that grows with depth, which the engine has not got.
+    assert not any(covers("numpy", [n]) for n in ("propeller_lag", "thrust_overshoot", "fin_lag", "waves"))
     assert covers("numpy", ["ocean_current", "current_shear"])
     pytest.importorskip("mujoco")
     assert covers("mujoco", ["ocean_current"]) and not covers("mujoco", ["ocean_current", "current_shear"])
