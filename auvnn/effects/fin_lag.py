@@ -7,8 +7,8 @@ from typing import Any
 from torch import Tensor
 
 from auvnn.effects.fin_parts import FinEffect
-from auvnn.effects.first_order import first_order
-from auvnn.effects.hooks import EACH, Parameter, Response
+from auvnn.effects.first_order import TIME_CONSTANT, first_order
+from auvnn.effects.hooks import Parameter, Response
 
 
 class FinLag(FinEffect):
@@ -34,7 +34,7 @@ class FinLag(FinEffect):
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
         """Return the time constant."""
-        return (Parameter("time_constant", "s", 0.0, 0.15, 0.0, 5.0, timing=True, actuator=EACH),)
+        return (TIME_CONSTANT,)
 
     def steer(self, state: Tensor, command: Tensor, step: Tensor) -> Response:
         """Return the lagged angles; at the null they are the commands themselves, exactly.

@@ -7,7 +7,10 @@ import math
 import torch
 from torch import Tensor
 
-from auvnn.effects.hooks import Response
+from auvnn.effects.hooks import EACH, Parameter, Response
+
+TIME_CONSTANT = Parameter("time_constant", "s", 0.0, 0.15, 0.0, 5.0, timing=True, actuator=EACH)
+"""Of lags that act on each actuator by itself."""
 
 SMALL = 0.05
 """Step over time constant below which the power series holds to the last digits."""
@@ -48,3 +51,16 @@ def first_order(tau: Tensor, state: Tensor, demand: Tensor, step: Tensor) -> Res
     gap = state - demand
     start = torch.where(tau > 0, state, demand)
     return Response(demand + gap * left, demand + gap * mean, gap * moment, start)
+
+
+def row_lengths(times: Tensor) -> Tensor:
+    """Return for how long the command of each row is held, s, (..., T, 1).
+
+    The last row has no known length: as long as the one before, as if the record went on; zero where it is the only one.
+
+    Args:
+        times: of the rows, s, (..., T).
+    """
+    steps = (times[..., 1:] - times[..., :-1]).unsqueeze(-1)
+    last = steps[..., -1:, :] if steps.shape[-2] else torch.zeros_like(times[..., :1].unsqueeze(-1))
+    return torch.cat([steps, last], dim=-2)

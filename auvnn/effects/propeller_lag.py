@@ -8,8 +8,8 @@ import torch
 from torch import Tensor
 
 from auvnn.effects.base import Effect
-from auvnn.effects.first_order import first_order
-from auvnn.effects.hooks import EACH, Parameter
+from auvnn.effects.first_order import TIME_CONSTANT, first_order, row_lengths
+from auvnn.effects.hooks import Parameter
 from auvnn.physics.recurrence import closing_gap
 
 
@@ -43,7 +43,7 @@ class PropellerLag(Effect):
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
         """Return the time constant."""
-        return (Parameter("time_constant", "s", 0.0, 0.15, 0.0, 5.0, timing=True, actuator=EACH),)
+        return (TIME_CONSTANT,)
 
     def command(self, command: Tensor, times: Tensor) -> Tensor:
         """Return the mean speed of every row as a command; it is settled at the first one.
@@ -52,10 +52,7 @@ class PropellerLag(Effect):
             command: held per interval, (..., T, n).
             times: of the rows, s, (..., T).
         """
-        steps = (times[..., 1:] - times[..., :-1]).unsqueeze(-1)
-        # The last row has no known length: as long as the one before, as if the record went on.
-        last = steps[..., -1:, :] if steps.shape[-2] else torch.ones_like(times[..., :1].unsqueeze(-1))
-        steps = torch.cat([steps, last], dim=-2)
+        steps = row_lengths(times)
         # The answer is linear in the gap between speed and command: that to a gap of one tells how it closes.
         one = first_order(self.theta[0], torch.ones_like(steps), torch.zeros_like(steps), steps)
         return command + closing_gap(command, one.end[..., :-1, :]) * one.mean

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from auvnn.effects.base import Effect
 from auvnn.effects.factors import actuators
+from auvnn.effects.first_order import row_lengths
 from auvnn.effects.hooks import EACH, Parameter
 from auvnn.physics.recurrence import closing_gap
 
@@ -48,11 +49,7 @@ class ThrustOvershoot(Effect):
     def command(self, command: Tensor, times: Tensor) -> Tensor:
         """Add the excess; the flow is taken as settled at the first row."""
         tau, excess = self.theta[0].to(command), self.theta[1:].to(command)
-        steps = (times[..., 1:] - times[..., :-1]).unsqueeze(-1)
-        # The last row has no known length: as long as the one before, as if the record went on.
-        last = steps[..., -1:, :] if steps.shape[-2] else torch.zeros_like(times[..., :1].unsqueeze(-1))
-        steps = torch.cat([steps, last], dim=-2)
-        ratio = steps / tau
+        ratio = row_lengths(times) / tau
         # The flow follows the held commands by first-order filtering, exactly.
         gap = closing_gap(command, torch.exp(-ratio[..., :-1, :]))
         return command - excess * gap * _left(ratio)

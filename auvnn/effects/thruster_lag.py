@@ -7,8 +7,8 @@ from typing import Any
 from torch import Tensor
 
 from auvnn.effects.base import Effect
-from auvnn.effects.first_order import first_order
-from auvnn.effects.hooks import EACH, Parameter, Response
+from auvnn.effects.first_order import TIME_CONSTANT, first_order
+from auvnn.effects.hooks import Parameter, Response
 
 
 class ThrusterLag(Effect):
@@ -31,7 +31,7 @@ class ThrusterLag(Effect):
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
         """Return the time constant."""
-        return (Parameter("time_constant", "s", 0.0, 0.15, 0.0, 5.0, timing=True, actuator=EACH),)
+        return (TIME_CONSTANT,)
 
     def respond(self, state: Tensor, demand: Tensor, step: Tensor) -> Response:
         """Return the lagged thrust; at the null it is the demand itself, exactly."""
