@@ -40,6 +40,8 @@ class Effect(nn.Module):
     `leaves`: effects that look like what its own form gets wrong. `remembers`: what `command` returns depends on earlier
     commands by one state per command: `follow`, `advance`. `acts_with`: effects without any of which it does nothing, so
     that it can neither be missing nor be hidden alone. `is_drag`: what it adds grows with the drag that others scale.
+    `turns`: what `command` returns is the propellers' speed, as the command that it settles at; `by_speed`: its `thrust`
+    goes by that speed (`Moment.turning`).
     """
 
     name: ClassVar[str]
@@ -60,6 +62,8 @@ class Effect(nn.Module):
     contains: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     time_varying: ClassVar[bool] = False
     remembers: ClassVar[bool] = False
+    turns: ClassVar[bool] = False
+    by_speed: ClassVar[bool] = False
     leaves: ClassVar[tuple[str, ...]] = ()
     acts_with: ClassVar[tuple[str, ...]] = ()
     is_drag: ClassVar[bool] = False

@@ -191,6 +191,7 @@ class Moment:
         dragged: the same as the drag feels it, (..., 6), where an effect sets it apart; None is `nu_r`.
         nu_c_dot: acceleration of the water in body axes, (..., 6); zero inside `water`.
         command: what was commanded over this interval, (..., n).
+        speed: of the propellers, as the command that it settles at, (..., n), where an effect has it follow its command.
         fins: fin angles, rad, (..., m), or None; where an effect has the fins follow their commands, the actual ones.
         voltage: V, (...), or None.
         altitude: m, (...), or None.
@@ -218,6 +219,12 @@ class Moment:
     dragged: Tensor | None = None
     body_lift: Tensor | None = None
     lift_lost: Tensor | None = None
+    speed: Tensor | None = None
+
+    @property
+    def turning(self) -> Tensor:
+        """Speed of the propellers as a command, (..., n): the command itself where nothing lags."""
+        return self.command if self.speed is None else self.speed
 
     @property
     def drag_flow(self) -> Tensor:

@@ -18,6 +18,8 @@ class InflowEffect(Effect):
     A commanded wrench is taken as six propellers of which three push, along x, y and z.
     """
 
+    by_speed = True
+
     def settle(self, vehicle: Any, actuation: str) -> None:
         """Keep the actuators' geometry and what a full command is."""
         if actuation == "wrench":
@@ -35,5 +37,5 @@ class InflowEffect(Effect):
         return moment.nu_r @ self.kept("columns").to(moment.nu_r).mT
 
     def share(self, moment: Moment) -> Tensor:
-        """Return the commands as shares of full ones, (..., n)."""
-        return moment.command / self.kept("full").to(moment.command)
+        """Return the speeds of the propellers, as commands, as shares of full ones, (..., n)."""
+        return moment.turning / self.kept("full").to(moment.turning)

@@ -21,7 +21,8 @@ class PropellerLag(Effect):
     a lag of the thrust itself (`thruster_lag`); while the time constant is short beside the changes of the command, the
     two are the same: T(n - tau dn/dt) = T - tau dT/dt. The speed begins settled at the first command of the history.
     Over an interval of constant command the solution is exact. The curves are given its mean there, which misses the
-    mean of n abs(n) by the variance of n within the interval. At the null (0 s) the slope is the true one.
+    mean of n abs(n) by the variance of n within the interval. Losses by inflow go by that mean too. At the null (0 s) the
+    slope is the true one.
     Reference: Yoerger, Cooke and Slotine (1990), for the propeller's speed as the state of the actuator.
     """
 
@@ -34,6 +35,7 @@ class PropellerLag(Effect):
     told_apart_by = "large steps of the command, up and down and through zero"
     plainer = ("thruster_lag",)
     remembers = True
+    turns = True
 
     @classmethod
     def lacks(cls, vehicle: Any, actuation: str) -> tuple[str, ...]:

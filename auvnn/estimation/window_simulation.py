@@ -15,6 +15,7 @@ from auvnn.estimation.few_inputs import Directions, slopes
 from auvnn.metrics.free_run import away, predict
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
+from auvnn.models.actuation.acting import speeds_follow
 from auvnn.models.actuation.drive import Drive
 from auvnn.models.free_running.one_interval import one_interval
 from auvnn.models.free_running.rollout import steps_per_interval
@@ -28,7 +29,7 @@ class Thrust(nn.Module):
     """Mean thrust of every interval, and the thrust as it begins, as functions of the effects' parameters.
 
     Where an effect has the fins follow their commands, or they go by parts of an interval, their angles come after the
-    thrust and count among the n.
+    thrust and count among the n; so does the propellers' speed where an effect goes by it.
     """
 
     def __init__(self, model: GreyBox) -> None:
@@ -47,6 +48,7 @@ class Thrust(nn.Module):
             given.fins,
             given.within,
             given.fins_within,
+            speeds_follow(self.model),
         )
 
     def forward(self, windows: Windows, substeps: int) -> tuple[Tensor, Tensor]:

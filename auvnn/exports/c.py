@@ -111,7 +111,7 @@ void {name}_settle_step(const {name}_real *u, {name}_real *s);
 def source(system: System, precision: str) -> str:
     """Return the functions."""
     name, say = system.name, Dialect(system.name, precision == "float")
-    real, n, flow = f"{name}_real", system.flow.actuators.inputs, system.flow
+    real, n, flow = f"{name}_real", system.flow.actuators.acting, system.flow
     rate, step, settled = (g.results for g in (system.actuator_rate, system.actuator_step, system.settled))
     k, whole, risen = flow.actuators.states, system.jacobian.results, _risen(system)
     parts = [
@@ -172,7 +172,7 @@ def _together(system: System) -> set[str]:
 
 def _risen(system: System) -> bool:
     """Return whether the thrust changes within a step."""
-    n = system.flow.actuators.inputs
+    n = system.flow.actuators.acting
     return any(
         system.actuator_step.scalars.value(node) != 0.0 for node in system.actuator_step.results[n : 2 * n]
     )
@@ -181,7 +181,7 @@ def _risen(system: System) -> bool:
 def _step(system: System, say: Dialect, risen: bool) -> str:
     """Return the step: the classical Runge-Kutta scheme around the functions above."""
     name, upper, real = system.name, system.name.upper(), f"{system.name}_real"
-    n, m = system.flow.actuators.inputs, system.steps.actuators.states
+    n, m = system.flow.actuators.acting, system.steps.actuators.states
     half, sixth = ("0.5f", "6.0f") if say.single else ("0.5", "6.0")
     wanted = (
         [f"if ({say.function('abs')}(h - {upper}_STEP) > {say.number(1e-6)} * {upper}_STEP)", "    return 1;"]

@@ -60,7 +60,7 @@ def import_casadi() -> Any:
 def functions(system: System) -> dict[str, Any]:
     """Return rate, step and jacobian as CasADi functions."""
     ca = import_casadi()
-    flow, steps, name, n = system.flow, system.steps, system.name, system.flow.actuators.inputs
+    flow, steps, name, n = system.flow, system.steps, system.name, system.flow.actuators.acting
     x, u, t, h = ca.SX.sym("x", flow.size), ca.SX.sym("u", flow.inputs), ca.SX.sym("t"), ca.SX.sym("h")
     s = x if steps.size == flow.size else ca.SX.sym("s", steps.size)
     rate = built(system.rate, {"x": x, "u": u, "t": t})

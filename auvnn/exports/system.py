@@ -63,7 +63,7 @@ class System:
 
     @cached_property
     def motion(self) -> Graph:
-        """Rate (13) of y (13) under thrust (n) and fin angles where they lag, u (m) at time t."""
+        """Rate (13) of y (13) under thrust (n), fin angles and speeds where they lag, u (m) at time t."""
         return traced(
             lambda y, thrust, u, t: self.flow.motion(y, thrust, u, t),
             {"y": self.sample("y"), "f": self.sample("f"), "u": self.sample("u"), "t": self.sample("t")},
@@ -134,9 +134,12 @@ class System:
         parts += [15.0 + draw(1)] * space.voltage + [0.5 + 3.0 * draw(1).abs()] * space.altitude
         with torch.no_grad():
             thrust = self.flow.actuators.static(before)
+            speed = before
             if self.flow.actuators.fins:
                 turned = 0.2 * draw(space.fins)
                 before, thrust = torch.cat([before, turned], dim=-1), torch.cat([thrust, turned], dim=-1)
+            if self.flow.actuators.turning is not None:
+                thrust = torch.cat([thrust, speed], dim=-1)
             a, b = (s.actuators.settled(before) for s in (self.flow, self.steps))
         # Away from where actuators are settled, by more than a little.
         a, b = (v + 0.3 * v * torch.randn(v.shape, generator=generator, dtype=torch.float64) for v in (a, b))

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from auvnn.effects import Body, Moment
 from auvnn.errors import ConfigError
+from auvnn.models.actuation.acting import apart, speeds_follow
 from auvnn.models.actuation.actuators import Actuators
 from auvnn.models.input_conversion import as_tensor, own
 from auvnn.models.inputs import Inputs
@@ -153,6 +154,7 @@ class EquationsOfMotion(Sensors):
             command.expand(*lead, self.actuators.size).unsqueeze(-2),
             moment_time.expand(lead).unsqueeze(-1),
             self.using("command"),
+            speeds=speeds_follow(self),
         )
         return self.nu_dot(
             eta[..., :3], quat_to_matrix(eta[..., 3:]), nu, drive.start[0], inputs, moment_time
@@ -176,8 +178,8 @@ class EquationsOfMotion(Sensors):
             position: NED, m, (..., 3).
             rotation: body to NED, (..., 3, 3).
             nu: velocity over ground, m/s and rad/s, (..., 6).
-            thrust: of the actuators, N, (..., n); the fins' actual angles, rad, may follow it, (..., n + m), and count
-                instead of those of the inputs.
+            thrust: of the actuators, N, (..., n); the fins' actual angles, rad, may follow it, and then the propellers'
+                speed (`speeds_follow`), and count instead of what the inputs say.
             inputs: at this moment.
             time: s since the start of the run, (...).
             prepared: body and inertia matrices; worked out here where None.
@@ -219,9 +221,8 @@ class EquationsOfMotion(Sensors):
         time: Tensor,
         prepared: Prepared | None,
     ) -> tuple[dict[str, Tensor], Prepared]:
-        altitude, fins = inputs.altitude, inputs.fins
-        if thrust.shape[-1] > self.actuators.size:
-            thrust, fins = thrust.split((self.actuators.size, thrust.shape[-1] - self.actuators.size), dim=-1)
+        thrust, fins, speed = apart(self, thrust, inputs, self.actuators.size)
+        altitude = inputs.altitude
         if altitude is None and self.bottom is not None:
             altitude = self.bottom - position[..., 2]
         moment = Moment(
@@ -235,6 +236,7 @@ class EquationsOfMotion(Sensors):
             fins,
             inputs.voltage,
             altitude,
+            speed=speed,
         )
         moving = self.using("water")
         if moving:

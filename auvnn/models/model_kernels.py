@@ -15,6 +15,7 @@ from auvnn.compiled.known_code import KnownCode, Made
 from auvnn.compiled.program import Layout, Numbers, Program, trace, trace_plain
 from auvnn.compiled.recorder import CannotCompile
 from auvnn.compiled.source import write
+from auvnn.models.actuation.acting import speeds_follow
 from auvnn.models.free_running.rate import SIZE, state_rate, unit_attitude
 from auvnn.models.identity import Identity, has_hooks
 from auvnn.models.inputs import Inputs
@@ -74,8 +75,10 @@ def require_plain(tensors: list[Tensor]) -> None:
 def _layout(model: GreyBox, inputs: Inputs) -> Layout:
     size = model.actuators.size
     fins = 0 if inputs.fins is None else inputs.fins.shape[-1]
-    # Fins that follow their commands, or change within an interval, come after the thrust, as lines over each step.
+    # Fins that follow their commands, or change within an interval, come after the thrust, as lines over each step; then
+    # the propellers' speed, where something goes by it.
     moving = fins if inputs.fins_move(bool(model.using("steer"))) else 0
+    moving += size if speeds_follow(model) else 0
     there = (("voltage", inputs.voltage), ("altitude", inputs.altitude))
     plain = tuple((name, None if x is not None else 0) for name, x in there)
     return Layout(

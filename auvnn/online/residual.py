@@ -18,6 +18,7 @@ from torch import Tensor
 
 from auvnn.effects import Moment
 from auvnn.models import GreyBox, Inputs
+from auvnn.models.actuation.acting import speeds_follow
 from auvnn.models.equations_of_motion import Prepared
 from auvnn.physics.attitude import quat_to_matrix
 from auvnn.physics.kinematics import eta6_to_eta7
@@ -162,7 +163,7 @@ class Predictor:
         rows, times = self._rows()
         drive = self.model.actuators.drive(
             rows.command, times, [e for h in ("command", "respond", "steer") for e in self.model.using(h)], 1,
-            len(times) - 1, rows.fins,
+            len(times) - 1, rows.fins, speeds=speeds_follow(self.model),
         )  # fmt: skip
         return self.model.nu_dot(
             sample.eta[:3], quat_to_matrix(sample.eta[3:]), sample.nu, drive.start[-1], sample.inputs(),

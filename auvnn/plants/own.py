@@ -16,7 +16,7 @@ from auvnn.models.actuation.thrust_signal import ThrustSignal
 from auvnn.models.free_running.rollout import LIMIT, steps_per_interval
 from auvnn.physics.attitude import quat_derivative, quat_to_matrix
 from auvnn.plants.base import Controller, Look, Motion, Plant, PlantTask, diverged, refuse, refuse_laws
-from auvnn.plants.followed_fins import FollowedFins
+from auvnn.plants.beside_thrust import BesideThrust
 
 Array = NDArray[np.float64]
 
@@ -169,9 +169,8 @@ class Stepper:
         self.commands: list[Tensor] = []
         self.fins: list[Tensor] = []
         self.thrusts: list[Tensor] = []
-        self.etas: list[Tensor] = []
-        self.nus: list[Tensor] = []
-        self.lag, self.followed = next(iter(model.using("respond")), None), FollowedFins(model)
+        self.etas, self.nus = list[Tensor](), list[Tensor]()
+        self.lag, self.beside = next(iter(model.using("respond")), None), BesideThrust(model)
         self.delay = max((float(e.delay()) for e in model.using("delay")), default=0.0)
         self.demands: list[Tensor] = []
         self.states: list[Tensor] = []
@@ -202,7 +201,7 @@ class Stepper:
                 mean, slope, start = self._delayed(k, part, h)
             if part == 0:
                 self.thrusts.append(start)
-            mean, slope = self.followed.append_fins(mean, slope, fins, h, part == 0)
+            mean, slope = self.beside.append(mean, slope, fins, h, part == 0)
             if last:
                 return
             if self.lag is not None:
@@ -225,6 +224,7 @@ class Stepper:
         if self.model.using("command"):
             history = torch.stack(self.commands, dim=-2)
             times = self.t[: k + 1].expand(history.shape[:-1])
+            self.beside.command(history, times)
             for effect in self.model.using("command"):
                 history = effect.command(history, times)
             command = history[..., k, :]
@@ -274,7 +274,8 @@ class Stepper:
     def trajectory(self) -> Trajectory:
         """Return the motion so far."""
         eta, nu, thrust = (torch.stack(x, dim=-2) for x in (self.etas, self.nus, self.thrusts))
-        return Trajectory(self.t, eta, nu, thrust, fins=self.followed.angles())
+        fins, speeds = self.beside.rows()
+        return Trajectory(self.t, eta, nu, thrust, fins=fins, speeds=speeds)
 
 
 def _first_velocity(plant: GreyBox, plan: Start) -> Tensor:

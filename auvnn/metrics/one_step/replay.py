@@ -13,6 +13,7 @@ from auvnn.errors import InputError
 from auvnn.logs import Run
 from auvnn.metrics.derivative import integrated
 from auvnn.models import GreyBox, Inputs
+from auvnn.models.actuation.acting import speeds_follow
 from auvnn.models.inputs import joined
 from auvnn.physics.attitude import quat_to_matrix
 
@@ -85,7 +86,11 @@ class OneStepReplay:
         model = self.model
         with torch.no_grad():
             drive = model.actuators.drive(
-                self.inputs.command, self.times, model.before_thrust, fins=self.inputs.fins
+                self.inputs.command,
+                self.times,
+                model.before_thrust,
+                fins=self.inputs.fins,
+                speeds=speeds_follow(model),
             )
         self.start, self.mean = drive.starts, drive.means[..., 0, :]
 

@@ -9,6 +9,7 @@ from torch import Tensor, nn
 
 from auvnn.effects import Effect
 from auvnn.errors import ConfigError
+from auvnn.models.actuation.acting import follow
 from auvnn.models.actuation.actuators import Actuators, answer_of
 from auvnn.models.actuation.thrust_signal import Answer
 from auvnn.physics.thrusters import quadratic_thrust, summed_table_thrust
@@ -28,7 +29,9 @@ class ActuatorStates(nn.Module):
     lag, filter and delay are exact for commands that are held, as in a rollout.
 
     Where fins follow their commands with a lag, their actual angles are the first numbers of the state, either way; a
-    command is then [commands of the thrusters | commanded fin angles], and what acts [thrust | fin angles].
+    command is then [commands of the thrusters | commanded fin angles], and what acts [thrust | fin angles]. Where the
+    propellers' speed follows its command and losses by inflow go by it, it comes last among what acts; where other
+    effects shape the command before, it is a block of its own after the filters.
 
     Reference: Franklin, Powell and Workman (1998), Digital Control of Dynamic Systems, section 4.3; for the Padé
     approximant Golub and Van Loan (2013), section 9.3.
@@ -57,6 +60,9 @@ class ActuatorStates(nn.Module):
                 raise ConfigError(
                     f"effect {effect.name} remembers commands and does not say how: see Effect.follow"
                 )
+        # The effect whose state is the propellers' speed, where that acts by itself, and whether it is a further block.
+        self.turning = next((e for e in self.shaping if e.turns), None) if follow(effects) else None
+        self.apart = self.turning is not None and self.turning is not self.shaping[0]
         answer = answer_of(effects, "respond")
         self.rate_of_lag = None if answer is None else _decay(answer)
         self.lag = answer if self.rate_of_lag is not None else None
@@ -81,19 +87,24 @@ class ActuatorStates(nn.Module):
     def states(self) -> int:
         """Numbers that are remembered."""
         late = 0 if not self.delay else (self.rows if self.dt is not None else PADE)
-        return self.size * ((self.lag is not None) + len(self.filters) + late) + self.fins
+        return self.size * ((self.lag is not None) + len(self.filters) + self.apart + late) + self.fins
 
     @property
     def inputs(self) -> int:
-        """Numbers in a command, and in what acts."""
+        """Numbers in a command."""
         return self.size + self.fins
+
+    @property
+    def acting(self) -> int:
+        """Numbers in what acts."""
+        return self.inputs + (0 if self.turning is None else self.size)
 
     def names(self) -> list[str]:
         """Return one name per number of the state."""
         places = [f"tau_{a}" for a in "XYZKMN"] if self.actuators.actuation == "wrench" else None
         places = places or [f"thruster_{k + 1}" for k in range(self.size)]
         blocks = ["thrust"] if self.lag is not None else []
-        blocks += [str(e.name) for e in self.filters]
+        blocks += [str(e.name) for e in self.filters] + ["speed"] * self.apart
         if self.delay:
             blocks += [f"delay_{k + 1}" for k in range(self.rows if self.dt is not None else PADE)]
         names = [f"{block}.{place}" for block in blocks for place in places]
@@ -113,7 +124,7 @@ class ActuatorStates(nn.Module):
     def settled(self, command: Tensor) -> Tensor:
         """Return the state (..., k) of actuators that have been at a command (..., n + m) for long."""
         command, angles = command.split((self.size, self.fins), dim=-1)
-        shaped, filters = command, []
+        shaped, filters = command, list[Tensor]()
         for effect in self.shaping:
             if effect.remembers:
                 filters.append(shaped)
@@ -121,25 +132,30 @@ class ActuatorStates(nn.Module):
                 shaped = _now(effect, shaped)
         thrust = self.static(shaped)
         parts = [thrust] if self.lag is not None else []
-        parts += filters
+        parts += filters + [command] * self.apart
         if self.delay:
             parts += [thrust] * self.rows if self.dt is not None else [thrust, 0 * thrust, 0 * thrust]
         parts = [angles, *parts] if self.fins else parts
         return torch.cat(parts, dim=-1) if parts else command[..., :0]
 
     def rate(self, state: Tensor, command: Tensor) -> tuple[Tensor, Tensor]:
-        """Return what acts (..., n + m), N and rad, and the rate of the state (..., k), in continuous time."""
+        """Return what acts (..., n + m + n), N and rad, and the rate of the state (..., k), in continuous time."""
         angles, state = state.split((self.fins, self.states - self.fins), dim=-1)
         command, wanted = command.split((self.size, self.fins), dim=-1)
         blocks = list(state.split(self.size, dim=-1)) if self.states > self.fins else []
         rates: list[Tensor] = []
         lagged = blocks.pop(0) if self.lag is not None else None
+        given, speed = command, None
         for effect in self.shaping:
             if effect.remembers:
                 command, rate = effect.follow(blocks.pop(0), command)
                 rates.append(rate)
             else:
                 command = _now(effect, command)
+            speed = command if effect is self.turning else speed
+        if self.apart and self.turning is not None:
+            speed, rate = self.turning.follow(blocks.pop(0), given)
+            rates.append(rate)
         thrust = self.static(command)
         if lagged is not None:
             assert self.rate_of_lag is not None
@@ -153,6 +169,8 @@ class ActuatorStates(nn.Module):
             assert self.rate_of_fins is not None
             rates.insert(0, self.rate_of_fins.to(thrust) * (wanted - angles))
             thrust = torch.cat([thrust, angles], dim=-1)
+        if speed is not None:
+            thrust = torch.cat([thrust, speed], dim=-1)
         return thrust, torch.cat(rates, dim=-1) if rates else state
 
     def advance(
@@ -167,7 +185,7 @@ class ActuatorStates(nn.Module):
             substeps: equal parts.
 
         Returns:
-            Mean of what acts and rise of the equivalent line, (..., n + m) each, of every part (None where it is
+            Mean of what acts and rise of the equivalent line, (..., n + m + n) each, of every part (None where it is
             constant), and the state afterwards, (..., k).
         """
         angles, state = state.split((self.fins, self.states - self.fins), dim=-1)
@@ -175,12 +193,17 @@ class ActuatorStates(nn.Module):
         blocks = list(state.split(self.size, dim=-1)) if self.states > self.fins else []
         filters: list[Tensor] = []
         thrust = blocks.pop(0) if self.lag is not None else None
+        given, speed = command, None
         for effect in self.shaping:
             if effect.remembers:
                 command, after = effect.advance(blocks.pop(0), command, step)
                 filters.append(after)
             else:
                 command = _now(effect, command)
+            speed = command if effect is self.turning else speed
+        if self.apart and self.turning is not None:
+            speed, after = self.turning.advance(blocks.pop(0), given, step)
+            filters.append(after)
         demand, coming = self.static(command), blocks
         # Oldest last: first what is left of the row under way, then the row after it.
         queue = [demand, *coming]
@@ -201,6 +224,14 @@ class ActuatorStates(nn.Module):
                 parts[k] = (torch.cat([mean, turned.mean], dim=-1), torch.cat([rise, turned.slope], dim=-1))
                 angles = turned.end
             left.insert(0, angles)
+        if speed is not None:
+            parts = [
+                (
+                    torch.cat([m, speed], dim=-1),
+                    None if r is None else torch.cat([r, torch.zeros_like(speed)], dim=-1),
+                )
+                for m, r in parts
+            ]
         return parts, torch.cat(left, dim=-1) if left else state
 
     def _part(

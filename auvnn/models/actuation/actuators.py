@@ -122,6 +122,17 @@ class Actuators(nn.Module):
             return None
         return ThrustSignal(fins, states_of(fins, times, steer, 1)[0], times, steer)
 
+    def turned(self, command: Tensor, times: Tensor, effects: Sequence[Effect]) -> ThrustSignal:
+        """Return the propellers' speed, as a command, as a function of time: its mean over each row.
+
+        Args:
+            command: held per interval, (..., T, n).
+            times: of the rows, s, (..., T).
+            effects: of the model.
+        """
+        rows = turning(command, times, effects)
+        return ThrustSignal(rows, rows, times, None)
+
     def drive(
         self,
         command: Tensor,
@@ -132,6 +143,7 @@ class Actuators(nn.Module):
         fins: Tensor | None = None,
         within: Tensor | None = None,
         fins_within: Tensor | None = None,
+        speeds: bool = False,
     ) -> Drive:
         """Work out the thrust over a stretch, after the effects on commands and the actuators' dynamics.
 
@@ -149,6 +161,7 @@ class Actuators(nn.Module):
             within: commands over equal parts of each interval, (..., warmup + T, parts, n), see `Inputs`. They stand for
                 `command` where each part is a whole number of steps.
             fins_within: fin angles over the same parts, rad, (..., warmup + T, parts, m).
+            speeds: whether the propellers' speed, as a command, comes after it (see `speeds_follow`).
 
         Returns:
             The thrust over the T - 1 intervals of the stretch, and at its last row.
@@ -156,9 +169,11 @@ class Actuators(nn.Module):
         rows = (times, effects, substeps, warmup)
         thrust = _by_parts(self._thrust, command, within, *rows)
         steer = answer_of(effects, "steer")
-        if fins is None or (steer is None and (fins_within is None or substeps % fins_within.shape[-2])):
-            return thrust
-        return side_by_side(thrust, _by_parts(_angles, fins, fins_within, *rows))
+        if fins is not None and (
+            steer is not None or (fins_within is not None and substeps % fins_within.shape[-2] == 0)
+        ):
+            thrust = side_by_side(thrust, _by_parts(_angles, fins, fins_within, *rows))
+        return side_by_side(thrust, _by_parts(_speeds, command, within, *rows)) if speeds else thrust
 
     def _thrust(
         self, command: Tensor, times: Tensor, effects: Sequence[Effect], substeps: int, warmup: int
@@ -185,6 +200,27 @@ def _angles(fins: Tensor, times: Tensor, effects: Sequence[Effect], substeps: in
         rows = fins[..., warmup:, :]
         return Drive(rows.unsqueeze(-2), None, rows, substeps)
     return lagged(fins, *states_of(fins, times, steer, substeps), substeps, warmup)
+
+
+def turning(command: Tensor, times: Tensor, effects: Sequence[Effect]) -> Tensor:
+    """Return the propellers' mean speed over each row, as the command that it settles at, (..., T, n).
+
+    It is that of the command as given: what other effects make of commands is about the thrust.
+
+    Args:
+        command: held per interval, (..., T, n).
+        times: of the rows, s, (..., T).
+        effects: of the model.
+    """
+    for effect in effects:
+        if effect.turns:
+            command = effect.command(command, times.to(command))
+    return command
+
+
+def _speeds(command: Tensor, times: Tensor, effects: Sequence[Effect], substeps: int, warmup: int) -> Drive:
+    rows = turning(command, times, effects)[..., warmup:, :]
+    return Drive(rows.unsqueeze(-2), None, rows, substeps)
 
 
 def _by_parts(

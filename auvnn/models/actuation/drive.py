@@ -18,7 +18,7 @@ class Drive:
     """The thrust over T rows' intervals, each cut into equal steps, N (or the wrench).
 
     Where an effect has the fins follow their commands, or they change within an interval, their actual angles, rad, come
-    after the thrust: n is then the number of thrusters and fins together.
+    after the thrust, and last, where asked for, the propellers' speed as a command: n is the number of them all.
 
     Attributes:
         means: average thrust over each step, (..., T, steps, n), or (..., T, 1, n) where all steps have the same.
@@ -50,12 +50,12 @@ class Drive:
         return list(self.starts.unbind(-2))
 
 
-def side_by_side(thrust: Drive, angles: Drive) -> Drive:
-    """Return thrust and fin angles as one, (..., n + m)."""
-    both = (thrust, angles)
+def side_by_side(thrust: Drive, more: Drive) -> Drive:
+    """Return thrust and what acts beside it as one, (..., n + m)."""
+    both = (thrust, more)
     straight = any(x.slopes is not None for x in both)
     slopes = [torch.zeros_like(x.means) if x.slopes is None else x.slopes for x in both]
-    steps = max(x.shape[-2] for x in (*slopes, thrust.means, angles.means))
+    steps = max(x.shape[-2] for x in (*slopes, thrust.means, more.means))
 
     def joined(parts: Sequence[Tensor]) -> Tensor:
         return torch.cat([x.expand(*x.shape[:-2], steps, -1) for x in parts], dim=-1)

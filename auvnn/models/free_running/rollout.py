@@ -11,6 +11,7 @@ from torch import Tensor
 
 from auvnn.effects import Effect
 from auvnn.errors import ConfigError
+from auvnn.models.actuation.acting import speeds_follow
 from auvnn.models.actuation.drive import Drive
 from auvnn.models.engine import compiled_run
 from auvnn.models.free_running.excursions import extrapolated
@@ -125,6 +126,7 @@ def rollout(
         _alongside(inputs.fins, rows) if turning else None,
         inputs.within,
         inputs.fins_within,
+        speeds_follow(model),
     )
     whole, inputs, times = (inputs, times), inputs.rows(warmup), times[..., warmup:]
     state = (eta0.expand(*batch, 7), nu0.expand(*batch, 6))
@@ -144,8 +146,15 @@ def rollout(
         )
     begun = drive.starts.expand(*batch, *drive.starts.shape[-2:])
     size = model.actuators.size
+    turning_fins = begun.shape[-1] - size * (2 if speeds_follow(model) else 1)
+    thrust, fins, speeds = begun.split((size, turning_fins, begun.shape[-1] - size - turning_fins), dim=-1)
     result = Trajectory(
-        times, eta, nu, begun[..., :size], fins=begun[..., size:] if begun.shape[-1] > size else None
+        times,
+        eta,
+        nu,
+        thrust,
+        fins=fins if turning_fins else None,
+        speeds=speeds if speeds.shape[-1] else None,
     )
     if not check:
         return result

@@ -135,4 +135,5 @@ def _checked(model: GreyBox, run: Trajectory, inputs: Inputs) -> Trajectory:
             run.thrust,
             tuple(found),
             fins=run.fins,
+            speeds=run.speeds,
         )

@@ -11,6 +11,7 @@ from torch import Tensor
 from torchdiffeq import odeint
 
 from auvnn.errors import ConfigError
+from auvnn.models.actuation.acting import speeds_follow
 from auvnn.models.free_running.limits import LIMIT
 from auvnn.models.inputs import Inputs
 from auvnn.physics.attitude import quat_derivative, quat_to_matrix
@@ -80,6 +81,9 @@ def solve(
         clock,
         model.before_thrust,
     )
+    turned = (
+        model.actuators.turned(inputs.command, clock, model.before_thrust) if speeds_follow(model) else None
+    )
     late = next((e.delay() for e in model.using("delay")), torch.zeros(())).to(times)
     # Delayed pieces of thrust change inside the intervals; where they do, the integration starts again.
     jumps = (times + late).tolist() if model.using("delay") else []
@@ -107,6 +111,8 @@ def solve(
             now = signal.along(piece, (t - late + since).expand(shape[:-2]))
             if steering is not None:
                 now = torch.cat([now, steering.along(held, (t + since).expand(shape[:-2]))], dim=-1)
+            if turned is not None:
+                now = torch.cat([now, turned.along(held, (t + since).expand(shape[:-2]))], dim=-1)
             rotation = quat_to_matrix(y[..., 3:7] / torch.linalg.norm(y[..., 3:7], dim=-1, keepdim=True))
             nu = y[..., 7:]
             change = torch.cat(
@@ -126,7 +132,8 @@ def solve(
         for low, high in itertools.pairwise(cuts):
             middle = torch.full(shape[:-2], 0.5 * (low + high), dtype=times.dtype)
             piece = signal.piece(middle - late.detach().cpu() + since)
-            held = piece if steering is None else steering.piece(middle + since)
+            by_commands = steering or turned
+            held = piece if by_commands is None else by_commands.piece(middle + since)
             ends = torch.tensor([low, high], dtype=times.dtype, device=times.device)
             try:
                 run = odeint(

@@ -40,6 +40,8 @@ class Trajectory(Shown):
         divergences: empty where the run stayed sound; a diverged trajectory holds its last sound state.
         fins: (..., T, m), rad, the actual fin angles just after each row's command, where an effect has them follow it or
             they change within an interval; else None.
+        speeds: (..., T, n), the propellers' speed as the command that it settles at, its mean over each row, where an
+            effect has it follow its command and another goes by it; else None.
         notes: in words, steps that were cut because the model is stiff, and velocities beyond those that the damping
             was trained on, where what it says is extrapolated.
     """
@@ -51,6 +53,7 @@ class Trajectory(Shown):
     divergences: tuple[Divergence, ...] = ()
     notes: tuple[str, ...] = ()
     fins: Tensor | None = None
+    speeds: Tensor | None = None
 
     def card(self) -> Card:
         """Return how long the run is, how many there are, and whether they stayed sound."""
@@ -63,8 +66,9 @@ class Trajectory(Shown):
 
     @property
     def acting(self) -> Tensor:
-        """What the actuators do as each row begins, for `GreyBox.nu_dot`: thrust, and fin angles where they lag."""
-        return self.thrust if self.fins is None else torch.cat([self.thrust, self.fins], dim=-1)
+        """What the actuators do as each row begins, for `GreyBox.nu_dot`: thrust, and fin angles and speeds that lag."""
+        parts = [x for x in (self.thrust, self.fins, self.speeds) if x is not None]
+        return torch.cat(parts, dim=-1) if len(parts) > 1 else self.thrust
 
     @property
     def diverged(self) -> bool:

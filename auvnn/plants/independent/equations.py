@@ -72,6 +72,8 @@ class Equations(Forces):
         self.strangers = [(n, STRANGERS.get(n), values) for n, values in strangers.items()]
         self.fins = None
         self.servos = Servos(effects.get("fin_lag", {}).get("time_constant", 0.0))
+        # The propellers' speed as the command that it settles at: losses by inflow go by it.
+        self.speeds = Servos(effects.get("propeller_lag", {}).get("time_constant", 0.0))
         if vehicle.fins:
             self.fins = Fins(vehicle, laws.separation, effects)
         self.moves = any(n in effects for n in ("ocean_current", "current_shear", "waves"))
@@ -199,7 +201,9 @@ class Equations(Forces):
             out["added drag"] = share * drag
         if near.walls:
             out["walls"] = self._walls(v, turn, down, near)
-        left = self.actuators.given(thrust, command, voltage, flow, turn)
+        turning = self.speeds.now(t, command)
+        assert turning is not None
+        left = self.actuators.given(thrust, turning, voltage, flow, turn)
         moment = left @ self.actuators.turns.T
         if "propeller_torque" in self.effects:
             moment = moment + self.actuators.torque(left)

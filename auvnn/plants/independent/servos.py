@@ -11,6 +11,8 @@ Array = NDArray[np.float64]
 class Servos:
     """Fins whose angles chase what is commanded, tau d(angle)/dt = command - angle, from the first command on.
 
+    Of propellers' speeds the same holds.
+
     Args:
         tau: time constant, s; at zero the angles are the commands.
     """

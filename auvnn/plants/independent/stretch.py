@@ -106,6 +106,7 @@ class Stretch:
         end = begin if last else float(task.t[k + 1])
         self.actuators.hold(command, begin, end)
         self.equations.servos.hold(fins, begin)
+        self.equations.speeds.hold(command, begin)
         self.commands.append(command)
         self.fins.append(fins)
         held = (command, fins, voltage)

@@ -158,12 +158,12 @@ class Actuators:
         start = self.begins[index]
         return lambda t: piece(max(t - self.late, start))
 
-    def given(self, thrust: Array, command: Array, voltage: Array | None, flow: Array, turn: Array) -> Array:
+    def given(self, thrust: Array, turning: Array, voltage: Array | None, flow: Array, turn: Array) -> Array:
         """Return what is left of the thrust (R, n) in a flow (R, 3) with the battery as it is, in order of effects.
 
         Args:
             thrust: N.
-            command: as given by the log, (R, n).
+            turning: speed of the propellers as the command that it settles at, (R, n).
             voltage: V, (R,), or None.
             flow: velocity through the water, (R, 3).
             turn: angular rate, (R, 3).
@@ -178,16 +178,16 @@ class Actuators:
                 along = flow @ self.forces
                 if not self.wrench:
                     along = along + turn @ self.turns
-                thrust = thrust - values["coefficient"] * np.abs(command / self.full) * along
+                thrust = thrust - values["coefficient"] * np.abs(turning / self.full) * along
             elif name == "thrust_advance":
                 # The same as J / (1 + |J|) with J = V / (c V_1), and zero where neither turns nor flows anything.
                 along = flow @ self.forces
                 if not self.wrench:
                     along = along + turn @ self.turns
-                turning = command / self.full
-                whole = np.abs(turning) * values["speed"] + np.abs(along)
+                share = turning / self.full
+                whole = np.abs(share) * values["speed"] + np.abs(along)
                 with np.errstate(invalid="ignore", divide="ignore"):
-                    fallen = np.where(whole > 0.0, along * np.sign(turning) / whole, 0.0)
+                    fallen = np.where(whole > 0.0, along * np.sign(share) / whole, 0.0)
                 thrust = thrust * (1.0 - values["loss"] * fallen)
             elif name == "voltage_droop" and voltage is not None and self.vehicle.reference_voltage:
                 share = np.maximum(voltage / self.vehicle.reference_voltage, 1e-3)

@@ -103,6 +103,7 @@ def accelerations(course: Course, effects: Values, kicks: Array | None = None) -
     memory = any(remembers_commands(name) for name in effects)
     # The mean over a step is what moves the vehicle, of fins that lag as of thrusters.
     servos = Servos(effects["fin_lag"]["time_constant"]) if "fin_lag" in effects else None
+    propellers = Servos(effects["propeller_lag"]["time_constant"]) if "propeller_lag" in effects else None
     out = np.empty((many, *speeds.shape))
     done = -1
 
@@ -120,6 +121,8 @@ def accelerations(course: Course, effects: Values, kicks: Array | None = None) -
             )
             if servos is not None and motion.fins is not None:
                 servos.hold(motion.fins[:, done], float(task.t[done]))
+            if propellers is not None:
+                propellers.hold(motion.command[:, done], float(task.t[done]))
         thrust = _mean(actuators, moment - 0.5 * course.step, moment + 0.5 * course.step, memory)
         place = (places[None, :, j] + changes[:, None, :3]).reshape(-1, 3)
         rotation = (rotations[None, :, j] @ turns[:, None]).reshape(-1, 3, 3)
@@ -127,8 +130,11 @@ def accelerations(course: Course, effects: Values, kicks: Array | None = None) -
         fins = None if motion.fins is None else motion.fins[:, row]
         if servos is not None and fins is not None:
             fins = servos.mean(moment - 0.5 * course.step, moment + 0.5 * course.step)
+        command = motion.command[:, row]
+        if propellers is not None:
+            command = propellers.mean(moment - 0.5 * course.step, moment + 0.5 * course.step)
         voltage = None if task.voltage is None else task.voltage[:, row]
-        held = (np.concatenate([motion.command[:, row]] * many), all_of(fins), all_of(voltage))
+        held = (np.concatenate([command] * many), all_of(fins), all_of(voltage))
         rate = equations.rate(
             moment, place, rotation, nu[:, :3], nu[:, 3:], np.concatenate([thrust] * many), held
         )
