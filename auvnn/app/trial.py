@@ -16,6 +16,7 @@ from auvnn.effects import EFFECTS, effect_class
 from auvnn.effects.acting_beside import in_words, needed_beside
 from auvnn.errors import InputError
 from auvnn.logs import Log
+from auvnn.metrics.commands.stated import as_stated
 from auvnn.metrics.rollouts import NAMES, Rolled, Scale, horizon_windows, roll_windows, scale_of
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
@@ -139,7 +140,8 @@ class Trial:
 
     def _rolled(self, model: GreyBox, horizon: str) -> Rolled | None:
         if horizon not in self._windows:
-            self._windows[horizon] = horizon_windows(self.log, horizon, model.actuation)
+            windows = horizon_windows(self.log, horizon, model.actuation)
+            self._windows[horizon] = None if windows is None else as_stated(self.model, windows)
         windows = self._windows[horizon]
         return None if windows is None else roll_windows(model, windows, self.scale, engine="firm")
 

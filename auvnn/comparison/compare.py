@@ -20,6 +20,7 @@ from auvnn.comparison.locate import AXES, Regime, failures, locate
 from auvnn.comparison.predictions import RunTraces, stitch, write_predictions
 from auvnn.errors import ConfigError
 from auvnn.logs import Log
+from auvnn.metrics.commands.stated import said
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.one_step import OneStep, one_step, scores
@@ -229,6 +230,7 @@ def _warnings(model: GreyBox, log: Log, rolled: dict[str, Rolled]) -> list[str]:
     if gone:
         found.append("free runs diverged: " + ", ".join(f"{n} of horizon {h} s" for h, n in gone.items()))
     found += _extrapolated(model, rolled)
+    found += said(model, float(np.median([run.dt for run in log.runs])))
     found += doubts(model, log)
     if (
         log.runs[0].wrench is not None

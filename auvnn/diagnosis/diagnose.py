@@ -80,7 +80,8 @@ def diagnose(
         advice: for an ambiguous answer, also work out which manoeuvre would tell the candidates apart.
         whiteness: also test what is left for correlations, before and after; no verdict depends on these tests.
         stochastic: where a force is left without a name, also ask how commands go between samples, and compare the
-            effects again together with a stochastic force whose law is estimated; takes as long again.
+            effects again together with a stochastic force whose law is estimated; takes as long again. Without it
+            commands go between samples as the model states.
         force: go on with a log that contradicts itself: signs, units, axes.
         tolerance: what does not matter: a number for the cost in free running, with a fifth of it for the force as a
             share of the actuators', or a mapping with `cost` and `force`; by default 0.1 and 0.02. At 0 everything
@@ -165,7 +166,8 @@ def searched(
     allowed = Tolerance.of(tolerance)
     # What subnetworks have absorbed leaves no residual: only what drag can be is kept of them.
     known, spread = with_drag_only(model, log)
-    windows, notes = windows_that_hold(known, log, window)
+    driven = None if stochastic else model
+    windows, notes = windows_that_hold(known, log, window, driven)
     layout = lay_out(known, usable, spread)
     absorbed = confounded_effects(model, log)
     notes += [] if spread is None else [LEARNED]
@@ -188,6 +190,7 @@ def searched(
         notes=(*assumed(log, model), *blind(log), *notes, *doubts(model, log)),
         say=say,
         pool=pool,
+        driven=driven,
     )
     try:
         state, told, words = search(asked, windows, until=ends_early if stochastic else None), {}, []

@@ -19,6 +19,7 @@ from auvnn.effects.acting_beside import in_words, needed_beside
 from auvnn.effects.registering import names_of
 from auvnn.errors import ConfigError
 from auvnn.improvement.added import Improvement
+from auvnn.improvement.commands_between import by_their_path
 from auvnn.improvement.fits import GIVEN, REFITTED, Fits, fit_steps, unseen
 from auvnn.improvement.held_out import Judged, judge, words
 from auvnn.logs import Log
@@ -98,6 +99,7 @@ def add(
     if "5" not in horizons:
         raise ConfigError(f"horizons={list(horizons)}: '5' must be among them, the gain is measured there")
     fits = fit_steps(model, log, names, objective=objective, window=window, derivative=derivative, say=say)
+    fits = by_their_path(fits, model, names, say)
     notes += [*fits.notes, *unseen(fits.layout, fits.best, names, log)]
     steps = 2 * len(names) + 1 if len(names) > 1 else 3
     say(Progress("free running on the held-out data", steps - 1, steps))
@@ -197,6 +199,7 @@ def _assembled(
             for k, (step, candidate) in enumerate(fits.steps)
         ],
         by_effect=judged.by_effect,
+        commands=None if fits.final.commands is None else fits.final.commands.to_dict(),
         baseline=compare_with_baseline(
             rolled[last],
             model.actuation,

@@ -24,6 +24,7 @@ class Improvement(Answer):
             whether that is beyond its uncertainty, and what else to mind of it.
         baseline: what a plain regression and holding the initial velocity reach on the held-out data.
         better: the model with the effects.
+        commands: how they go between the log's samples, as the model states it then; None where they are held.
         refitted_model: the model as given, its uncertain coefficients refitted.
         left_out: where one-step errors were fitted, their weighted size on runs of `log` left out in turn: before
             and after, the fall and its standard error; None otherwise. It never saw the test log.
@@ -54,6 +55,7 @@ class Improvement(Answer):
     steps: list[dict[str, Any]] = field(default_factory=list)
     by_effect: dict[str, OwnFall] = field(default_factory=dict)
     baseline: dict[str, Any] = field(default_factory=dict)
+    commands: dict[str, Any] | None = None
 
     def card(self) -> Card:
         """Return the fall of the held-out error, and the fitted values."""
@@ -89,6 +91,7 @@ class Improvement(Answer):
             "left_out",
             "by_effect",
             "baseline",
+            "commands",
             "warnings",
         )
         return plain(

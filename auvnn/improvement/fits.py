@@ -33,6 +33,7 @@ class Fits:
         steps: the models of the waterfall, by name of the step.
         fits: those behind all steps but the first.
         without: effect to the model with all others; only where there are several.
+        fitter: who fitted them.
         notes: what to say of the windows that were taken.
     """
 
@@ -40,6 +41,7 @@ class Fits:
     steps: list[tuple[str, GreyBox]]
     fits: list[FittedHypothesis]
     without: dict[str, GreyBox]
+    fitter: Fitter
     notes: tuple[str, ...] = ()
 
     @property
@@ -87,7 +89,7 @@ def fit_steps(
         InputError: the log says nothing about an effect, or a fit has nowhere to begin.
     """
     fitter = fitter_for(model, log, objective, window=window, derivative=derivative)
-    first = _fitted_by(fitter, model, names, say)
+    first = fitted_by(fitter, model, names, say)
     if window is not None or not isinstance(fitter, ByWindows) or not first.stuck:
         return first
     step = float(np.median([run.dt for run in log.runs]))
@@ -99,15 +101,25 @@ def fit_steps(
             f"no step of a fit over windows of {longest:.3g} s leads on: fitting windows of {longest * share:.3g} s"
         )
         shorter = fitter_for(model, log, objective, window=longest * share, derivative=derivative)
-        found = _fitted_by(shorter, model, names, say)
+        found = fitted_by(shorter, model, names, say)
         if not found.stuck:
             note = f"windows of {longest * share:.3g} s were fitted: over {longest:.3g} s no step of the fit leads on"
             return replace(found, notes=(note,))
     return first
 
 
-def _fitted_by(fitter: Fitter, model: GreyBox, names: Sequence[str], say: Callable[[str], None]) -> Fits:
-    """Return what one fitter makes of a model; arguments as in `fit_steps`."""
+def fitted_by(fitter: Fitter, model: GreyBox, names: Sequence[str], say: Callable[[str], None]) -> Fits:
+    """Return what one fitter makes of a model.
+
+    Args:
+        fitter: who fits.
+        model: as known.
+        names: effects to add.
+        say: called with what is being done, in words.
+
+    Raises:
+        InputError: a fit has nowhere to begin.
+    """
     layout = lay_out(model, list(names))
     base = [n for n in layout.names if n not in names or n in layout.nuisance]
     say = Counted(say, 2 * len(names) + 1 if len(names) > 1 else 3)
@@ -134,7 +146,7 @@ def _fitted_by(fitter: Fitter, model: GreyBox, names: Sequence[str], say: Callab
         say(f"fitting without {name}")
         less = fitter.fit(layout, [n for n in base if n != name], others, fits[-1])
         without[name] = with_fitted_parameters(model, layout, less)
-    return Fits(layout, steps, fits, without)
+    return Fits(layout, steps, fits, without, fitter)
 
 
 def unseen(layout: Layout, found: FittedHypothesis, names: Sequence[str], log: Log) -> list[str]:

@@ -12,6 +12,7 @@ from auvnn.effects import Sensed
 from auvnn.errors import InputError
 from auvnn.logs import Log
 from auvnn.logs.signals.noise import noise_std
+from auvnn.metrics.commands.stated import as_stated
 from auvnn.metrics.coordinates import Coordinates, coordinates, names_of, spread
 from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.likely_states import likely_states
@@ -114,7 +115,8 @@ class Rolled:
 def roll(model: GreyBox, log: Log, horizon: str, scale: Scale, engine: str = "torch") -> Rolled | None:
     """Run a model free over the windows of one horizon; None where no stretch is long enough.
 
-    Windows start every half horizon, from measured states. Outliers of single samples do not count.
+    Windows start every half horizon, from measured states. Outliers of single samples do not count. Between samples
+    commands go as the model states, and are held where it does not.
 
     Args:
         model: that is run.
@@ -124,7 +126,7 @@ def roll(model: GreyBox, log: Log, horizon: str, scale: Scale, engine: str = "to
         engine: as in `rollout`.
     """
     windows = horizon_windows(log, horizon, model.actuation)
-    return None if windows is None else roll_windows(model, windows, scale, engine)
+    return None if windows is None else roll_windows(model, as_stated(model, windows), scale, engine)
 
 
 def horizon_windows(log: Log, horizon: str, kind: str) -> Windows | None:

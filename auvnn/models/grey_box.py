@@ -16,9 +16,10 @@ from auvnn.effects import HOOKS, Effect, effect_class
 from auvnn.effects.registering import values_of
 from auvnn.errors import ConfigError
 from auvnn.models.actuation.actuators import Actuators
+from auvnn.models.command_path import CommandPath, carried_over
 from auvnn.models.equations_of_motion import EquationsOfMotion
 from auvnn.models.inputs import Inputs
-from auvnn.models.joint_covariance import JointCovariance, with_joint
+from auvnn.models.joint_covariance import JointCovariance
 from auvnn.models.notebook_view import ShownModel
 from auvnn.models.saving import PASSIVE, REGION, SUBNETWORKS, save
 from auvnn.models.stated_drag import StatedDrag
@@ -97,9 +98,11 @@ class GreyBox(ShownModel, EquationsOfMotion):
         self.effects = nn.ModuleList(members)
         self._by_hook = {h: [e for e in members if h in e.hooks()] for h in HOOKS}
         self._by_hook["wrench"].sort(key=lambda e: not e.is_drag)
-        # Depth of a flat bottom, m: gives the altitude to a simulated vehicle that has no altimeter to go by.
-        self.bottom: float | None = None
+        self.bottom: float | None = (
+            None  # depth of a flat one, m: the altitude of a vehicle that is simulated
+        )
         self.joint: JointCovariance | None = None  # of the effects' parameters, where a fit has said it
+        self.commands: CommandPath | None = None  # between a log's samples, where they are not held
         self.time_varying = any(e.time_varying for e in self._by_hook["body"])
         self._constants(vehicle)
 
@@ -187,11 +190,11 @@ class GreyBox(ShownModel, EquationsOfMotion):
             actuation: "thrusters" or "wrench", or None for the same.
         """
         made = self._like(effects, vehicle or self.vehicle, actuation or self.actuation, shared=False)
-        return with_joint(made, self.joint)
+        return carried_over(made, self)
 
     def sharing(self, effects: Iterable[Effect]) -> GreyBox:
         """Return a model with other effects that shares its learned parts with this one: nothing is copied."""
-        return with_joint(self._like(effects, self.vehicle, self.actuation, shared=True), self.joint)
+        return carried_over(self._like(effects, self.vehicle, self.actuation, shared=True), self)
 
     def extended_by(self, *effects: Effect) -> GreyBox:
         """Return the model with further effects, probes among them: its own are copied, learned parts shared."""

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.errors import ModelError
-
-if TYPE_CHECKING:
-    from auvnn.models.grey_box import GreyBox
 
 Array = NDArray[np.float64]
 # Share of the largest eigenvalue, or of the standard deviations' product, that passes for rounding.
@@ -101,9 +98,3 @@ class JointCovariance:
         np.fill_diagonal(part, 1.0)
         out[np.ix_(known, known)] = part
         return out
-
-
-def with_joint(model: GreyBox, joint: JointCovariance | None) -> GreyBox:
-    """Return a model with what of a covariance concerns its effects."""
-    model.joint = None if joint is None else joint.of(model.effect_names)
-    return model

@@ -12,9 +12,11 @@ from auvnn.damping.region import Region
 from auvnn.effects import Effect, effect_class
 from auvnn.effects.registering import names_of
 from auvnn.errors import ConfigError, ModelError
+from auvnn.models.command_path import CommandPath
 from auvnn.models.grey_box import GreyBox
 from auvnn.models.joint_covariance import JointCovariance
 from auvnn.models.saving import (
+    COMMANDS,
     COVARIANCE,
     MODEL,
     PASSIVE,
@@ -91,11 +93,13 @@ def from_contents(files: Mapping[str, bytes], path: Path, actuation: str | None 
             f"{path / MODEL}: is not UTF-8 text (byte {error.start}): save the model again"
         ) from None
     data: dict[str, Any] = parse_yaml(text, str(path / MODEL))
-    joint = data.pop(COVARIANCE, None)
+    joint, commands = data.pop(COVARIANCE, None), data.pop(COMMANDS, None)
     model = _made(data, files, path, actuation)
     if joint is not None:
         known = [f"{e.name}.{p}" for e in model.members for p in e.values()]
         model.joint = JointCovariance.read(joint, known, str(path / MODEL))
+    if commands is not None:
+        model.commands = CommandPath.read(commands, str(path / MODEL))
     return model
 
 

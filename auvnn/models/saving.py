@@ -17,6 +17,7 @@ SUBNETWORKS = "damping_subnetworks"
 STRUCTURE = "structure"
 UNCERTAINTY = "uncertainty"
 COVARIANCE = "covariance"
+COMMANDS = "commands"
 REGION = "trained_region"
 PASSIVE = "passive_drag"
 
@@ -64,6 +65,8 @@ def contents(model: GreyBox, path: Path) -> dict[str, bytes | str]:
     }
     if model.joint is not None:
         data[COVARIANCE] = model.joint.to_dict()
+    if model.commands is not None:
+        data[COMMANDS] = model.commands.to_dict()
     data["actuation"] = model.actuation
     files: dict[str, bytes | str] = {}
     described, learned = model.learned_parts()

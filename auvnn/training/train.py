@@ -22,6 +22,7 @@ from auvnn.metrics.one_step import OneStep, one_step, scores
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
+from auvnn.models.command_path import carried_over
 from auvnn.models.load_arguments import GivenLog, GivenModel, as_log, as_model
 from auvnn.progress import Progress
 from auvnn.threads import on_one_thread
@@ -177,7 +178,8 @@ def train(
             resume=resume if folder is not None else False,
         )
         own.requires_grad_(True)
-        return GreyBox(model.vehicle, model.copied_effects(), own, model.actuation), fit, nu, held_samples
+        made = GreyBox(model.vehicle, model.copied_effects(), own, model.actuation)
+        return carried_over(made, model), fit, nu, held_samples
 
     trained, fit, nu, held_samples = one_step_fit(how, checkpoint)
     # Whether the damping adds energy is judged below, with what the log leaves open.

@@ -31,6 +31,7 @@ from auvnn.log_chunks.samples import Pieces, Reading, evenly_spread_runs
 from auvnn.logs import Log
 from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.models import GreyBox
+from auvnn.models.command_path import carried_over
 from auvnn.progress import Progress
 from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects
@@ -175,7 +176,7 @@ def train_files(
             resume=resume if checkpoint is not None else False,
         )
         own.requires_grad_(True)
-        trained = GreyBox(model.vehicle, model.copied_effects(), own, model.actuation)
+        trained = carried_over(GreyBox(model.vehicle, model.copied_effects(), own, model.actuation), model)
         say("the held-out part")
         before, after = score(pool, shares.test.pieces, [model, trained], how, plan)
     worse = [n for n in after if after[n]["rmse"] > before[n]["rmse"] * (1 + 1e-9)]

@@ -29,6 +29,7 @@ from auvnn.diagnosis.noise_law.commands.in_place_of_names import (
     without,
     without_timed,
 )
+from auvnn.diagnosis.noise_law.commands.later import late_by_a_share
 from auvnn.diagnosis.noise_law.commands.share import with_share
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncertain_wrench
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
@@ -112,6 +113,12 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         why += [] if colour.noise is None else ["the sensors' noise is not white"]
         asked.say(f"{' and '.join(why)}: searching again")
         state = search(asked, colour.applied(windows), until=a_force_stays)
+        late = None if colour.noise is not None else late_by_a_share(asked, state, began.windows, held)
+        if late is not None:
+            gone = {**gone, **replaced(late[0], state.current)}
+            asked, held = without(asked, gone), late[1]
+            asked.say("commands act later than taken, by part of an interval: searching again")
+            state = search(asked, held.applied(began.windows), until=a_force_stays)
         state = state.but(failed={**state.failed, **gone})
     wrench = uncertain.to_dict()
     told: dict[str, Any] = {

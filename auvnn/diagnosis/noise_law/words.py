@@ -7,6 +7,7 @@ from typing import Any
 
 from auvnn.diagnosis.residuals.input_forces import AXES
 from auvnn.metrics.force_law import ForceLaw
+from auvnn.models.command_path import CommandPath
 
 MOTIONS = {"X": "surge", "Y": "sway", "Z": "heave", "K": "roll", "M": "pitch", "N": "yaw"}
 
@@ -25,17 +26,9 @@ def stochastic_words(stochastic: Mapping[str, Any]) -> list[str]:
         lines.append(f"The sensors' noise is not white; its correlation times: {times}.")
     commands = stochastic.get("commands")
     if commands and commands["between_samples"] != "held":
-        next_one, what = commands["share_of_next"], "thrust"
-        along = f"as {1 - next_one:.0%} of its own sample's and {next_one:.0%} of the next one's"
-        through = "the thrusts of four samples" if "interpolated" in commands else "four samples"
-        if commands["between_samples"] == "smooth":
-            along = f"along the cubic through {through}, {next_one - 0.5:+.2f} of an interval from its own"
-        elif commands["between_samples"] == "averaged":
-            what = "command"
-            along = f"as the average of {commands['samples']} samples about it, because commands have noise"
-        lines.append(
-            f"Commands change between the log's samples: the mean {what} of an interval was taken {along}."
-        )
+        given = {n: commands[n] for n in ("samples", "interpolated") if n in commands}
+        path = CommandPath(commands["between_samples"], commands["share_of_next"], 1.0, **given)
+        lines.append(path.words())
     uncertain = {a: v for a, v in (commands or {}).get("uncertain", {}).items() if v > 0.0}
     if uncertain:
         sizes = [f"{MOTIONS[a]} {v:.2g} {'N' if a in 'XYZ' else 'N m'}" for a, v in uncertain.items()]

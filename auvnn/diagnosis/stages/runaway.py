@@ -9,6 +9,7 @@ from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.errors import InputError
 from auvnn.estimation.prediction_error import SINGULAR
 from auvnn.logs import Log
+from auvnn.metrics.commands.stated import as_stated
 from auvnn.metrics.free_run import initial_states, predict
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
@@ -19,7 +20,9 @@ SHORTER = (2.0, 1.0, 0.5)
 MOST, LEAST = 0.5, 4
 
 
-def windows_that_hold(model: GreyBox, log: Log, window: float | None) -> tuple[Windows, list[str]]:
+def windows_that_hold(
+    model: GreyBox, log: Log, window: float | None, driven: GreyBox | None = None
+) -> tuple[Windows, list[str]]:
     """Return the windows of a log over which a model runs free without leaving what is physical, and remarks on that.
 
     Where it leaves that in more than half of them, shorter ones are taken, unless a length was asked for.
@@ -28,17 +31,23 @@ def windows_that_hold(model: GreyBox, log: Log, window: float | None) -> tuple[W
         model: as stated.
         log: the log.
         window: length that was asked for, s.
+        driven: the model by whose statement commands go between samples; None where they are held.
 
     Raises:
         InputError: too few windows, or the model runs away in all of them.
     """
-    windows = windows_for(model, log, window)
+
+    def cut(length: float | None) -> Windows:
+        found = windows_for(model, log, length)
+        return found if driven is None else as_stated(driven, found)
+
+    windows = cut(window)
     if len(windows) < LEAST:
         cure = "record a longer log" if window is None else "choose a shorter window, or record a longer log"
         raise InputError(f"{log.name} gives only {len(windows)} windows of free running: {cure}")
     for length in (window, *(SHORTER if window is None else ())):
         if length is not None and length != window:
-            windows = windows_for(model, log, length)
+            windows = cut(length)
         good = _holds(model, windows)
         if good.all() and length == window:
             return windows, []

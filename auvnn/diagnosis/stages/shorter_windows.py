@@ -93,7 +93,7 @@ def search_over_shorter(asked: Setting, state: State, search: Callable[..., Stat
         return asked, state
     asked.say(f"most of the error is left: searching over windows of {SHORTER:g} s")
     try:
-        windows, notes = windows_that_hold(asked.layout.model, asked.log, SHORTER)
+        windows, notes = windows_that_hold(asked.layout.model, asked.log, SHORTER, asked.driven)
         shorter = replace(asked, floor=TRUST * motion(windows) + 1e-9)
         progress = Progress(asked.layout.nuisance)
         other = search(shorter, windows, progress, promising=progress.promising)

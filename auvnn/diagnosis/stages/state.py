@@ -49,6 +49,7 @@ class Setting:
         notes: what to say about the model and the log besides.
         say: called with what is being done, in words.
         pool: who makes fits of which none has to wait for another.
+        driven: the model by whose statement commands go between samples, where the log is not asked for that; else None.
     """
 
     model: GreyBox
@@ -67,6 +68,7 @@ class Setting:
     notes: tuple[str, ...]
     say: Callable[[str], None]
     pool: Executor = SERIAL
+    driven: GreyBox | None = None
 
     @property
     def stated(self) -> dict[str, Array]:

@@ -7,15 +7,19 @@ from collections.abc import Callable
 
 from auvnn.diagnosis.diagnose import diagnose
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
+from auvnn.improvement.commands_between import path_of
 from auvnn.improvement.loop.answer import CAUSE, REFITTED
 from auvnn.improvement.loop.excerpt import liveliest
+from auvnn.improvement.loop.judge import Judge
 from auvnn.improvement.loop.state import (
     Recipe,
     State,
+    as_given,
     fitted,
     fitted_one_step,
 )
 from auvnn.improvement.loop.trials import FAILURES, Trials
+from auvnn.models.command_path import with_commands
 
 # A diagnosis sees at most so many seconds of a log.
 DIAGNOSED = 300.0
@@ -39,6 +43,21 @@ class Causes(Trials):
         words = "; ".join(f"{f['where']}: {f['what']}" for f in bad[:3])
         more = f", and {len(bad) - 3} more (auvnn check shows them)" if len(bad) > 3 else ""
         self.told(f"Check: {words}{more}." if bad else "Check: nothing to complain of.")
+
+    def commands(self) -> None:
+        """Ask how commands go between samples; where they are not held, everything is fitted and judged as they go."""
+        self.say("asking how commands go between samples")
+        try:
+            path = path_of(self.model, liveliest(self.log, DIAGNOSED))
+        except FAILURES as problem:
+            self._failed("asking how commands go between samples", problem)
+            return
+        if path is not None:
+            self.told(path.words())
+        if path is not None or self.model.commands is not None:
+            self.model = with_commands(self.model, path)
+            self.judge = Judge.of(self.log, self.model.actuation, self.model)
+            self.state = as_given(self.model, self.judge)
 
     def compare(self) -> None:
         """Say how the model as given compares with the plain regression and persistence."""

@@ -98,6 +98,7 @@ def improve(
     names = None if effects is None else candidates_for(model, log, effects, stated=True)[0]
     walk = Walk(model, log, derivative, names, max_effects, seconds, progress, tell)
     walk.check()
+    walk.commands()
     walk.compare()
     walk.refit()
     if diagnosing:

@@ -12,6 +12,7 @@ from auvnn.diagnosis.cross_validation.errors import LeftOut
 from auvnn.errors import InputError
 from auvnn.improvement.free_run import Task, predicted
 from auvnn.logs import Log
+from auvnn.metrics.commands.stated import as_stated
 from auvnn.metrics.derivative import Derivative
 from auvnn.metrics.folds import Folds
 from auvnn.metrics.regression import Regression
@@ -40,6 +41,7 @@ class Judge:
         folds: what is left out in turn.
         own: (B,) fold of each window.
         free: (B, F) whether it shares nothing with each fold.
+        driven: the model that states how commands go between samples; None where they are held.
     """
 
     log: Log
@@ -50,10 +52,16 @@ class Judge:
     folds: Folds
     own: NDArray[np.int64]
     free: NDArray[np.bool_]
+    driven: GreyBox | None = None
 
     @classmethod
-    def of(cls, log: Log, kind: str) -> Judge:
+    def of(cls, log: Log, kind: str, driven: GreyBox | None = None) -> Judge:
         """Cut a log.
+
+        Args:
+            log: what is fitted to.
+            kind: which commands drive the model.
+            driven: the model that states how commands go between samples; None where they are held.
 
         Raises:
             InputError: no stretch of it is long enough to run free over.
@@ -70,9 +78,10 @@ class Judge:
             raise InputError(
                 f"{log.name} has hardly a stretch of {HORIZONS[-1]} s without a gap: record a longer log"
             )
+        windows = windows if driven is None else as_stated(driven, windows)
         folds = Folds.of(log)
         own, free = folds.windows(windows)
-        return cls(log, kind, horizon, windows, scale_of(log), folds, own, free)
+        return cls(log, kind, horizon, windows, scale_of(log), folds, own, free, driven)
 
     def task(self, seconds: float) -> tuple[Task, NDArray[np.int64], NDArray[np.bool_]]:
         """Return windows of a length to fit, their folds, and (B, F) which share nothing with each fold.
@@ -83,6 +92,7 @@ class Judge:
         windows = self.windows
         if seconds != float(self.horizon):
             windows = cut_windows(self.log, seconds, seconds / 2, warmup=WARMUP, kind=self.kind)
+            windows = windows if self.driven is None else as_stated(self.driven, windows)
         if len(windows) > FITTED:
             windows = windows.pick(np.linspace(0, len(windows) - 1, FITTED).round().astype(int))
         return Task(windows, self.scale), *self.folds.windows(windows)

@@ -20,6 +20,7 @@ from auvnn.improvement.loop.judge import Judge
 from auvnn.improvement.loop.state import ALL, State, banked, fold_models, laid_out
 from auvnn.metrics.derivative import Derivative
 from auvnn.models import GreyBox
+from auvnn.models.command_path import carried_over
 from auvnn.training.fit_damping import fit_damping
 from auvnn.training.problem import DampingProblem
 from auvnn.training.targets import Targets
@@ -65,7 +66,9 @@ def trained(base: GreyBox, judge: Judge, state: State, how: Derivative) -> State
 
 
 def _with(model: GreyBox, bank: DampingBank) -> GreyBox:
-    return GreyBox(model.vehicle, model.copied_effects(), copy.deepcopy(bank), model.actuation)
+    return carried_over(
+        GreyBox(model.vehicle, model.copied_effects(), copy.deepcopy(bank), model.actuation), model
+    )
 
 
 def _bank(model: GreyBox, judge: Judge, how: Derivative, absent: int | None) -> DampingBank:

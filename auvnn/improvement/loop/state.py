@@ -22,6 +22,7 @@ from auvnn.improvement.free_run import STEPS, FreeRunFit, fit_free_run
 from auvnn.improvement.loop.judge import NEWTON, Judge
 from auvnn.metrics.derivative import Derivative
 from auvnn.models import GreyBox
+from auvnn.models.command_path import with_commands
 
 Array = NDArray[np.float64]
 # The networks that were trained on all folds, among those trained without each.
@@ -89,7 +90,8 @@ def banked(base: GreyBox, recipe: Recipe, fold: int = ALL) -> GreyBox:
     """
     if not recipe.banks:
         return base
-    return GreyBox(base.vehicle, base.copied_effects(), copy.deepcopy(recipe.banks[fold]), base.actuation)
+    made = GreyBox(base.vehicle, base.copied_effects(), copy.deepcopy(recipe.banks[fold]), base.actuation)
+    return with_commands(made, base.commands)
 
 
 def laid_out(base: GreyBox, recipe: Recipe) -> tuple[Layout, tuple[str, ...], Priors]:

@@ -62,7 +62,7 @@ class Trials:
         self.say, self.tell = Counted(progress, EXPECTED, rough=True), tell or (lambda words: None)
         self.model, self.log = model, log
         self.how = choose_derivative(log, derivative)
-        self.judge = Judge.of(log, model.actuation)
+        self.judge = Judge.of(log, model.actuation, model)
         self.state = as_given(model, self.judge)
         self.effects, self.max_effects = effects, max_effects
         self.steps: list[Step] = []

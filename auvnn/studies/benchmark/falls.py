@@ -15,6 +15,7 @@ from auvnn.improvement.gains import paired_gain
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
+from auvnn.models.command_path import with_commands
 
 HORIZON = "5"
 # A true fall below this many of its own standard errors is nothing to take a share of.
@@ -48,7 +49,9 @@ def fall(model: GreyBox, true: GreyBox, log: Log, held_out: Log, names: Sequence
     try:
         before, after = _fitted(model, log, held_out, names)
         scale = scale_of(held_out)
-        rolled = [roll(m, held_out, HORIZON, scale) for m in (before, after, true)]
+        # The truth is driven as the fitted model is: what commands do between samples is no part of the question.
+        alike = with_commands(true, after.commands)
+        rolled = [roll(m, held_out, HORIZON, scale) for m in (before, after, alike)]
     except AuvnnError as problem:
         return {
             "refitted": None,

@@ -15,6 +15,7 @@ from auvnn.estimation.sensitivity import Response, respond
 from auvnn.estimation.window_normal_equations import CHUNK, LOOSE, TRUST, motion
 from auvnn.estimation.window_simulation import output_error
 from auvnn.logs import Log
+from auvnn.metrics.commands.stated import as_stated
 from auvnn.metrics.free_run import initial_states, moved
 from auvnn.metrics.windows import ACCELERATION, POSITION, Windows, cut_windows
 from auvnn.models import GreyBox
@@ -55,7 +56,7 @@ def training_windows(model: GreyBox, log: Log, horizon: float) -> Windows:
     if not any(n in windows.estimated for n in "uvw"):
         mask[..., POSITION] = 0.0
     mask[..., ACCELERATION] = 0.0
-    return replace(windows, nu_dot=None, mask=mask)
+    return as_stated(model, replace(windows, nu_dot=None, mask=mask))
 
 
 @dataclass(frozen=True)

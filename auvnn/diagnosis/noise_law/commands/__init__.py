@@ -1,6 +1,6 @@
 """Commands between samples: how they go there, and what that leaves open.
 
 `holding` asks the log, `share` once more about a fit to such commands, `early` whether the answer is so clear that names
-need not be sought with held ones; `paths` and `mean_thrust` make windows of commands that go so; `uncertain` says how
+need not be sought with held ones (`auvnn.metrics.commands` makes windows of commands that go so); `uncertain` says how
 much of a force that leaves open, `in_place_of_names` which names another law of the commands replaces.
 """

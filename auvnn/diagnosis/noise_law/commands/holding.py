@@ -37,13 +37,14 @@ from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
-from auvnn.diagnosis.noise_law.commands.mean_thrust import MeanThrust
-from auvnn.diagnosis.noise_law.commands.paths import LAWS, between
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
+from auvnn.metrics.commands.mean_thrust import MeanThrust
+from auvnn.metrics.commands.paths import LAWS, between
 from auvnn.metrics.windows import Windows
+from auvnn.models.command_path import CommandPath
 
 Array = NDArray[np.float64]
 LINEAR = 0.5
@@ -83,6 +84,17 @@ class Holding:
         """Return windows of commands that go so."""
         along = self.name if self.name in LAWS else "ahead"
         return between(windows, self.share, along, samples=self.samples, curves=self.curves)
+
+    def path(self, interval: float) -> CommandPath | None:
+        """Return it as models state it; None where commands are held.
+
+        Args:
+            interval: between samples of the log, s.
+        """
+        if self.name == "held":
+            return None
+        through = "thrust" if self.curves is not None and self.curves.through_thrusts else "command"
+        return CommandPath(self.name, self.share, interval, self.samples, through)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""

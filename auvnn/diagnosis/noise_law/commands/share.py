@@ -22,9 +22,9 @@ from auvnn.diagnosis.noise_law.commands.holding import (
     least_share,
     through_thrusts,
 )
-from auvnn.diagnosis.noise_law.commands.mean_thrust import MeanThrust
-from auvnn.diagnosis.noise_law.commands.paths import LAWS, between
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
+from auvnn.metrics.commands.mean_thrust import MeanThrust
+from auvnn.metrics.commands.paths import LAWS, between
 from auvnn.metrics.windows import Windows
 
 # A share that is so far from one half is asked about one half, too.

@@ -19,10 +19,10 @@ from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.noise_law.commands.holding import LINEAR, Holding
-from auvnn.diagnosis.noise_law.commands.paths import between
 from auvnn.diagnosis.residuals.forces import fins_of
 from auvnn.effects.base import AXES
 from auvnn.estimation.window_normal_equations import linearise
+from auvnn.metrics.commands.paths import between
 from auvnn.metrics.free_run import away
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox

@@ -21,8 +21,8 @@ from auvnn.diagnosis.noise_law.commands.holding import (
     _best,
     holding,
 )
-from auvnn.diagnosis.noise_law.commands.mean_thrust import MeanThrust
-from auvnn.diagnosis.noise_law.commands.paths import between, cubic_at, line_at, step_at
+from auvnn.metrics.commands.mean_thrust import MeanThrust
+from auvnn.metrics.commands.paths import between, cubic_at, line_at, step_at
 from auvnn.diagnosis.noise_law.commands.share import with_share
 from auvnn.estimation.window_parts import split
 from auvnn.metrics.windows import cut_windows

@@ -11,7 +11,7 @@ import torch
 from scipy.stats import binom
 from torch import Tensor
 
-from auvnn.diagnosis.noise_law.commands.mean_thrust import MeanThrust
+from auvnn.metrics.commands.mean_thrust import MeanThrust
 from auvnn.metrics.windows import Windows
 from auvnn.models.free_running.rollout import steps_per_interval
 

@@ -1,0 +1,93 @@
+"""How commands go between the log's samples, asked of the fits that `add` makes, and these made anew where they change.
+
+A fit of commands that are held, where a controller changed them in between, has the coefficients make up for it: they are
+off, and so is every model that is used at another rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from auvnn.diagnosis.cross_validation.fitters import ByWindows
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
+from auvnn.diagnosis.hypotheses.stated_priors import Layout, lay_out
+from auvnn.diagnosis.noise_law.commands.early import clearly_between_samples
+from auvnn.diagnosis.noise_law.commands.holding import HELD, Holding, holding
+from auvnn.diagnosis.noise_law.commands.share import with_share
+from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
+from auvnn.diagnosis.selection.model_comparison import ODDS
+from auvnn.errors import InputError
+from auvnn.improvement.fits import Fits, fitted_by
+from auvnn.logs import Log
+from auvnn.metrics.commands.stated import interval_of
+from auvnn.metrics.windows import Windows
+from auvnn.models import GreyBox
+from auvnn.models.command_path import CommandPath, with_commands
+
+
+def by_their_path(fits: Fits, model: GreyBox, names: Sequence[str], say: Callable[[str], None]) -> Fits:
+    """Return the fits to commands as they go between samples; themselves where these are held, or nothing tells.
+
+    Args:
+        fits: to commands that are held.
+        model: as known.
+        names: effects to add.
+        say: called with what is being done, in words.
+    """
+    if not isinstance(fits.fitter, ByWindows):
+        return fits
+    windows = fits.fitter.windows
+    say("asking how commands go between samples")
+    law = asked(fits.layout, fits.best, windows)
+    path = law.path(interval_of(windows))
+    if path is None:
+        return _stated(fits, None) if model.commands is not None else fits
+    say(f"commands change between samples ({law.name}): fitting again")
+    try:
+        again = fitted_by(ByWindows(law.applied(windows)), model, names, say)
+    except InputError:
+        # What was found with held commands stands: a fit to others has nowhere to begin.
+        return _stated(fits, None)
+    return _stated(replace(again, notes=(*fits.notes, *again.notes, path.words())), path)
+
+
+def path_of(model: GreyBox, log: Log) -> CommandPath | None:
+    """Return how commands go by a fit of the uncertain coefficients alone; None where they are held, or nothing tells.
+
+    Args:
+        model: as known.
+        log: measurements.
+    """
+    windows, layout = windows_for(model, log), lay_out(model, [])
+    try:
+        fit = fit_hypothesis(layout, windows, list(layout.names), ())
+    except UNSOLVED:
+        return None
+    return asked(layout, fit, windows).path(interval_of(windows))
+
+
+def asked(layout: Layout, fit: FittedHypothesis, windows: Windows) -> Holding:
+    """Return how commands go by a fit; held unless the straight line is clearly likelier.
+
+    Args:
+        layout: of the model as it is stated.
+        fit: to commands that are held.
+        windows: those it was fitted to.
+    """
+    try:
+        if not clearly_between_samples(layout, fit, windows, ODDS):
+            return HELD
+        return with_share(layout, fit, windows, holding(fit, windows, layout))
+    except UNSOLVED:
+        return HELD
+
+
+def _stated(fits: Fits, path: CommandPath | None) -> Fits:
+    """Return the fits with models that state how commands go."""
+    return replace(
+        fits,
+        steps=[(name, with_commands(model, path)) for name, model in fits.steps],
+        without={name: with_commands(model, path) for name, model in fits.without.items()},
+    )
