@@ -21,10 +21,10 @@ from auvnn.diagnosis.noise_law.commands.holding import (
     _best,
     holding,
 )
-from auvnn.metrics.commands.mean_thrust import MeanThrust
-from auvnn.metrics.commands.paths import between, cubic_at, line_at, step_at
 from auvnn.diagnosis.noise_law.commands.share import with_share
 from auvnn.estimation.window_parts import split
+from auvnn.metrics.commands.mean_thrust import MeanThrust
+from auvnn.metrics.commands.paths import between, cubic_at, line_at, step_at
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox, load
 from tests.small_logs import make_log, sines, small_vehicle, thinned

@@ -13,11 +13,11 @@ from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.commands.early import clearly_between_samples
 from auvnn.diagnosis.noise_law.commands.holding import FAR, Holding, cost_at_best, cost_with, holding
-from auvnn.metrics.commands.mean_thrust import MeanThrust
-from auvnn.metrics.commands.paths import between
 from auvnn.diagnosis.noise_law.commands.share import with_share
 from auvnn.estimation.window_parts import split
 from auvnn.logs import Log, Run
+from auvnn.metrics.commands.mean_thrust import MeanThrust
+from auvnn.metrics.commands.paths import between
 from auvnn.models import GreyBox, Inputs
 from auvnn.vehicle import load_vehicle
 from tests.small_logs import NOISE, sines

@@ -15,7 +15,6 @@ from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.commands import uncertain
 from auvnn.diagnosis.noise_law.commands.holding import Holding
-from auvnn.metrics.commands.mean_thrust import MeanThrust
 from auvnn.diagnosis.noise_law.commands.uncertain import (
     UncertainWrench,
     in_closed_loop,
@@ -23,6 +22,7 @@ from auvnn.diagnosis.noise_law.commands.uncertain import (
     noise_answered,
     uncertain_wrench,
 )
+from auvnn.metrics.commands.mean_thrust import MeanThrust
 from auvnn.models import GreyBox, load
 from tests.small_logs import make_log, sines, small_vehicle
 

@@ -8,8 +8,8 @@ import pytest
 import torch
 
 from auvnn.diagnosis.noise_law.commands.holding import HELD, Holding
-from auvnn.metrics.commands.mean_thrust import MeanThrust
 from auvnn.diagnosis.noise_law.words import stochastic_words
+from auvnn.metrics.commands.mean_thrust import MeanThrust
 from auvnn.models import GreyBox
 from tests.small_logs import small_vehicle
 
