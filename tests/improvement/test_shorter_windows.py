@@ -25,7 +25,7 @@ def case():
 def test_windows_are_as_long_as_fits_settle(case, monkeypatch, stuck):
     """Where none is short enough, the usual ones stay, with what the fits over them say."""
     model, log = case
-    real, asked = fits._fitted_by, []
+    real, asked = fits.fitted_by, []
 
     def fitted(fitter: Any, *rest: Any) -> Any:
         found = real(fitter, *rest)
@@ -33,7 +33,7 @@ def test_windows_are_as_long_as_fits_settle(case, monkeypatch, stuck):
         last = replace(found.best, fitted=replace(found.best.fitted, stuck=len(asked) <= stuck))
         return replace(found, fits=[*found.fits[:-1], last])
 
-    monkeypatch.setattr(fits, "_fitted_by", fitted)
+    monkeypatch.setattr(fits, "fitted_by", fitted)
     steps = fits.fit_steps(
         model, log, [NAME], objective="rollout", window=None, derivative=None, say=lambda _: None
     )
@@ -46,7 +46,7 @@ def test_windows_are_as_long_as_fits_settle(case, monkeypatch, stuck):
 
 def test_windows_whose_length_was_asked_for_stay(case, monkeypatch):
     model, log = case
-    real, asked = fits._fitted_by, []
+    real, asked = fits.fitted_by, []
 
     def fitted(fitter: Any, *rest: Any) -> Any:
         found = real(fitter, *rest)
@@ -54,6 +54,6 @@ def test_windows_whose_length_was_asked_for_stay(case, monkeypatch):
         last = replace(found.fits[-1], fitted=replace(found.fits[-1].fitted, stuck=True))
         return replace(found, fits=[last])
 
-    monkeypatch.setattr(fits, "_fitted_by", fitted)
+    monkeypatch.setattr(fits, "fitted_by", fitted)
     fits.fit_steps(model, log, [NAME], objective="rollout", window=3.0, derivative=None, say=lambda _: None)
     assert len(asked) == 1

@@ -1,0 +1,139 @@
+"""`add`, `compare`, `improve` and `diagnose` on a log whose commands changed between its samples."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+import auvnn
+from auvnn.improvement import commands_between
+from auvnn.improvement.commands_between import path_of
+from auvnn.improvement.loop.judge import Judge
+from auvnn.metrics.commands.stated import as_stated
+from auvnn.models import GreyBox
+from auvnn.models.command_path import CommandPath, with_commands
+from tests.small_logs import make_log, small_vehicle, thinned
+
+STEP = 5
+NAME, FORCE = "net_buoyancy", 8.0
+
+
+@pytest.fixture(scope="module")
+def model():
+    return GreyBox(small_vehicle())
+
+
+def logged(model, *, held, first=0, runs=3, hidden=True):
+    """Return a log at 5 Hz, its commands held or changed at 25 Hz; of a plant with a net buoyancy, or as the model."""
+    plant = model.with_effects({NAME: {"force": FORCE}}) if hidden else model
+    rate = 5.0 if held else 5.0 * STEP
+    log = make_log(plant, runs=runs, duration=30.0, rate=rate, noise=0.3, max_step=0.04, first=first)
+    return log if held else thinned(log, STEP)
+
+
+@pytest.fixture(scope="module")
+def between(model):
+    return logged(model, held=False), logged(model, held=False, first=10)
+
+
+@pytest.fixture(scope="module")
+def better(model, between):
+    return auvnn.add(model, between[0], NAME, horizons=("5",))
+
+
+def test_commands_are_taken_as_they_went_and_the_model_states_it(better):
+    """Five ticks a sample: two fifths of the next command are in an interval's mean."""
+    path = better.model.commands
+    assert path.between_samples in ("ahead", "linear", "smooth") and path.interval == pytest.approx(0.2)
+    assert path.share_of_next == pytest.approx(0.4, abs=0.12)
+    assert better.commands == path.to_dict() == better.to_dict()["commands"]
+    assert better.refitted_model.commands == path
+    assert path.words() in better.warnings
+    # The truth's coefficients are the model's own: with held commands they were off to make up for the commands.
+    found = better.coefficients["added_mass"]
+    assert all(abs(found[k]["value"] - 1.0) < 0.03 for k in "XYZ")
+    assert better.parameters[NAME]["force"]["value"] == pytest.approx(FORCE, rel=0.02)
+
+
+def test_the_held_out_error_is_that_of_a_model_driven_so(model, better, between, monkeypatch):
+    monkeypatch.setattr(commands_between, "clearly_between_samples", lambda *_: False)
+    held = auvnn.add(model, between[0], NAME, horizons=("5",))
+    assert held.commands is None and held.model.commands is None
+    errors = [b.after["rollout"]["5"]["total"] for b in (held, better)]
+    assert errors[1] < 0.6 * errors[0]
+    # On another day, too, by `compare`, which says what it takes from the model.
+    compared = [auvnn.compare(b.model, between[1], horizons=["5"]) for b in (held, better)]
+    errors = [c.rollout["5"]["total"] for c in compared]
+    assert errors[1] < 0.6 * errors[0]
+    told = [[w for w in c.warnings if "between the log's samples" in w] for c in compared]
+    assert not told[0] and "The model states it" in told[1][0]
+
+
+def test_the_next_day_finds_nothing_missing(better, between):
+    found = auvnn.diagnose(
+        better.model, between[1], [NAME, "added_mass", "thruster_lag"], advice=False, whiteness=False
+    )
+    assert found.verdict == "adequate" and not found.missing
+
+
+def test_a_statement_comes_back_from_disk(better, between, tmp_path):
+    better.write(tmp_path / "answer")
+    assert json.loads((tmp_path / "answer/improvement.json").read_text())["commands"] == better.commands
+    better.model.save(tmp_path / "model")
+    again = auvnn.compare(tmp_path / "model", between[1], horizons=["5"])
+    expected = auvnn.compare(better.model, between[1], horizons=["5"])
+    assert again.rollout["5"]["total"] == pytest.approx(expected.rollout["5"]["total"], rel=1e-6)
+
+
+def test_commands_that_were_held_stay_so_and_an_old_statement_goes(model):
+    log = logged(model, held=True)
+    plain = auvnn.add(model, log, NAME, horizons=("5",))
+    assert plain.commands is None and plain.model.commands is None
+    stated = with_commands(model, CommandPath("linear", 0.5, 0.2))
+    again = auvnn.add(stated, log, NAME, horizons=("5",))
+    assert again.model.commands is None and again.refitted_model.commands is None
+    assert again.after["rollout"]["5"]["total"] == pytest.approx(
+        plain.after["rollout"]["5"]["total"], rel=1e-6
+    )
+
+
+def test_a_fit_one_step_ahead_asks_nothing(model, between):
+    found = auvnn.add(model, between[0], NAME, objective="one_step", horizons=("5",))
+    assert found.commands is None
+
+
+def test_a_fit_that_has_nowhere_to_begin_leaves_the_one_of_held_commands(model, between, monkeypatch):
+    from auvnn.errors import InputError
+
+    def refuse(*_):
+        raise InputError("nowhere")
+
+    monkeypatch.setattr(commands_between, "fitted_by", refuse)
+    found = auvnn.add(model, between[0], NAME, horizons=("5",))
+    assert found.commands is None and found.accepted
+
+
+def test_the_loop_fits_and_judges_by_commands_as_they_went(model, between):
+    found = auvnn.improve(
+        model, between[0], test=between[1], effects=[NAME, "thruster_lag"], learn=(), seconds=120.0
+    )
+    assert found.model.commands.between_samples in ("ahead", "linear", "smooth")
+    assert any("between the log's samples" in line for line in found.story)
+    assert [s.step for s in found.steps if s.kind == "a cause with a name"] == [NAME]
+    assert found.waterfall[-2]["error"] < 1.5 * found.waterfall[-1]["error"]
+
+
+def test_the_judge_cuts_windows_of_every_length_alike(model, between):
+    path = path_of(model.with_effects({NAME: {"force": FORCE}}), between[0])
+    driven = with_commands(model, path)
+    judge = Judge.of(between[0], model.actuation, driven)
+    plain = Judge.of(between[0], model.actuation)
+    for seconds in (float(judge.horizon), 1.0):
+        mine, others = (j.task(seconds)[0].windows for j in (judge, plain))
+        assert (mine.inputs.command == as_stated(driven, others).inputs.command).all()
+        assert not (mine.inputs.command == others.inputs.command).all()
+
+
+def test_nothing_is_asked_where_commands_were_held(model):
+    assert path_of(model.with_effects({NAME: {"force": FORCE}}), logged(model, held=True)) is None
