@@ -40,8 +40,7 @@ class Effect(nn.Module):
     `leaves`: effects that look like what its own form gets wrong. `remembers`: what `command` returns depends on earlier
     commands by one state per command: `follow`, `advance`. `acts_with`: effects without any of which it does nothing, so
     that it can neither be missing nor be hidden alone. `is_drag`: what it adds grows with the drag that others scale.
-    `turns`: what `command` returns is the propellers' speed, as the command that it settles at; `by_speed`: its `thrust`
-    goes by that speed (`Moment.turning`).
+    `turns`: what `command` returns is the propellers' speed as a command; `by_speed`: its `thrust` goes by that speed.
     """
 
     name: ClassVar[str]
@@ -69,8 +68,7 @@ class Effect(nn.Module):
     is_drag: ClassVar[bool] = False
 
     theta: nn.Parameter
-    # Standard deviations by parameter, as they were stated or fitted; of what is not in it the default holds.
-    uncertainty: dict[str, float]
+    uncertainty: dict[str, float]  # standard deviations; of what is not in it the default holds
 
     def __init__(self, parameters: tuple[Parameter, ...], values: Mapping[str, float] | None = None) -> None:
         """Keep the parameters' descriptions and start them at `values`, the rest at their nulls.

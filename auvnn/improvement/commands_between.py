@@ -24,7 +24,7 @@ from auvnn.logs import Log
 from auvnn.metrics.commands.stated import interval_of
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
-from auvnn.models.command_path import CommandPath, with_commands
+from auvnn.models.actuation.command_path import CommandPath, with_commands
 
 
 def by_their_path(fits: Fits, model: GreyBox, names: Sequence[str], say: Callable[[str], None]) -> Fits:

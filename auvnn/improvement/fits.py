@@ -15,6 +15,7 @@ from auvnn.diagnosis.hypotheses.standard_errors import determined
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, lay_out
 from auvnn.errors import InputError
 from auvnn.estimation.prediction_error import FitError
+from auvnn.improvement.from_parts import better_from_parts
 from auvnn.logs import Log
 from auvnn.models import GreyBox
 from auvnn.progress import Counted
@@ -134,6 +135,8 @@ def fitted_by(fitter: Fitter, model: GreyBox, names: Sequence[str], say: Callabl
             found = fitter.fit(layout, base, names[:count], fits[-1])
         except FitError as problem:
             raise InputError(f"{name} cannot be added: {problem}") from None
+        if isinstance(fitter, ByWindows):
+            found = better_from_parts(fitter, layout, base, names[:count], found, say)
         fits.append(found)
         steps.append((name, with_fitted_parameters(model, layout, found)))
     without: dict[str, GreyBox] = {}

@@ -16,7 +16,7 @@ from auvnn.effects import HOOKS, Effect, effect_class
 from auvnn.effects.registering import values_of
 from auvnn.errors import ConfigError
 from auvnn.models.actuation.actuators import Actuators
-from auvnn.models.command_path import CommandPath, carried_over
+from auvnn.models.actuation.command_path import CommandPath, carried_over
 from auvnn.models.equations_of_motion import EquationsOfMotion
 from auvnn.models.inputs import Inputs
 from auvnn.models.joint_covariance import JointCovariance
@@ -98,9 +98,7 @@ class GreyBox(ShownModel, EquationsOfMotion):
         self.effects = nn.ModuleList(members)
         self._by_hook = {h: [e for e in members if h in e.hooks()] for h in HOOKS}
         self._by_hook["wrench"].sort(key=lambda e: not e.is_drag)
-        self.bottom: float | None = (
-            None  # depth of a flat one, m: the altitude of a vehicle that is simulated
-        )
+        self.bottom: float | None = None  # its depth, m, for the altitude of simulated vehicles
         self.joint: JointCovariance | None = None  # of the effects' parameters, where a fit has said it
         self.commands: CommandPath | None = None  # between a log's samples, where they are not held
         self.time_varying = any(e.time_varying for e in self._by_hook["body"])

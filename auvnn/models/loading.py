@@ -12,7 +12,7 @@ from auvnn.damping.region import Region
 from auvnn.effects import Effect, effect_class
 from auvnn.effects.registering import names_of
 from auvnn.errors import ConfigError, ModelError
-from auvnn.models.command_path import CommandPath
+from auvnn.models.actuation.command_path import CommandPath
 from auvnn.models.grey_box import GreyBox
 from auvnn.models.joint_covariance import JointCovariance
 from auvnn.models.saving import (

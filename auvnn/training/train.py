@@ -22,7 +22,7 @@ from auvnn.metrics.one_step import OneStep, one_step, scores
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.metrics.unmeasured import assumed, completed
 from auvnn.models import GreyBox
-from auvnn.models.command_path import carried_over
+from auvnn.models.actuation.command_path import carried_over
 from auvnn.models.load_arguments import GivenLog, GivenModel, as_log, as_model
 from auvnn.progress import Progress
 from auvnn.threads import on_one_thread

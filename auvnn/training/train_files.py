@@ -31,7 +31,7 @@ from auvnn.log_chunks.samples import Pieces, Reading, evenly_spread_runs
 from auvnn.logs import Log
 from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.models import GreyBox
-from auvnn.models.command_path import carried_over
+from auvnn.models.actuation.command_path import carried_over
 from auvnn.progress import Progress
 from auvnn.threads import on_one_thread
 from auvnn.training.confounding.confounded_effects import confounded_effects

@@ -12,7 +12,7 @@ from auvnn.improvement.commands_between import path_of
 from auvnn.improvement.loop.judge import Judge
 from auvnn.metrics.commands.stated import as_stated
 from auvnn.models import GreyBox
-from auvnn.models.command_path import CommandPath, with_commands
+from auvnn.models.actuation.command_path import CommandPath, with_commands
 from tests.small_logs import make_log, small_vehicle, thinned
 
 STEP = 5

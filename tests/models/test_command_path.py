@@ -1,4 +1,4 @@
-"""How commands go between samples, as a model states it: read, refused, saved, and carried over to models made from it."""
+"""How commands go between samples, as a model states it: read, refused, saved, and carried over."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import yaml
 
 from auvnn.errors import ModelError
 from auvnn.models import GreyBox, load, remove
-from auvnn.models.command_path import CommandPath, with_commands
+from auvnn.models.actuation.command_path import CommandPath, with_commands
 from auvnn.models.structures import build_structure
 from tests.small_logs import small_vehicle
 

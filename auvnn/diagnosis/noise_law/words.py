@@ -7,7 +7,7 @@ from typing import Any
 
 from auvnn.diagnosis.residuals.input_forces import AXES
 from auvnn.metrics.force_law import ForceLaw
-from auvnn.models.command_path import CommandPath
+from auvnn.models.actuation.command_path import CommandPath
 
 MOTIONS = {"X": "surge", "Y": "sway", "Z": "heave", "K": "roll", "M": "pitch", "N": "yaw"}
 

@@ -19,7 +19,7 @@ from auvnn.improvement.loop.state import (
     fitted_one_step,
 )
 from auvnn.improvement.loop.trials import FAILURES, Trials
-from auvnn.models.command_path import with_commands
+from auvnn.models.actuation.command_path import with_commands
 
 # A diagnosis sees at most so many seconds of a log.
 DIAGNOSED = 300.0

@@ -20,7 +20,7 @@ from auvnn.improvement.loop.judge import Judge
 from auvnn.improvement.loop.state import ALL, State, banked, fold_models, laid_out
 from auvnn.metrics.derivative import Derivative
 from auvnn.models import GreyBox
-from auvnn.models.command_path import carried_over
+from auvnn.models.actuation.command_path import carried_over
 from auvnn.training.fit_damping import fit_damping
 from auvnn.training.problem import DampingProblem
 from auvnn.training.targets import Targets

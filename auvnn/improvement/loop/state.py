@@ -22,7 +22,7 @@ from auvnn.improvement.free_run import STEPS, FreeRunFit, fit_free_run
 from auvnn.improvement.loop.judge import NEWTON, Judge
 from auvnn.metrics.derivative import Derivative
 from auvnn.models import GreyBox
-from auvnn.models.command_path import with_commands
+from auvnn.models.actuation.command_path import with_commands
 
 Array = NDArray[np.float64]
 # The networks that were trained on all folds, among those trained without each.

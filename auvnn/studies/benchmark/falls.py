@@ -15,7 +15,7 @@ from auvnn.improvement.gains import paired_gain
 from auvnn.logs import Log
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
-from auvnn.models.command_path import with_commands
+from auvnn.models.actuation.command_path import with_commands
 
 HORIZON = "5"
 # A true fall below this many of its own standard errors is nothing to take a share of.

@@ -11,7 +11,7 @@ from auvnn.metrics.commands.paths import between
 from auvnn.metrics.commands.stated import as_stated, interval_of, said
 from auvnn.metrics.rollouts import horizon_windows, roll, scale_of
 from auvnn.models import GreyBox
-from auvnn.models.command_path import CommandPath, with_commands
+from auvnn.models.actuation.command_path import CommandPath, with_commands
 from auvnn.training.objectives.windows import training_windows
 from tests.small_logs import make_log, small_vehicle, thinned
 
@@ -32,7 +32,12 @@ def log(model):
 
 @pytest.mark.parametrize(
     "path",
-    [LINE, CommandPath("smooth", 0.4, 0.2), CommandPath("ahead", 0.3, 0.2), CommandPath("averaged", 0.5, 0.2, 4)],
+    [
+        LINE,
+        CommandPath("smooth", 0.4, 0.2),
+        CommandPath("ahead", 0.3, 0.2),
+        CommandPath("averaged", 0.5, 0.2, 4),
+    ],
 )
 def test_windows_are_those_of_the_law(model, log, path):
     windows = horizon_windows(log, "5", model.actuation)
@@ -40,7 +45,9 @@ def test_windows_are_those_of_the_law(model, log, path):
     expected = between(
         windows, path.share_of_next, path.between_samples, samples=path.samples, curves=MeanThrust.of(model)
     ).inputs
-    assert torch.equal(found.command, expected.command) and not torch.equal(found.command, windows.inputs.command)
+    assert torch.equal(found.command, expected.command) and not torch.equal(
+        found.command, windows.inputs.command
+    )
     assert (found.within is None) == (expected.within is None)
 
 

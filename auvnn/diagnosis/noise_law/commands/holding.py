@@ -44,7 +44,7 @@ from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.metrics.commands.mean_thrust import MeanThrust
 from auvnn.metrics.commands.paths import LAWS, between
 from auvnn.metrics.windows import Windows
-from auvnn.models.command_path import CommandPath
+from auvnn.models.actuation.command_path import CommandPath
 
 Array = NDArray[np.float64]
 LINEAR = 0.5
