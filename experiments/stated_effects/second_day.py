@@ -3,7 +3,7 @@
     python experiments/stated_effects/second_day.py OUT [every=10] [offset=0] [shift=47000000]
     python experiments/stated_effects/second_day.py OUT count     # of the rows in OUT, without making any
 
-The cases are those of `run.py`, of another shift. The effect that is there is added and fitted on the first day; the second
+The cases are those of `run.py`, of another shift. The effect that is there is added and fitted on the first day; the next
 is held out as a whole, and the regression is fitted to the first. Errors are those of 5 s of free running, in standard
 deviations of the motion. Rows go to OUT/days.jsonl.
 """
