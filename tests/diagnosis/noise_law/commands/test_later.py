@@ -1,0 +1,113 @@
+"""Lags that only say by how much of an interval commands act later, told from lags that are there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from auvnn.diagnosis.hypotheses.candidates import windows_for
+from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.diagnosis.noise_law import answer
+from auvnn.diagnosis.noise_law.commands.holding import HELD, Holding
+from auvnn.diagnosis.noise_law.commands.later import late_by_a_share
+from auvnn.diagnosis.selection.choose import Chooser
+from auvnn.diagnosis.stages.state import State
+from auvnn.metrics.commands.mean_thrust import MeanThrust
+from auvnn.models import GreyBox
+from tests.small_logs import make_log, small_vehicle, thinned
+
+STEP = 5
+NAMES = ["net_buoyancy", "thruster_lag"]
+
+
+@pytest.fixture(scope="module")
+def model():
+    return GreyBox(small_vehicle())
+
+
+def ended(model: GreyBox, hidden: dict[str, Any], names: list[str]) -> tuple[Any, State, Any, Holding]:
+    """Return what is asked, a search that has ended with names, windows as read, and a cubic that is not late."""
+    log = thinned(
+        make_log(model.with_effects(hidden), runs=3, duration=30.0, rate=25.0, noise=0.3, max_step=0.04), STEP
+    )
+    raw, layout = windows_for(model, log), lay_out(model, NAMES)
+    law = Holding("smooth", 0.5, 100.0, 100.0, curves=MeanThrust.of(model))
+    windows, base = law.applied(raw), list(layout.nuisance)
+    first = fit_hypothesis(layout, windows, base, ())
+    end = fit_hypothesis(layout, windows, base, names)
+    asked = SimpleNamespace(
+        layout=layout, base=tuple(base), chooser=lambda w: Chooser(layout, w, lambda _: None)
+    )
+    return asked, State(windows, first, end, chosen=tuple(names), path=(end,)), raw, law
+
+
+@pytest.fixture(scope="module")
+def late(model):
+    """Return a search by a cubic, of commands of five ticks a sample: they act a tenth of an interval later."""
+    return ended(model, {"net_buoyancy": {"force": 8.0}}, NAMES)
+
+
+def test_a_lag_of_part_of_a_tick_is_another_share(late):
+    asked, state, raw, law = late
+    assert 0.005 < state.current.fitted.model.effect("thruster_lag").theta.item() < 0.06
+    found = late_by_a_share(asked, state, raw, law)
+    assert found is not None
+    fewer, other = found
+    assert fewer.effects == ("net_buoyancy",)
+    assert other.share == pytest.approx(0.4, abs=0.05)
+
+
+def test_a_lag_that_is_longer_than_an_interval_leaves_open_stays(model):
+    asked, state, raw, law = ended(model, {"thruster_lag": {"time_constant": 0.3}}, ["thruster_lag"])
+    assert late_by_a_share(asked, state, raw, law) is None
+
+
+def test_nothing_is_asked_without_names_of_timing_or_where_commands_are_held(late):
+    asked, state, raw, law = late
+    plain = fit_hypothesis(asked.layout, state.windows, list(asked.base), ["net_buoyancy"])
+    assert late_by_a_share(asked, state.but(current=plain), raw, law) is None
+    assert late_by_a_share(asked, state, raw, HELD) is None
+    assert late_by_a_share(asked, state, raw, replace(law, name="averaged", samples=8)) is None
+
+
+def test_what_the_law_does_less_well_stays_a_name(late, monkeypatch):
+    """Where the other share leaves more than a fifth of what the names did."""
+    from auvnn.diagnosis.noise_law.commands import later
+
+    asked, state, raw, law = late
+    monkeypatch.setattr(later, "with_share", lambda *_: replace(law, share=0.47))
+    assert late_by_a_share(asked, state, raw, law) is None
+    monkeypatch.setattr(later, "with_share", lambda *_: law)
+    assert late_by_a_share(asked, state, raw, law) is None
+
+
+def test_the_answer_searches_again_without_it(late, monkeypatch):
+    asked, state, raw, law = late
+    made = []
+
+    def searched(asked: Any, windows: Any, until: Any = None) -> State:
+        made.append((asked.usable, windows))
+        return state.but(windows=windows, current=state.current if len(made) == 1 else state.first)
+
+    asked = SimpleNamespace(**vars(asked), usable=tuple(NAMES), floor=1e-9, say=lambda _: None)
+    monkeypatch.setattr(answer, "search", searched)
+    monkeypatch.setattr(answer, "_held", lambda *_: (state.first, law))
+    monkeypatch.setattr(answer, "with_share", lambda *_: law)
+    monkeypatch.setattr(answer, "without_timed", lambda *_: None)
+    monkeypatch.setattr(answer, "uncertain_wrench", lambda *_: SimpleNamespace(to_dict=dict))
+    monkeypatch.setattr(answer, "noise_colour", lambda *_: answer.Colour(None, 0.0))
+    monkeypatch.setattr(answer, "sensing_alone", lambda *_: None)
+    monkeypatch.setattr(answer, "without", lambda asked, gone: SimpleNamespace(**{**vars(asked), "usable": tuple(
+        n for n in asked.usable if n not in gone)}))  # fmt: skip
+    began = state.but(windows=raw, steps=({"verdict": "unknown", "effects": [], "p_value": 0.0},))
+    monkeypatch.setattr(answer, "_names_alone", lambda asked, began, state, told, words: (state, told, words))
+    monkeypatch.setattr(State, "leaves_something", property(lambda self: self.windows is raw))
+    found, told, _ = answer.answer_with_force(asked, began)
+    assert [usable for usable, _ in made] == [tuple(NAMES), ("net_buoyancy",)]
+    assert "thruster_lag" in found.failed and told["commands"]["share_of_next"] == pytest.approx(
+        0.4, abs=0.05
+    )
