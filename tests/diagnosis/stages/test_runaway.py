@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 import torch
@@ -10,7 +12,9 @@ from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.effects import Effect, Parameter
 from auvnn.errors import InputError
 from auvnn.estimation.scaling import unit_of
+from auvnn.metrics.commands.stated import as_stated
 from auvnn.models import GreyBox
+from auvnn.models.actuation.command_path import CommandPath, with_commands
 from tests.small_logs import make_log, small_vehicle
 
 
@@ -63,3 +67,32 @@ def test_a_length_that_was_asked_for_is_not_changed(log):
 def test_units_of_sums_that_say_nothing_are_zero_and_none_overflows():
     units = unit_of(np.diag([4.0, 0.0, -1e13, np.nan, 1e200]))
     np.testing.assert_array_equal(units, [0.5, 0.0, 0.0, 0.0, 1e-100])
+
+
+def test_commands_go_as_a_model_states_where_it_is_asked_to_drive(log):
+    """Of the usual length and of shorter ones; else they are held."""
+    step = float(np.median(np.diff(log.runs[0].t)))
+    for model in (GreyBox(small_vehicle()), pushing(0.4)):
+        stated = with_commands(model, CommandPath("linear", 0.5, step))
+        held, _ = windows_that_hold(stated, log, None)
+        assert torch.equal(held.inputs.command, windows_that_hold(model, log, None)[0].inputs.command)
+        windows, _ = windows_that_hold(stated, log, None, stated)
+        assert not torch.equal(windows.inputs.command, held.inputs.command)
+        assert torch.equal(windows.inputs.command, as_stated(stated, held).inputs.command)
+
+
+def test_a_diagnosis_that_does_not_ask_the_log_drives_as_the_model_states(log, monkeypatch):
+    from auvnn.diagnosis import diagnose as module
+
+    model = with_commands(GreyBox(small_vehicle()), CommandPath("linear", 0.5, 1.0))
+    asked = []
+
+    def told(known, log, window, driven=None):
+        asked.append(driven)
+        raise InputError("enough")
+
+    monkeypatch.setattr(sys.modules["auvnn.diagnosis.diagnose"], "windows_that_hold", told)
+    for stochastic in (False, True):
+        with pytest.raises(InputError, match="enough"):
+            module(model, log, ["net_buoyancy"], stochastic=stochastic)
+    assert asked[0] is not None and asked[0].commands == model.commands and asked[1] is None

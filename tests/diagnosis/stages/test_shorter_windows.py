@@ -39,6 +39,7 @@ class Asked:
     layout: object
     floor: object = 0.0
     notes: tuple = ("stated",)
+    driven: object = None
 
     def say(self, words):
         """Say nothing."""
