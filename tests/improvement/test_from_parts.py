@@ -12,7 +12,7 @@ from auvnn.diagnosis.cross_validation.fitters import ByWindows
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.estimation.priors import set_parameters
-from auvnn.improvement import from_parts
+from auvnn.improvement import fits, from_parts
 from auvnn.improvement.from_parts import better_from_parts, missed
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
@@ -78,3 +78,18 @@ def test_what_is_missed_is_counted_in_the_variances_of_the_velocities(case):
     away = replace(windows, nu=windows.nu.clone())
     away.nu[:, 1:] += 1e6 * torch.sign(torch.randn(away.nu[:, 1:].shape, dtype=torch.float64))
     assert missed(model, away) <= from_parts.CUT**2
+
+
+def test_every_fit_with_a_name_is_asked_for_a_better_one(case, monkeypatch):
+    """Name after name, beside those before; the fit of the coefficients alone is not."""
+    fitter, _layout, _, _ = case
+    real, asked = fits.better_from_parts, []
+
+    def noted(*given):
+        asked.append(list(given[3]))
+        return real(*given)
+
+    monkeypatch.setattr(fits, "better_from_parts", noted)
+    model = GreyBox(small_vehicle())
+    fits.fitted_by(fitter, model, [NAME, "constant_force"], lambda _: None)
+    assert asked == [[NAME], [NAME, "constant_force"]]
