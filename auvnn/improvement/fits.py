@@ -136,7 +136,7 @@ def fitted_by(fitter: Fitter, model: GreyBox, names: Sequence[str], say: Callabl
         except FitError as problem:
             raise InputError(f"{name} cannot be added: {problem}") from None
         if isinstance(fitter, ByWindows):
-            found = better_from_parts(fitter, layout, base, names[:count], found, say)
+            found = better_from_parts(fitter, layout, base, names[:count], found, fits[-1], say)
         fits.append(found)
         steps.append((name, with_fitted_parameters(model, layout, found)))
     without: dict[str, GreyBox] = {}

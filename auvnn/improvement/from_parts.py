@@ -27,8 +27,9 @@ from auvnn.models import GreyBox
 
 # Parts of the windows that are tried, and by how much the squared error must be less for their minimum to be taken.
 SHARES, BETTER = (0.5, 0.25), 0.05
-# Where the noise is less than this share of the squared error that is left, they are.
-EXPLAINED = 0.8
+# They are where the noise is less than this share of the squared error that is left, and the effect leaves more than that
+# share of the error of free running without it.
+EXPLAINED, FELL = 0.8, 0.5
 
 
 def better_from_parts(
@@ -37,6 +38,7 @@ def better_from_parts(
     base: Sequence[str],
     effects: Sequence[str],
     found: FittedHypothesis,
+    before: FittedHypothesis,
     say: Callable[[str], None],
 ) -> FittedHypothesis:
     """Return the best of a fit and those begun from fits over parts of the windows.
@@ -47,14 +49,17 @@ def better_from_parts(
         base: effects that are free anyway.
         effects: that are asked for, the newest last.
         found: the fit with these.
+        before: the fit without the newest.
         say: called with what is being done, in words.
     """
     windows, best = fitter.windows, found
     if windows.law is not None or noise_share(found.fitted) >= EXPLAINED:
         return found
+    least = missed(found.fitted.model, windows)
+    if least <= FELL * missed(before.fitted.model, windows):
+        return found
     times = windows.times[:, windows.warmup :]
     longest = float((times[:, -1] - times[:, 0]).max())
-    least = missed(best.fitted.model, windows)
     for share in SHARES:
         parts, _, begins = split(windows, share * longest)
         if not begins.any():

@@ -26,7 +26,8 @@ def case():
     log = make_log(model.with_effects({NAME: {"force": FORCE}}), runs=2, duration=20.0, noise=1.0)
     layout, fitter = lay_out(model, [NAME]), ByWindows(windows_for(model, log))
     base = [n for n in layout.names if n != NAME]
-    return fitter, layout, base, fitter.fit(layout, base, [NAME], None)
+    before = fitter.fit(layout, base, (), None)
+    return fitter, layout, base, fitter.fit(layout, base, [NAME], None), before
 
 
 def wrong(found, layout, force):
@@ -41,30 +42,35 @@ def forces(found):
 
 
 def test_a_fit_that_predicts_badly_gives_way(case, monkeypatch):
-    fitter, layout, base, found = case
+    fitter, layout, base, found, before = case
     monkeypatch.setattr(from_parts, "noise_share", lambda _: 0.1)
     said = []
-    better = better_from_parts(fitter, layout, base, [NAME], wrong(found, layout, -20.0), said.append)
+    better = better_from_parts(fitter, layout, base, [NAME], wrong(found, layout, -20.0), before, said.append)
     assert forces(better) == pytest.approx(FORCE, rel=0.05)
     assert len(said) == 2 and "from there again" in said[0]
 
 
 def test_a_fit_that_is_as_good_stays_itself(case, monkeypatch):
-    fitter, layout, base, found = case
+    fitter, layout, base, found, before = case
     monkeypatch.setattr(from_parts, "noise_share", lambda _: 0.1)
-    assert better_from_parts(fitter, layout, base, [NAME], found, lambda _: None) is found
+    said = []
+    assert better_from_parts(fitter, layout, base, [NAME], found, before, said.append) is found
+    assert not said, "the error has fallen to less than half"
+    monkeypatch.setattr(from_parts, "FELL", 0.0)
+    assert better_from_parts(fitter, layout, base, [NAME], found, before, said.append) is found
+    assert len(said) == 2
 
 
 def test_where_noise_is_most_of_the_error_nothing_is_tried(case, monkeypatch):
-    fitter, layout, base, found = case
+    fitter, layout, base, found, before = case
     monkeypatch.setattr(from_parts, "noise_share", lambda _: 0.81)
     bad = wrong(found, layout, -20.0)
-    assert better_from_parts(fitter, layout, base, [NAME], bad, lambda _: None) is bad
+    assert better_from_parts(fitter, layout, base, [NAME], bad, before, lambda _: None) is bad
 
 
 def test_what_is_missed_is_counted_in_the_variances_of_the_velocities(case):
     """Against the same by hand; what runs away counts as five standard deviations."""
-    fitter, layout, _, found = case
+    fitter, layout, _, found, _ = case
     windows, model = fitter.windows, found.fitted.model
     seen = from_parts.predicted(model, windows)
     there = windows.mask[..., 6:12].numpy() > 0
@@ -82,14 +88,17 @@ def test_what_is_missed_is_counted_in_the_variances_of_the_velocities(case):
 
 def test_every_fit_with_a_name_is_asked_for_a_better_one(case, monkeypatch):
     """Name after name, beside those before; the fit of the coefficients alone is not."""
-    fitter, _layout, _, _ = case
-    real, asked = fits.better_from_parts, []
+    fitter, *_ = case
+    asked, given_back = [], []
 
-    def noted(*given):
-        asked.append(list(given[3]))
-        return real(*given)
+    def noted(fitter, layout, base, effects, found, before, say):
+        asked.append((list(effects), before))
+        given_back.append(replace(found, evidence=float(len(asked))))
+        return given_back[-1]
 
     monkeypatch.setattr(fits, "better_from_parts", noted)
     model = GreyBox(small_vehicle())
-    fits.fitted_by(fitter, model, [NAME, "constant_force"], lambda _: None)
-    assert asked == [[NAME], [NAME, "constant_force"]]
+    made = fits.fitted_by(fitter, model, [NAME, "constant_force"], lambda _: None)
+    assert [effects for effects, _ in asked] == [[NAME], [NAME, "constant_force"]]
+    assert made.fits[1] is given_back[0] and made.best is given_back[1]
+    assert all(before is fit for (_, before), fit in zip(asked, made.fits, strict=False))
