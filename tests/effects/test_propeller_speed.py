@@ -22,6 +22,7 @@ from auvnn.models.actuation.acting import speeds_follow
 from auvnn.models.free_running.rate import state_rate, unit_attitude
 from auvnn.models.linear.state_space import StateSpace
 from auvnn.online.residual import Predictor, Sample
+from auvnn.physics.attitude import quat_to_matrix
 from auvnn.plants import PLANTS, PlantTask
 from auvnn.studies.benchmark.identifiability.oracle_slopes import Course, accelerations
 
@@ -270,17 +271,23 @@ def test_exported_graphs_agree_with_the_model(rov, effects):
     assert max(found.values()) < 1e-9, found
 
 
-def test_online_residuals_know_the_speed(rov):
+@pytest.mark.parametrize("measured", [False, True])
+def test_online_residuals_know_the_speed(rov, measured):
     """What the model itself has moved leaves nothing; the same samples with a model that goes by commands leave more."""
     model = rov.with_effects(BOTH)
     eta, nu, inputs, times = stirred(model)
     run = model.rollout(eta, nu, inputs, times, max_step=0.05)
+    with torch.no_grad():
+        rate = model.nu_dot(run.eta[:, :3], quat_to_matrix(run.eta[:, 3:]), run.nu, run.acting, inputs, times)
+    rates = rate if measured else [None] * len(times)
     left = []
     for asked in (model, rov.with_effects(LAG)):
         predictor = Predictor(asked)
         errors = [
-            predictor.take(Sample(float(t), e, n, c))
-            for t, e, n, c in zip(times, run.eta.detach(), run.nu.detach(), inputs.command, strict=True)
+            predictor.take(Sample(float(t), e, n, c, a))
+            for t, e, n, c, a in zip(
+                times, run.eta.detach(), run.nu.detach(), inputs.command, rates, strict=True
+            )
         ]
         left.append(max(float(r.error.abs().max()) for r in errors if r is not None))
     assert left[0] < 1e-6 < 0.1 < left[1]

@@ -12,6 +12,7 @@ from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law import answer
+from auvnn.diagnosis.noise_law.commands import later
 from auvnn.diagnosis.noise_law.commands.holding import HELD, Holding
 from auvnn.diagnosis.noise_law.commands.later import late_by_a_share
 from auvnn.diagnosis.selection.choose import Chooser
@@ -61,9 +62,15 @@ def test_a_lag_of_part_of_a_tick_is_another_share(late):
     assert other.share == pytest.approx(0.4, abs=0.05)
 
 
-def test_a_lag_that_is_longer_than_an_interval_leaves_open_stays(model):
+def test_a_lag_that_is_longer_than_an_interval_leaves_open_stays(model, monkeypatch):
+    """Whatever another share does."""
     asked, state, raw, law = ended(model, {"thruster_lag": {"time_constant": 0.3}}, ["thruster_lag"])
     assert late_by_a_share(asked, state, raw, law) is None
+    monkeypatch.setattr(later, "cost_with", lambda *_: 0.0)
+    monkeypatch.setattr(later, "with_share", lambda *_: replace(law, share=0.1))
+    assert late_by_a_share(asked, state, raw, law) is None
+    monkeypatch.setattr(later, "WITHIN", 20.0)
+    assert late_by_a_share(asked, state, raw, law) is not None
 
 
 def test_nothing_is_asked_without_names_of_timing_or_where_commands_are_held(late):
@@ -76,8 +83,6 @@ def test_nothing_is_asked_without_names_of_timing_or_where_commands_are_held(lat
 
 def test_what_the_law_does_less_well_stays_a_name(late, monkeypatch):
     """Where the other share leaves more than a fifth of what the names did."""
-    from auvnn.diagnosis.noise_law.commands import later
-
     asked, state, raw, law = late
     monkeypatch.setattr(later, "with_share", lambda *_: replace(law, share=0.47))
     assert late_by_a_share(asked, state, raw, law) is None
