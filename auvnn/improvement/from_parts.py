@@ -27,9 +27,9 @@ from auvnn.models import GreyBox
 
 # Parts of the windows that are tried, and by how much the squared error must be less for their minimum to be taken.
 SHARES, BETTER = (0.5, 0.25), 0.05
-# They are where the noise is less than this share of the squared error that is left, and the effect leaves more than that
-# share of the error of free running without it.
-EXPLAINED, FELL = 0.8, 0.5
+# They are where the noise is less than this share of the squared error that is left, and the error of free running is more
+# than that share of the one without the effect, or than a tenth of the velocities' variances.
+EXPLAINED, FELL, SMALL = 0.8, 0.5, 0.1
 
 
 def better_from_parts(
@@ -56,7 +56,7 @@ def better_from_parts(
     if windows.law is not None or noise_share(found.fitted) >= EXPLAINED:
         return found
     least = missed(found.fitted.model, windows)
-    if least <= FELL * missed(before.fitted.model, windows):
+    if least <= min(FELL * missed(before.fitted.model, windows), SMALL):
         return found
     times = windows.times[:, windows.warmup :]
     longest = float((times[:, -1] - times[:, 0]).max())
