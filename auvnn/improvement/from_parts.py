@@ -27,8 +27,8 @@ from auvnn.models import GreyBox
 
 # Parts of the windows that are tried, and by how much the squared error must be less for their minimum to be taken.
 SHARES, BETTER = (0.5, 0.25), 0.05
-# They are where the noise is less than this share of the squared error that is left, and the error of free running is more
-# than that share of the one without the effect, or than a tenth of the velocities' variances.
+# They are where the noise is less than this share of the squared error that is left, and that of free running is more
+# than such a share of the one without the effect, or than a tenth of the velocities' variances.
 EXPLAINED, FELL, SMALL = 0.8, 0.5, 0.1
 
 
