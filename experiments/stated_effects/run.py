@@ -38,9 +38,11 @@ LEFT = 0.25
 def chosen(every: int, offset: int, shift: int) -> list[Case]:
     """Return every so many of the plan's cases whose effect the model can have at other values."""
     plan = yaml.safe_load(PLAN.read_text())
-    found = []
+    found, models = [], dict[str, Any]()
     for case in cases({"plan": plan, "only": list(WORLDS), "shift": shift}):
-        model = auvnn.load(case.vehicle)
+        if case.vehicle not in models:
+            models[case.vehicle] = auvnn.load(case.vehicle)
+        model = models[case.vehicle]
         shaped = any(p.shape for p in EFFECTS.get(case.hidden).describe(model.vehicle, model.actuation))
         if not shaped and case.hidden not in GROUPS:
             found.append(case)
