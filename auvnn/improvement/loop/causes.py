@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
+from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.diagnose import diagnose
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.improvement.commands_between import path_of
@@ -151,11 +152,8 @@ class Causes(Trials):
                 self.adequate = True
                 return
             pays = False
-            groups = [[n] for n in found.missing] if found.verdict == "named" else [list(found.missing)]
-            for group in [g for g in groups if g]:
-                pays |= self._add_best(
-                    group, CAUSE, "named by the diagnosis", rivals=found.verdict != "named"
-                )
+            for group in tied(found.missing, found.steps):
+                pays |= self._add_best(group, CAUSE, "named by the diagnosis", rivals=len(group) > 1)
             if not pays:
                 return
             if found.verdict == "named" and last == "adequate":
@@ -171,3 +169,19 @@ class Causes(Trials):
             self.say(words)
 
         return say
+
+
+def tied(missing: Sequence[str], steps: Sequence[SearchStep]) -> list[list[str]]:
+    """Return the names of a diagnosis in groups, in order: of those between which the log cannot tell one is missing.
+
+    Args:
+        missing: all names.
+        steps: what was found one after the other.
+    """
+    left, groups = dict.fromkeys(missing), list[list[str]]()
+    for step in steps:
+        own = [n for n in step["effects"] if n in left]
+        for name in own:
+            del left[name]
+        groups += [own] if step["verdict"] == "ambiguous" else [[n] for n in own]
+    return [g for g in (*groups, *([n] for n in left)) if g]
