@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.logs import Log
+from auvnn.metrics.commands.stated import as_stated
 from auvnn.metrics.rollouts import Scale, horizon_windows, roll_windows, scale_of
 from auvnn.models import GreyBox
 
@@ -33,6 +34,7 @@ def predicts_better(model: GreyBox, log: Log, allocation: Array) -> bool:
     windows, scale = horizon_windows(log, HORIZON, model.actuation), scale_of(log)
     if windows is None:
         return False
+    windows = as_stated(model, windows)
     changed = model.rebuilt(model.copied_effects())
     changed.actuators.allocation.copy_(changed.actuators.allocation.new_tensor(allocation))
     before, after = (_squares(roll_windows(m, windows, scale).squared, scale) for m in (model, changed))

@@ -26,6 +26,22 @@ from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 from auvnn.models.actuation.command_path import CommandPath, with_commands
 
+# What is said where a model stated another way for such a log.
+GONE = (
+    "by this log commands are held until the next sample, or it does not tell: the model no longer states that they go "
+    "otherwise"
+)
+
+
+def gone(model: GreyBox, interval: float) -> bool:
+    """Return whether a model states how commands go in a log in which they were taken as held.
+
+    Args:
+        model: as known.
+        interval: between samples of the log, s.
+    """
+    return model.commands is not None and model.commands.counts_at(interval)
+
 
 def by_their_path(fits: Fits, model: GreyBox, names: Sequence[str], say: Callable[[str], None]) -> Fits:
     """Return the fits to commands as they go between samples; themselves where these are held, or nothing tells.
@@ -41,15 +57,16 @@ def by_their_path(fits: Fits, model: GreyBox, names: Sequence[str], say: Callabl
     windows = fits.fitter.windows
     say("asking how commands go between samples")
     law = asked(fits.layout, fits.best, windows)
-    path = law.path(interval_of(windows))
+    interval = interval_of(windows)
+    path = law.path(interval)
     if path is None:
-        return _stated(fits, None) if model.commands is not None else fits
+        return _stated(replace(fits, notes=(*fits.notes, GONE)), None) if gone(model, interval) else fits
     say(f"commands change between samples ({law.name}): fitting again")
     try:
         again = fitted_by(ByWindows(law.applied(windows)), model, names, say)
     except InputError:
         # What was found with held commands stands: a fit to others has nowhere to begin.
-        return _stated(fits, None)
+        return _stated(fits, None) if gone(model, interval) else fits
     return _stated(replace(again, notes=(*fits.notes, *again.notes, path.words())), path)
 
 

@@ -93,9 +93,17 @@ def test_commands_that_were_held_stay_so_and_an_old_statement_goes(model):
     stated = with_commands(model, CommandPath("linear", 0.5, 0.2))
     again = auvnn.add(stated, log, NAME, horizons=("5",))
     assert again.model.commands is None and again.refitted_model.commands is None
+    assert commands_between.GONE in again.warnings and commands_between.GONE not in plain.warnings
     assert again.after["rollout"]["5"]["total"] == pytest.approx(
         plain.after["rollout"]["5"]["total"], rel=1e-6
     )
+
+
+def test_a_statement_for_another_rate_stays(model):
+    """A log at 5 Hz whose commands were held says nothing of one at 1 Hz."""
+    path = CommandPath("linear", 0.5, 1.0)
+    found = auvnn.add(with_commands(model, path), logged(model, held=True), NAME, horizons=("5",))
+    assert found.model.commands == path and commands_between.GONE not in found.warnings
 
 
 def test_a_fit_one_step_ahead_asks_nothing(model, between):

@@ -5,10 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.diagnose import diagnose
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
-from auvnn.improvement.commands_between import path_of
+from auvnn.improvement.commands_between import GONE, gone, path_of
 from auvnn.improvement.loop.answer import CAUSE, REFITTED
 from auvnn.improvement.loop.excerpt import liveliest
 from auvnn.improvement.loop.judge import Judge
@@ -53,9 +55,9 @@ class Causes(Trials):
         except FAILURES as problem:
             self._failed("asking how commands go between samples", problem)
             return
-        if path is not None:
-            self.told(path.words())
-        if path is not None or self.model.commands is not None:
+        other = gone(self.model, float(np.median([run.dt for run in self.log.runs])))
+        if path is not None or other:
+            self.told(GONE if path is None else path.words())
             self.model = with_commands(self.model, path)
             self.judge = Judge.of(self.log, self.model.actuation, self.model)
             self.state = as_given(self.model, self.judge)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from auvnn.diagnosis.hypotheses.candidates import windows_for
@@ -71,6 +72,16 @@ def test_a_lag_that_is_longer_than_an_interval_leaves_open_stays(model, monkeypa
     assert late_by_a_share(asked, state, raw, law) is None
     monkeypatch.setattr(later, "WITHIN", 20.0)
     assert late_by_a_share(asked, state, raw, law) is not None
+
+
+def test_a_long_lag_that_the_model_states_does_not_count(model):
+    """Only names are asked whether they are shorter than an interval leaves open."""
+    there = {"thruster_lag": {"time_constant": 0.4}, "actuation_delay": {"delay": 0.02}}
+    fitted = SimpleNamespace(model=model.with_effects(there), theta=np.array([0.4, 0.02]))
+    windows = windows_for(model, make_log(model, duration=12.0, rate=5.0))
+    for named, within in ((("actuation_delay",), True), (("thruster_lag", "actuation_delay"), False)):
+        end = SimpleNamespace(fitted=fitted, names=tuple(there), effects=named)
+        assert later._within_an_interval(end, windows) == within
 
 
 def test_nothing_is_asked_without_names_of_timing_or_where_commands_are_held(late):
