@@ -2,6 +2,6 @@
 
 `holding` asks the log, `share` once more about a fit to such commands, `early` whether the answer is so clear that names
 need not be sought with held ones (`auvnn.metrics.commands` makes windows of commands that go so); `uncertain` says how
-much of a force that leaves open, `in_place_of_names` which names another law of the commands replaces, and `later` which only say that
-commands act later by part of an interval.
+much of a force that leaves open, `in_place_of_names` which names another law of the commands replaces, and `later` which
+only say that commands act later by part of an interval.
 """
