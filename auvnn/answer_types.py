@@ -5,7 +5,7 @@ Whoever indexes an answer (`found.candidates[0]["parameters"]`) finds here which
 
 from __future__ import annotations
 
-from typing import NotRequired, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 
 class ParameterValue(TypedDict):
@@ -132,7 +132,8 @@ class SearchedPart(TypedDict):
 class Dive(TypedDict):
     """One dive of a fleet: its file, when it began and from what that is known, its length in s, its values, its place.
 
-    `dive` is its number in the order of the dates or of the names, from 1; `days` since the first one.
+    `dive` is its number in the order of the dates or of the names, from 1; `days` since the first one; `commands` as a
+    model file states it, None where they are held between samples or the dive does not tell.
     """
 
     file: str
@@ -144,6 +145,7 @@ class Dive(TypedDict):
     verdict: str
     cv: float
     settled: bool
+    commands: dict[str, Any] | None
     parameters: ByEffect
     coefficients: ByEffect
     dive: int

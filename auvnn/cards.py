@@ -144,6 +144,41 @@ def not_needed(gain: Any, by_effect: Any) -> str:
     return f"{name} {does}: leave it out"
 
 
+# An error that is larger than another one by no more than this share is about as good.
+ALIKE = 1.05
+
+
+def still_beaten(baseline: Any) -> str:
+    """Return in words that what needs no model predicts better than a model does; empty where nothing does.
+
+    Args:
+        baseline: the model's errors beside those of a plain regression and of holding the initial velocity, see
+            `improvement.json`.
+    """
+    line = baseline or {}
+    own = (line.get("model") or {}).get("total")
+    others = {
+        "a plain regression": line.get("total"),
+        "holding the initial velocity": (line.get("persistence") or {}).get("total"),
+    }
+    if own is None:
+        return ""
+    # A model that diverges has no finite error: what has one is better.
+    better = {
+        k: v
+        for k, v in others.items()
+        if v is not None and math.isfinite(v) and not (math.isfinite(own) and own <= ALIKE * v)
+    }
+    if not better:
+        return ""
+    who = " and ".join(f"{k} ({figure(v)})" for k, v in better.items())
+    verb = "predict" if len(better) > 1 else "predicts"
+    return (
+        f"{who} still {verb} better than this model ({figure(own)}): more is missing than was added, `auvnn improve` "
+        "looks for all of it"
+    )
+
+
 def _finite(gain: Any) -> bool:
     return all(x is not None and math.isfinite(x) for x in (gain.get("value"), gain.get("std")))
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from auvnn.cards import ALIKE
 from auvnn.errors import InputError
 from auvnn.logs import Log
 from auvnn.metrics.derivative import Derivative
@@ -97,9 +98,9 @@ def standing(rollout: Mapping[str, Any], line: Mapping[str, Any]) -> list[str]:
 
 def _than(error: float, other: float) -> str:
     """Return in a word how an error compares with another; within 5 % they are as good as each other."""
-    if error < 0.95 * other:
+    if ALIKE * error < other:
         return "better than"
-    return "no better than" if error <= 1.05 * other else "WORSE than"
+    return "no better than" if error <= ALIKE * other else "WORSE than"
 
 
 def words(line: Mapping[str, Any]) -> list[str]:

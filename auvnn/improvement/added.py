@@ -7,7 +7,7 @@ from typing import Any
 
 from auvnn.answer_types import ByEffect, OwnFall, WaterfallStep
 from auvnn.answers import PLOTTED, Answer, plain
-from auvnn.cards import PARAMETER_HEAD, Card, figure, not_needed, parameter_rows
+from auvnn.cards import PARAMETER_HEAD, Card, figure, not_needed, parameter_rows, still_beaten
 from auvnn.comparison.predictions import RefittedTraces
 from auvnn.models import GreyBox
 
@@ -62,7 +62,8 @@ class Improvement(Answer):
         steps = [f"{w['step']} {figure(w['error'])}" for w in self.waterfall]
         verdict = "accepted" if self.accepted else "not accepted"
         fall = f"the held-out error falls by {figure(self.gain['value'])} ± {figure(self.gain['std'], 2)}"
-        fall = "; ".join(x for x in (fall, not_needed(self.gain, self.by_effect)) if x)
+        more = (not_needed(self.gain, self.by_effect), still_beaten(self.baseline))
+        fall = "; ".join(x for x in (fall, *more) if x)
         return Card(
             f"Improvement of {self.name} by {', '.join(self.effects)}",
             f"{verdict}: {fall}",

@@ -183,6 +183,12 @@ def _together(model: GreyBox, names: list[str], dives: list[Dive], failed: list[
             f"{len(poor)} of {len(dives)} dives leave something that these effects do not explain (first: {poor[0]}): "
             "their values may stand in for it; auvnn diagnose asks what it is"
         )
+    driven = [d["file"] for d in dives if d["commands"] is not None]
+    if driven:
+        warnings.append(
+            f"in {len(driven)} of {len(dives)} dives (first: {driven[0]}) commands change between samples: they are fitted "
+            "with the mean thrust of each interval"
+        )
     if failed:
         warnings.append(f"{len(failed)} dives could not be fitted; the first: {failed[0]['words']}")
     return Fleet(model.vehicle.name, names, dives, failed, rows, "date" if dated else "dive", warnings)

@@ -16,7 +16,7 @@ from auvnn.improvement.one_dive import Question, dive
 from auvnn.improvement.trend import trend
 from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.models import GreyBox
-from tests.small_logs import make_log, small_vehicle
+from tests.small_logs import make_log, small_vehicle, thinned
 
 FORCES = (2.0, 2.0, 8.0)
 
@@ -143,3 +143,23 @@ def test_wrong_questions_are_refused(dives, tmp_path):
         fleet(model(), tmp_path, "net_buoyancy")
     with pytest.raises(InputError, match="none of 1 dives"):
         fleet(model(), dives / "dive_2026-05-20.parquet", "net_buoyancy")
+
+
+def test_commands_that_change_between_samples_are_fitted_so(tmp_path):
+    """Held, they would leave the added mass off to make up for it, and the dive with something unexplained."""
+    held, thin = (1.5, 4.0)
+    for k, force in enumerate((held, thin)):
+        truth = GreyBox(small_vehicle()).with_effects({"net_buoyancy": {"force": force}})
+        log = make_log(truth, runs=2, duration=30.0, rate=25.0, noise=1.0, max_step=0.04, seed=k, first=2 * k)
+        (thinned(log, 5) if force == thin else log).write(tmp_path / f"dive{k}.parquet")
+    found = fleet(GreyBox(small_vehicle()), tmp_path, "net_buoyancy")
+    first, second = found.dives
+    assert first["commands"] is None
+    assert second["commands"]["share_of_next"] == pytest.approx(0.4, abs=0.12)
+    for entry, force in zip(found.dives, (held, thin), strict=True):
+        assert entry["verdict"] == "adequate"
+        assert entry["parameters"]["net_buoyancy"]["force"]["value"] == pytest.approx(force, rel=0.03)
+        mass = entry["coefficients"]["added_mass"]
+        assert all(abs(mass[k]["value"] - 1.0) < 0.03 for k in "XYZ")
+    (told,) = [w for w in found.warnings if "between samples" in w]
+    assert "1 of 2" in told and "dive1" in told

@@ -15,6 +15,7 @@ import torch
 from auvnn.answers import Answer, plain, write_text
 from auvnn.app.jobs.messages import AddJob, LogJob, Order, Summary
 from auvnn.app.source import split
+from auvnn.cards import still_beaten
 from auvnn.comparison import compare
 from auvnn.comparison.predictions import write_predictions
 from auvnn.diagnosis import diagnose
@@ -139,7 +140,11 @@ class Tasks:
             model, log, order["effects"], test=test, refit=True, progress=say, force=bool(order.get("force"))
         )
         better.model.save(out / "model")
-        more = {"held_out_words": order["log"]["words"], "effects_in_model": better.model.effect_names}
+        more = {
+            "held_out_words": order["log"]["words"],
+            "effects_in_model": better.model.effect_names,
+            "beaten": still_beaten(better.baseline),
+        }
         _write(better, out, more)
         parts = ("t", "measured", "before", "refitted", "after")
         arrays: dict[str, Any] = {

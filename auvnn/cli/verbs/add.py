@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from auvnn.cards import not_needed
+from auvnn.cards import not_needed, still_beaten
 from auvnn.cli.runs.dry import check_inputs
 from auvnn.cli.runs.job import Answering, Job, Verb
 
@@ -36,6 +36,7 @@ def _run(job: Job) -> Answering:
     why = not_needed(data["gain"], data["by_effect"]) or "the held-out error does not fall enough"
     verdict = "accepted" if data["accepted"] else f"not accepted: {why}"
     minded = [w for entry in data["by_effect"].values() for w in entry["reservations"]]
+    minded += [beaten] if (beaten := still_beaten(better.baseline)) else []
     if data["accepted"] and minded:
         verdict = f"accepted, but mind: {'; '.join(dict.fromkeys(minded))}"
     for name, entry in data["by_effect"].items() if len(data["by_effect"]) > 1 else ():

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from auvnn.cards import not_needed
+from auvnn.cards import not_needed, still_beaten
 from auvnn.report import style
 from auvnn.report.html import HtmlTable
 from auvnn.report.page import Page, Plot
@@ -51,6 +51,8 @@ class ImprovementPage(Page):
         errors = {stage: _main_error(view, stage) for stage in STAGES}
         idle = not_needed(gain, view.mapping("by_effect"))
         out = [_verdict(effects, bool(view.get("accepted")), fall, std, idle)]
+        beaten = still_beaten(view.mapping("baseline"))
+        out += [f"{beaten[0].upper()}{beaten[1:].replace('`', '')}."] if beaten else []
         out += [*_error_words(view, effects, errors), *common.baseline_words(view)]
         out += _floor_words(steps, errors)
         return [*out, *_fitted_words(view.mapping("parameters")), *_channel_words(view)]

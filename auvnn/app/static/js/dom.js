@@ -83,6 +83,11 @@ export function plural(count, word) {
   return `${count.toLocaleString("en")} ${word}${count === 1 ? "" : "s"}`;
 }
 
+// Words that a program gives as a clause, as a sentence.
+export function sentence(words) {
+  return words ? `${words.charAt(0).toUpperCase()}${words.slice(1)}.` : "";
+}
+
 export function card(title, ...children) {
   const id = `t${Math.random().toString(36).slice(2, 9)}`;
   return h("section", { class: "card", "aria-labelledby": id }, h("h2", { id }, title), children);

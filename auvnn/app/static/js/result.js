@@ -2,11 +2,9 @@
 
 import { attempt, get, post } from "./api.js";
 import { againstHorizon, waterfall } from "./charts.js";
-import { card, choice, DOF, h, measured, number, percent, show } from "./dom.js";
+import { card, choice, DOF, h, measured, number, percent, sentence, show } from "./dom.js";
 import { parameters } from "./missing.js";
 import { Group, key } from "./plot.js";
-
-const sentence = (words) => (words ? `${words.charAt(0).toUpperCase()}${words.slice(1)}.` : "");
 
 export class ResultScreen {
   constructor(app) {
@@ -50,6 +48,7 @@ export class ResultScreen {
     return h("section", { class: `verdict ${a.accepted ? "good" : "warn"}`, "aria-label": "Result" },
       h("p", { class: "word" }, a.accepted ? "The held-out error falls" : "The held-out error does not fall by more than its own uncertainty", h("b", {}, `: ${number(first)} → ${number(last)}`), a.accepted && Number.isFinite(first) && first > 0 ? ` (${percent(1 - last / first)} lower)` : ""),
       h("p", {}, `With ${a.effects.join(", ")}; the noise floor is ${number(floor)}. ${sentence(a.more.held_out_words || "")}`),
+      a.more.beaten && h("p", { class: "alike" }, sentence(a.more.beaten.replaceAll("`", ""))),
       h("p", { class: "row" },
         state.can_keep && h("button", { type: "button", class: "primary", id: "keep", onclick: (e) => attempt(async () => { await post("keep"); await this.app.changed(); }, e.target) }, "Keep it in the model"),
         state.answers.improvement.report && h("a", { href: "report/improvement", target: "_blank", rel: "noopener", class: "button" }, "Report")),

@@ -2,7 +2,7 @@
 
 import { attempt, complain, get, post } from "./api.js";
 import { waterfall } from "./charts.js";
-import { card, choice, DOF, duration, h, measured, number, percent, show } from "./dom.js";
+import { card, choice, DOF, duration, h, measured, number, percent, sentence, show } from "./dom.js";
 import { bestFirst, parameters } from "./missing.js";
 import { Group, key } from "./plot.js";
 
@@ -207,6 +207,7 @@ export class TryScreen {
     show(this.fitPlace, card(`Held-out error: ${found.effects.join(", ")}`,
       waterfall(found.waterfall),
       h("p", { class: found.accepted ? "good" : "bad" }, found.accepted ? `Accepted: the error falls by ${measured(gain.value, gain.std, "1")} from the refitted model.` : "Not accepted: the held-out error does not fall by more than its own uncertainty."),
+      found.more && found.more.beaten && h("p", { class: "bad" }, sentence(found.more.beaten.replaceAll("`", ""))),
       Object.entries(found.parameters).map(([name, values]) => h("div", {}, h("h3", {}, name), parameters(values, this.effects && this.effects.find((e) => e.name === name)))),
       found.warnings.length > 0 && h("details", {}, h("summary", {}, `${found.warnings.length} ${found.warnings.length === 1 ? "warning" : "warnings"}`), h("ul", {}, found.warnings.map((w) => h("li", {}, w)))),
       h("p", { class: "row" },
