@@ -173,9 +173,10 @@ def still_beaten(baseline: Any) -> str:
         return ""
     who = " and ".join(f"{k} ({figure(v)})" for k, v in better.items())
     verb = "predict" if len(better) > 1 else "predicts"
+    size = f" ({figure(own)})" if math.isfinite(own) else ", which diverges"
     return (
-        f"{who} still {verb} better than this model ({figure(own)}): more is missing than was added, `auvnn improve` "
-        "looks for all of it"
+        f"{who} still {verb} better than this model{size}: more is missing than was added, `auvnn improve` looks for "
+        "all of it"
     )
 
 

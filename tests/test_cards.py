@@ -10,7 +10,7 @@ import torch
 from matplotlib.figure import Figure
 
 import auvnn
-from auvnn.cards import Card, Text, measured, not_needed
+from auvnn.cards import Card, Text, measured, not_needed, still_beaten
 from auvnn.errors import ConfigError, InputError
 from auvnn.models import as_log, as_model
 
@@ -224,3 +224,37 @@ def test_an_effect_that_does_not_add_is_told_where_all_together_lower_the_error(
         for name, value in bring.items()
     }
     assert not_needed({"value": fall, "std": 0.01}, own) == words
+
+
+@pytest.mark.parametrize(
+    ("own", "regression", "held", "words"),
+    [
+        (0.2, 0.3, 0.9, ""),
+        # About as good: no more than a twentieth above it.
+        (0.2, 0.195, 0.9, ""),
+        (0.2, 0.1, 0.9, "a plain regression (0.1) still predicts better than this model (0.2)"),
+        (
+            7.7,
+            0.93,
+            0.46,
+            "a plain regression (0.93) and holding the initial velocity (0.46) still predict better",
+        ),
+        (0.5, None, 0.4, "holding the initial velocity (0.4) still predicts better"),
+        (0.5, float("nan"), float("nan"), ""),
+        # One that diverges has no finite error.
+        (float("inf"), 0.9, 1.0, "still predict better than this model, which diverges: more"),
+        (float("nan"), 0.9, 1.0, "still predict better than this model, which diverges: more"),
+    ],
+)
+def test_a_model_that_needs_none_still_beats_is_told(own, regression, held, words):
+    line = {"model": {"total": own}, "total": regression, "persistence": {"total": held}}
+    said = still_beaten(line)
+    assert words in said and bool(said) == bool(words)
+    assert not words or "auvnn improve" in said
+
+
+@pytest.mark.parametrize(
+    "line", [None, {}, {"total": 0.1}, {"total": 0.1, "model": None, "persistence": None}]
+)
+def test_nothing_is_told_where_nothing_was_compared(line):
+    assert still_beaten(line) == ""

@@ -186,8 +186,8 @@ def _together(model: GreyBox, names: list[str], dives: list[Dive], failed: list[
     driven = [d["file"] for d in dives if d["commands"] is not None]
     if driven:
         warnings.append(
-            f"in {len(driven)} of {len(dives)} dives (first: {driven[0]}) commands change between samples: they are fitted "
-            "with the mean thrust of each interval"
+            f"in {len(driven)} of {len(dives)} dives (first: {driven[0]}) commands change between samples: they are "
+            "fitted with the mean thrust of each interval"
         )
     if failed:
         warnings.append(f"{len(failed)} dives could not be fitted; the first: {failed[0]['words']}")

@@ -116,6 +116,22 @@ def test_an_effect_that_adds_nothing_is_said_to_be_what_is_not_accepted(unseen, 
     assert words in PageText(drawer("improvement").page(answer)).text
 
 
+def test_a_model_that_a_regression_still_beats_is_told_after_the_verdict(unseen):
+    line = {
+        "total": 0.04,
+        "persistence": {"total": 0.9},
+        "model": {"total": 0.052},
+        "horizon": "5",
+        "loses": {},
+    }
+    told = PageText(drawer("improvement").page(improvement(60, baseline=line))).text
+    assert (
+        ": accepted. A plain regression (0.04) still predicts better than this model (0.052): more is" in told
+    )
+    line["model"] = {"total": 0.03}
+    assert "still predicts" not in PageText(drawer("improvement").page(improvement(60, baseline=line))).text
+
+
 def test_quality_says_what_is_wrong_and_how_to_mend_it(unseen):
     page = PageText(drawer("quality").page(quality(60)))
     assert "p has the opposite sign of the attitude's derivative (scale: -1 in the mapping)" in page.text

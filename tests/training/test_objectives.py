@@ -17,6 +17,7 @@ from auvnn.metrics.free_run import initial_states
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
+from auvnn.models.actuation.command_path import CommandPath, with_commands
 from auvnn.training import train
 from auvnn.training.objectives import OBJECTIVES, differentiable
 from auvnn.training.objectives.base import Refined, build_objective
@@ -24,7 +25,7 @@ from auvnn.training.objectives.differentiable import common_times
 from auvnn.training.objectives.shooting import Shooting
 from auvnn.training.objectives.weights import get_weights, set_weights
 from auvnn.training.objectives.windows import Shots, training_windows
-from tests.small_logs import make_log, small_vehicle
+from tests.small_logs import make_log, small_vehicle, thinned
 
 VEHICLE = small_vehicle()
 BARE = replace(VEHICLE, linear_damping=None, quadratic_damping=None)
@@ -206,3 +207,24 @@ def test_the_default_is_one_step_and_refines_nothing(clean):
     model = learner()
     found = build_objective("one_step").refine(model, clean, clean)
     assert found == Refined(model)
+
+
+def test_commands_that_change_between_samples_are_trained_so_where_the_model_states_it():
+    """A clean log at 5 Hz of commands that change at 25 Hz: with the mean of each interval the true coefficients."""
+    truth = make_log(GreyBox(VEHICLE), runs=3, duration=30.0, rate=25.0, max_step=0.04)
+    log, path = thinned(truth, 5), CommandPath("smooth", 0.4, 0.2)
+    off = []
+    for model in (learner(0.8), with_commands(learner(0.8), path)):
+        found = Shooting(window=2.0, iterations=5, prior=1e3).refine(model, log, log)
+        assert found.model.commands == model.commands
+        off.append(np.abs(get_weights(found.model) / get_weights(learner()) - 1.0).max())
+    assert off[1] < 0.03 < 0.06 < off[0]
+
+
+@pytest.mark.parametrize("objective", ["one_step", {"objective": "rollout", "window": 2.0, "iterations": 1}])
+def test_a_trained_model_states_what_the_given_one_does(noisy, objective):
+    path = CommandPath("linear", 0.5, 0.1)
+    given = with_commands(GreyBox(BARE), path)
+    few = {"scheme": "levenberg_marquardt", "max_iterations": 3, "restarts": 1}
+    assert train(given, noisy, few, POLYNOMIAL, objective=objective).model.commands == path
+    assert train(GreyBox(BARE), noisy, few, POLYNOMIAL, objective=objective).model.commands is None

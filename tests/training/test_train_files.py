@@ -26,6 +26,7 @@ from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.metrics.derivative import choose_derivative
 from auvnn.metrics.one_step import one_step, scores
 from auvnn.models import GreyBox
+from auvnn.models.actuation.command_path import CommandPath, with_commands
 from auvnn.training import train, train_files
 from auvnn.training import train_files as module_function
 from auvnn.training.distributed import grouped_sums as groups
@@ -313,3 +314,10 @@ def test_it_is_a_public_name():
     assert auvnn.train_files is module_function
     assert pieces.SAMPLES < parts.ROWS
     assert DistributedProblem.__dataclass_fields__["size"].default == groups.GROUP
+
+
+def test_a_model_trained_in_parts_states_what_the_given_one_does(bare, dives):
+    path = CommandPath("linear", 0.5, 0.1)
+    few = {**SCHEME, "max_iterations": 2}
+    found = train_files(with_commands(bare, path), dives, few, MIXED, seed=3, group=GROUP)
+    assert found.model.commands == path

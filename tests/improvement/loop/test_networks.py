@@ -13,6 +13,7 @@ from auvnn.improvement.loop import learned, networks
 from auvnn.improvement.loop.improve import Walk
 from auvnn.improvement.loop.state import ALL, banked
 from auvnn.models import GreyBox, load, save
+from auvnn.models.actuation.command_path import CommandPath, with_commands
 from tests.small_logs import make_log, small_vehicle
 
 
@@ -52,6 +53,12 @@ def test_each_fold_is_judged_by_networks_that_have_not_seen_it(walk):
     fold = walk.judge.folds.numbers[1]
     own = banked(walk.model, walk.state.recipe, fold).damping
     assert own is not None and torch.equal(own(nu), banks[fold](nu))
+
+
+def test_a_model_with_subnetworks_states_how_commands_go_as_before(walk):
+    path = CommandPath("linear", 0.5, 0.1)
+    made = networks._with(with_commands(walk.state.model, path), walk.state.recipe.banks[ALL])
+    assert made.commands == path
 
 
 def test_nothing_is_taken_where_drag_is_as_stated(model):
