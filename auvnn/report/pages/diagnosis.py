@@ -167,7 +167,8 @@ class DiagnosisPage(Page):
         ]
         caption = (
             "In the order of the figure. Rank: by evidence, which weighs the fit against the number of parameters. p: "
-            "how likely so large a gain would be if the effect were absent. cv error: on runs that were not fitted."
+            "how likely so large a gain would be if the effect were absent, or, of one that the model has, as stated. cv "
+            "error: on runs that were not fitted."
         )
         tested = view.mapping("residual_tests").get("after")
         return [

@@ -138,7 +138,7 @@ export class MissingScreen {
       h("dl", { class: "evidence" },
         h("dt", {}, "explains"), h("dd", {}, meter(c.explained, `${percent(c.explained)} of the residual above the noise`), percent(c.explained)),
         h("dt", {}, "error on runs left out"), h("dd", {}, fall === null ? "unknown" : fall > 0.0005 ? `${percent(fall)} lower` : fall < -0.0005 ? `${percent(-fall)} higher` : "the same"),
-        h("dt", {}, "if it were absent"), h("dd", {}, chance(c.p_value))),
+        h("dt", {}, c.effect in (this.answer.stated || {}) ? "if it were as stated" : "if it were absent"), h("dd", {}, chance(c.p_value))),
       parameters(c.parameters, effect),
       (c.confusable_with || []).length > 0 && h("p", { class: "alike" }, "Looks alike on this log: ", c.confusable_with.slice(0, 4).map((o) => `${o.effect} (${number(o.similarity, 3)})`).join(", ")),
       h("p", {}, h("button", { type: "button", class: chosen ? "primary small" : "small", onclick: () => this.attempt([c.effect]) }, `Try ${c.effect}`)));
