@@ -12,7 +12,7 @@ from auvnn.answer_types import Candidate, NextExperiment
 from auvnn.diagnosis.advise import advise
 from auvnn.diagnosis.answers.answer import Diagnosis, Names, OneOf
 from auvnn.diagnosis.answers.bounds import reservations
-from auvnn.diagnosis.answers.effect_costs import Worth, names_by_worth, worth
+from auvnn.diagnosis.answers.effect_costs import Worth, costliest_first, names_by_worth, worth
 from auvnn.diagnosis.answers.joint import joint
 from auvnn.diagnosis.answers.moved_coefficients import moved
 from auvnn.diagnosis.answers.table import fill_candidate
@@ -36,13 +36,14 @@ SURE = 0.01
 def answer(asked: Setting, state: State) -> Diagnosis:
     """Return the answer of a search."""
     notes: list[str] = list(state.notes)
-    gone = {e for s in state.steps if s["verdict"] == "withdrawn" for e in s["effects"]}
-    given = [e for s in state.steps for e in s["effects"] if e not in gone]
-    standing = [s for s in state.steps if s["verdict"] != "withdrawn" and not {*s["effects"]} <= gone]
-    leading = standing[0] if standing else state.steps[-1]
-    verdict = leading["verdict"]
     without = _fits_without(asked, state)
     found = _worth(asked, state, without, notes)
+    steps = costliest_first(state.steps, found.names)
+    gone = {e for s in steps if s["verdict"] == "withdrawn" for e in s["effects"]}
+    given = [e for s in steps for e in s["effects"] if e not in gone]
+    standing = [s for s in steps if s["verdict"] != "withdrawn" and not {*s["effects"]} <= gone]
+    leading = standing[0] if standing else steps[-1]
+    verdict = leading["verdict"]
     depends = _depends(asked, state, verdict, notes)
     given = names_by_worth(given, found.names)
     # Of a leading group one member is to be added; what was found after it stands in the steps.
@@ -55,7 +56,7 @@ def answer(asked: Setting, state: State) -> Diagnosis:
         log=asked.log.name,
         verdict=verdict,
         missing=missing,
-        steps=[s.copy() for s in state.steps],
+        steps=[s.copy() for s in steps],
         candidates=_candidates(asked, state, given, without),
         unexplained=_unexplained(state, verdict),
         depends_on=depends.shares,

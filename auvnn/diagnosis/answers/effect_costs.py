@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.answer_types import EffectCost, Worst
+from auvnn.answer_types import EffectCost, SearchStep, Worst
 from auvnn.diagnosis.cross_validation.errors import Gain, LeftOut, gain
 from auvnn.diagnosis.cross_validation.left_out import left_out_found
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
@@ -26,8 +26,10 @@ from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.rollouts import roll, scale_of
 
 Array = NDArray[np.float64]
-# Standard errors of a one-sided limit that holds in 19 of 20 logs.
-ONE_SIDED = 1.645
+# Standard errors of a one-sided limit that holds in 19 of 20 logs; by which one name costs more than another.
+ONE_SIDED, SURELY = 1.645, 2.0
+# Verdicts of steps that give a name.
+NAMING = ("named", "ambiguous")
 
 
 @dataclass(frozen=True)
@@ -198,6 +200,37 @@ def _left(asked: Setting, state: State, actuators: Array, errors: LeftOut | None
     floor = _floor(asked, state, errors) if errors is not None else float("nan")
     out["cost"] = errors.total / floor - 1.0 if errors is not None and floor > 0 else None
     return out
+
+
+def costliest_first(steps: Sequence[SearchStep], costs: Mapping[str, Cost]) -> list[SearchStep]:
+    """Return the steps of a search, a name ahead of those found before it that surely cost less.
+
+    What is found first brings most while the others are missing still: with many samples that may be a small fault of
+    the model that the whole log shows, and what the predictions suffer from comes after it. Names whose costs do not
+    differ by two standard errors stay in the order of the search, and so does every step that gives no name.
+
+    Args:
+        steps: what was found one after the other.
+        costs: of the names of the fit; a group of names has that of the one that stands for it.
+    """
+    gains = [next((costs[n].gain for n in s["effects"] if n in costs), None) for s in steps]
+    named = [k for k, s in enumerate(steps) if s["verdict"] in NAMING and gains[k] is not None]
+    order: list[int] = []
+    for k in named:
+        at = len(order)
+        while at and _surely_costlier(gains[k], gains[order[at - 1]]):
+            at -= 1
+        order.insert(at, k)
+    out = list(steps)
+    for place, k in zip(named, order, strict=True):
+        out[place] = steps[k]
+    return out
+
+
+def _surely_costlier(one: Gain | None, other: Gain | None) -> bool:
+    if one is None or other is None:
+        return False
+    return one.value - other.value > SURELY * float(np.hypot(one.std, other.std))
 
 
 def names_by_worth(names: Sequence[str], costs: Mapping[str, Cost]) -> list[str]:
