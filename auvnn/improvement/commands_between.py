@@ -17,6 +17,7 @@ from auvnn.diagnosis.noise_law.commands.early import clearly_between_samples
 from auvnn.diagnosis.noise_law.commands.holding import HELD, Holding, holding
 from auvnn.diagnosis.noise_law.commands.share import with_share
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
+from auvnn.diagnosis.score_tests.shape_search import searched_start
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.errors import InputError
 from auvnn.improvement.fits import Fits, fitted_by
@@ -70,19 +71,36 @@ def by_their_path(fits: Fits, model: GreyBox, names: Sequence[str], say: Callabl
     return _stated(replace(again, notes=(*fits.notes, *again.notes, path.words())), path)
 
 
-def path_of(model: GreyBox, log: Log) -> CommandPath | None:
-    """Return how commands go by a fit of the uncertain coefficients alone; None where they are held, or nothing tells.
+def path_of(model: GreyBox, log: Log, names: Sequence[str] = ()) -> CommandPath | None:
+    """Return how commands go by a fit of the uncertain coefficients and effects; None where held, or nothing tells.
 
     Args:
         model: as known.
         log: measurements.
+        names: effects that are fitted with them: what is missing hides what commands do.
     """
-    windows, layout = windows_for(model, log), lay_out(model, [])
+    windows, layout = windows_for(model, log), lay_out(model, names)
     try:
-        fit = fit_hypothesis(layout, windows, list(layout.names), ())
+        fit = one_after_another(layout, windows, names)
     except UNSOLVED:
         return None
     return asked(layout, fit, windows).path(interval_of(windows))
+
+
+def one_after_another(layout: Layout, windows: Windows, names: Sequence[str]) -> FittedHypothesis:
+    """Return the fit of what is uncertain with effects, put in one after the other.
+
+    Args:
+        layout: of the model with them.
+        windows: of a log.
+        names: effects, in the order in which they are put in.
+    """
+    base = [n for n in layout.names if n not in names or n in layout.nuisance]
+    found = fit_hypothesis(layout, windows, [n for n in base if n not in names], ())
+    for k in range(1, len(names) + 1):
+        guess = searched_start(layout, windows, found, base, names[k - 1])
+        found = fit_hypothesis(layout, windows, base, names[:k], start=found.fitted, guess=guess)
+    return found
 
 
 def asked(layout: Layout, fit: FittedHypothesis, windows: Windows) -> Holding:

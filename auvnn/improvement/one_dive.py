@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,21 +15,18 @@ from auvnn.diagnosis.hypotheses.candidates import (
     candidates_for,
     windows_for,
 )
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
-from auvnn.diagnosis.hypotheses.stated_priors import Layout, lay_out
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
-from auvnn.diagnosis.score_tests.shape_search import searched_start
 from auvnn.errors import AuvnnError, InputError, one_line
 from auvnn.estimation.window_normal_equations import TRUST, motion
-from auvnn.improvement.commands_between import asked
+from auvnn.improvement.commands_between import asked, one_after_another
 from auvnn.log_chunks.scan import WindowCut
 from auvnn.log_chunks.windows import plan_file, runs_of
 from auvnn.logs import Log
 from auvnn.logs.reading.mapping_file.mapping import Mapping
 from auvnn.logs.reading.portions import is_large, start_of
 from auvnn.metrics.commands.stated import interval_of
-from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
 
 _DAY = 86400.0
@@ -85,13 +81,13 @@ def _fitted(question: Question, path: Path) -> Dive:
         raise InputError(f"{path}: only {len(windows)} windows of free running: the dive is too short")
     known, spread = with_drag_only(model, log)
     layout = lay_out(known, names, spread)
-    found = _with_effects(layout, windows, names)
+    found = one_after_another(layout, windows, names)
     law = asked(layout, found, windows)
     between = law.path(interval_of(windows))
     if between is not None:
         # With commands that are held the values would make up for those that are not.
         windows = law.applied(windows)
-        found = _with_effects(layout, windows, names)
+        found = one_after_another(layout, windows, names)
     start, source = start_of(path, question.mapping), "t"
     if start is None:
         start, source = _named(path), "name"
@@ -114,16 +110,6 @@ def _fitted(question: Question, path: Path) -> Dive:
         "dive": 0,
         "days": None,
     }
-
-
-def _with_effects(layout: Layout, windows: Windows, names: Sequence[str]) -> FittedHypothesis:
-    """Return the fit with all effects, one after the other put in."""
-    base = [n for n in layout.names if n not in names or n in layout.nuisance]
-    found = fit_hypothesis(layout, windows, [n for n in base if n not in names], ())
-    for k in range(1, len(names) + 1):
-        guess = searched_start(layout, windows, found, base, names[k - 1])
-        found = fit_hypothesis(layout, windows, base, names[:k], start=found.fitted, guess=guess)
-    return found
 
 
 def _log(question: Question, path: Path) -> Log:

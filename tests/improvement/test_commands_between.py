@@ -9,6 +9,8 @@ import pytest
 import auvnn
 from auvnn.improvement import commands_between
 from auvnn.improvement.commands_between import path_of
+from auvnn.improvement.loop import causes
+from auvnn.improvement.loop.improve import Walk
 from auvnn.improvement.loop.judge import Judge
 from auvnn.metrics.commands.stated import as_stated
 from auvnn.models import GreyBox
@@ -145,3 +147,49 @@ def test_the_judge_cuts_windows_of_every_length_alike(model, between):
 
 def test_nothing_is_asked_where_commands_were_held(model):
     assert path_of(model.with_effects({NAME: {"force": FORCE}}), logged(model, held=True)) is None
+
+
+def walked(model, log, monkeypatch, answers):
+    """Return a walk through the diagnosis, with answers by the names beside which it is asked how commands go."""
+    asked = []
+
+    def answer(_, __, names=()):
+        asked.append(tuple(names))
+        return answers(tuple(names))
+
+    monkeypatch.setattr(causes, "path_of", answer)
+    walk = Walk(model, log, None, [NAME, "thruster_lag"], 8, 1e4, None, None)
+    walk.commands()
+    walk.refit()
+    walk.diagnose()
+    return walk, asked
+
+
+def test_commands_are_asked_for_again_beside_the_names(model, between, monkeypatch):
+    """A force that is missing hides how commands go; beside its name it shows, and everything is fitted again."""
+    path = path_of(model, between[0], [NAME])
+    assert path.share_of_next == pytest.approx(0.4, abs=0.12)
+    walk, asked = walked(model, between[0], monkeypatch, lambda names: path if NAME in names else None)
+    assert asked[0] == () and NAME in asked[1] and NAME in asked[-1] and len(asked) == 3
+    assert walk.state.model.commands == walk.model.commands == path
+    assert [s.step for s in walk.steps if s.kind == "a cause with a name"] == [NAME]
+    assert all(s.model.commands == path for s in walk.steps)
+    told = [w for w in walk.story if w.startswith(f"Beside {NAME}")]
+    assert len(told) == 1 and path.words() in told[0] and "fitted again" in told[0]
+
+
+def test_what_predicts_worse_with_other_commands_is_taken_back(model, between, monkeypatch):
+    truth = path_of(model, between[0], [NAME])
+    wrong = CommandPath("linear", 1.0, truth.interval)
+    walk, _ = walked(model, between[0], monkeypatch, lambda names: wrong if names else truth)
+    assert walk.state.model.commands == walk.model.commands == truth
+    assert walk.judge.driven.commands == truth and all(s.model.commands == truth for s in walk.steps)
+    assert any("predicts worse" in w for w in walk.story)
+
+
+def test_about_the_same_share_is_no_reason_to_begin_anew(model, between, monkeypatch):
+    path = path_of(model, between[0], [NAME])
+    near = CommandPath(path.between_samples, path.share_of_next + 0.05, path.interval, path.samples)
+    walk, asked = walked(model, between[0], monkeypatch, lambda names: near if names else path)
+    assert walk.model.commands == path and len(asked) == 2
+    assert not any("fitted again" in w for w in walk.story)

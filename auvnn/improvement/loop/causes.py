@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from auvnn.answer_types import SearchStep
+from auvnn.diagnosis.cross_validation.errors import gain
 from auvnn.diagnosis.diagnose import diagnose
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.improvement.commands_between import GONE, gone, path_of
@@ -22,14 +23,18 @@ from auvnn.improvement.loop.state import (
     fitted_one_step,
 )
 from auvnn.improvement.loop.trials import FAILURES, Trials
-from auvnn.models.actuation.command_path import with_commands
+from auvnn.logs import Log
+from auvnn.models.actuation.command_path import CommandPath, with_commands
 
 # A diagnosis sees at most so many seconds of a log.
 DIAGNOSED = 300.0
 # Share of the time after which a diagnosis is broken off: prediction shall have its turn.
 PATIENCE = 0.3
-# Rounds of diagnosis at most.
-ROUNDS = 3
+# Rounds of diagnosis at most; how often it begins anew because commands go otherwise beside the names.
+ROUNDS, CHANGES = 3, 2
+# Shares of the next command that are about the same.
+SHARES = 0.1
+HELD = "commands are held until the next sample, or the log does not tell."
 
 
 class _TooLong(Exception):
@@ -102,17 +107,69 @@ class Causes(Trials):
         self._take(best, REFITTED, REFITTED, "its stated uncertainties")
 
     def diagnose(self) -> None:
-        """Ask which causes are missing, and add those that pay, until none is named or none pays."""
+        """Ask which causes are missing, and add those that pay; and again, where commands go otherwise beside them."""
         part = liveliest(self.log, DIAGNOSED)
         if part is not self.log:
             self.told(
                 f"Diagnose: on the liveliest {part.duration:.0f} s of the log's {self.log.duration:.0f} s."
             )
+        self._rounds(part, self.began)
+        for _ in range(CHANGES):
+            # Names that predict a part, or come nearest, hide as much of the commands as those that are causes.
+            names = self.state.recipe.effects or tuple(
+                self.diagnoses[-1]["nearest"] if self.diagnoses else ()
+            )
+            if not names or self.late():
+                return
+            path, same = self._beside(names, part)
+            if same:
+                return
+            kept = self.model, self.judge, self.state, self.steps, self.ground, self.adequate
+            self._begin_anew(path, names)
+            self.refit()
+            self._rounds(part, time.monotonic())
+            won = gain(kept[2].left, self.state.left)
+            if not won.value > -won.std:
+                self.model, self.judge, self.state, self.steps, self.ground, self.adequate = kept
+                self.told("With that it predicts worse: commands are taken as before.")
+                return
+
+    def _beside(self, names: Sequence[str], part: Log) -> tuple[CommandPath | None, bool]:
+        """Return how commands go by a fit with names, and whether they are taken so: what is missing hides it."""
+        before = self.model.commands
+        self.say("asking how commands go between samples, beside the names")
+        try:
+            path = path_of(self.model, part, names)
+        except FAILURES as problem:
+            self._failed("asking how commands go between samples, beside the names", problem)
+            return before, True
+        if path is None or before is None:
+            return path, path is before
+        alike = (path.between_samples, path.samples) == (before.between_samples, before.samples)
+        return path, alike and abs(path.share_of_next - before.share_of_next) < SHARES
+
+    def _begin_anew(self, path: CommandPath | None, names: Sequence[str]) -> None:
+        """Go back to the model as given, with another statement of how commands go, that was found beside names."""
+        self.told(
+            f"Beside {', '.join(names)}: {HELD if path is None else path.words()} Everything is fitted again."
+        )
+        self.model = with_commands(self.model, path)
+        self.judge = Judge.of(self.log, self.model.actuation, self.model)
+        self.state, self.steps = as_given(self.model, self.judge), []
+        self.ground, self.adequate = None, False
+
+    def _rounds(self, part: Log, began: float) -> None:
+        """Ask for causes, add those that pay, and ask again, until none is named or none pays.
+
+        Args:
+            part: of the log, that is diagnosed.
+            began: when the time for it began.
+        """
         for number in range(ROUNDS):
             if self.late() or self._full():
                 return
             self.say(f"diagnosing what is missing ({number + 1})")
-            patience = max(self.limit * PATIENCE - (time.monotonic() - self.began), 0.0)
+            patience = max(self.limit * PATIENCE - (time.monotonic() - began), 0.0)
             # What this loop has put in was fitted to this log.
             usable = candidates_for(self.model, self.log, self.effects, stated=True)[0]
             asked = [n for n in usable if n not in self.state.recipe.effects]
