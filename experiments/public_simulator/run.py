@@ -1,6 +1,9 @@
 """Changes hidden in a public simulator's REMUS 100: is each one named, by a model of that vehicle fitted to clean logs?
 
-python experiments/public_simulator/run.py CHECKOUT OUT [NAME ...]
+python experiments/public_simulator/run.py CHECKOUT OUT [seed=50] [NAME ...]
+
+Of the K-th change the log has the seed K more than that which is given: another one is another log, with other headings,
+depths, revolutions and noise.
 """
 
 from __future__ import annotations
@@ -18,6 +21,8 @@ from remus import Plant, description, disagreement, simulator
 
 import auvnn
 
+# Of the log with nothing hidden; the next change's is one more.
+SEED = 50
 # Fitted to the clean log: what the class has no number for in the package's terms.
 FITTED = ("linear_damping", "quadratic_damping", "coupled_damping")
 
@@ -108,7 +113,7 @@ def fitted(module: Any, out: Path) -> Path:
     return folder
 
 
-def main(checkout: str, out: Path, wanted: list[str]) -> None:
+def main(checkout: str, out: Path, wanted: list[str], seed: int = SEED) -> None:
     """Hide each change in turn and print what is said of it."""
     unknown = sorted({*wanted} - {*CHANGES})
     if unknown:
@@ -119,7 +124,7 @@ def main(checkout: str, out: Path, wanted: list[str]) -> None:
     for k, (name, plant) in enumerate(CHANGES.items()):
         if wanted and name not in wanted:
             continue
-        log = Plant(module, **plant).write(out / f"{name}.parquet", 50 + k)
+        log = Plant(module, **plant).write(out / f"{name}.parquet", seed + k)
         began = time.monotonic()
         found = auvnn.diagnose(str(model), log)
         groups = [s["effects"] for s in found.steps if s["effects"]]
@@ -141,4 +146,5 @@ def main(checkout: str, out: Path, wanted: list[str]) -> None:
 if __name__ == "__main__":
     if len(sys.argv) < 3:
         raise SystemExit(__doc__)
-    main(sys.argv[1], Path(sys.argv[2]), sys.argv[3:])
+    seeds = [int(w.removeprefix("seed=")) for w in sys.argv[3:] if w.startswith("seed=")]
+    main(sys.argv[1], Path(sys.argv[2]), [w for w in sys.argv[3:] if "=" not in w], *(seeds[-1:] or [SEED]))

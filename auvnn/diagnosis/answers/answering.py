@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,10 +12,11 @@ from auvnn.answer_types import Candidate, NextExperiment
 from auvnn.diagnosis.advise import advise
 from auvnn.diagnosis.answers.answer import Diagnosis, Names, OneOf
 from auvnn.diagnosis.answers.bounds import reservations
-from auvnn.diagnosis.answers.effect_costs import Worth, costliest_first, names_by_worth, worth
+from auvnn.diagnosis.answers.effect_costs import Worth, worth
 from auvnn.diagnosis.answers.joint import joint
 from auvnn.diagnosis.answers.moved_coefficients import moved
 from auvnn.diagnosis.answers.table import fill_candidate
+from auvnn.diagnosis.answers.told_names import costliest_first, known_to_pay, names_by_worth
 from auvnn.diagnosis.hypotheses.candidates import HORIZON, WARMUP
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.measured_start import GROSS, noise_share
@@ -38,7 +39,7 @@ def answer(asked: Setting, state: State) -> Diagnosis:
     notes: list[str] = list(state.notes)
     without = _fits_without(asked, state)
     found = _worth(asked, state, without, notes)
-    steps = costliest_first(state.steps, found.names)
+    steps, unsure = known_to_pay(costliest_first(state.steps, found.names), found.names, asked.tolerance)
     gone = {e for s in steps if s["verdict"] == "withdrawn" for e in s["effects"]}
     given = [e for s in steps for e in s["effects"] if e not in gone]
     standing = [s for s in steps if s["verdict"] != "withdrawn" and not {*s["effects"]} <= gone]
@@ -62,7 +63,7 @@ def answer(asked: Setting, state: State) -> Diagnosis:
         depends_on=depends.shares,
         inseparable=depends.inseparable,
         next_experiment=_next(asked, state, notes),
-        warnings=[*_warnings(asked, state), *notes, *asked.notes],
+        warnings=[*_warnings(asked, state, unsure), *notes, *asked.notes],
         absorbed=asked.absorbed,
         derivative={
             "method": f"none: free-running windows of {_length(state):g} s with estimated initial states",
@@ -193,7 +194,7 @@ def _length(state: State) -> float:
     return round(float((times[:, -1] - times[:, 0]).max()), 3)
 
 
-def _warnings(asked: Setting, state: State) -> list[str]:
+def _warnings(asked: Setting, state: State, unsure: Sequence[str]) -> list[str]:
     log, found = asked.log, [*asked.model.vehicle.warnings, *asked.log.quality().reservations]
     if len(log.runs) < 2:
         found.append("the log holds one run: what is left out in turn are stretches of it")
@@ -217,6 +218,11 @@ def _warnings(asked: Setting, state: State) -> list[str]:
         found.append(
             f"not named, but likely beside what is named: {', '.join(beside)} (too little effect in free running, or "
             "more names than max_effects); the standard errors allow for this"
+        )
+    if unsure:
+        found.append(
+            f"not named: {', '.join(unsure)} (the log is likelier with it, but it is not known to improve predictions of "
+            "runs left out, beside what is named)"
         )
     found += [f"{name} was no candidate any more: {why}" for name, why in state.failed.items()]
     return found

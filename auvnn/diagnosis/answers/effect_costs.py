@@ -7,14 +7,15 @@ all runs: exact where the errors are linear in the parameters over a fold's shar
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from auvnn.answer_types import EffectCost, SearchStep, Worst
+from auvnn.answer_types import EffectCost, Worst
+from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.cross_validation.errors import Gain, LeftOut, gain
 from auvnn.diagnosis.cross_validation.left_out import left_out_found
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
@@ -26,10 +27,8 @@ from auvnn.metrics.noise_floor import noise_floor
 from auvnn.metrics.rollouts import roll, scale_of
 
 Array = NDArray[np.float64]
-# Standard errors of a one-sided limit that holds in 19 of 20 logs; by which one name costs more than another.
-ONE_SIDED, SURELY = 1.645, 2.0
-# Verdicts of steps that give a name.
-NAMING = ("named", "ambiguous")
+# Standard errors of a one-sided limit that holds in 19 of 20 logs.
+ONE_SIDED = 1.645
 
 
 @dataclass(frozen=True)
@@ -156,8 +155,18 @@ def _matters(asked: Setting, fall: Gain | None, share: Array) -> bool:
     force = largest(share)
     if force is not None and force >= tolerance.force:
         return True
+    return bool(not fall.cost < tolerance.cost or costs_in_one(fall, tolerance))
+
+
+def costs_in_one(fall: Gain, tolerance: Tolerance) -> bool:
+    """Whether a name surely costs more than is tolerated in one velocity.
+
+    Args:
+        fall: of the error that it brings.
+        tolerance: what does not matter.
+    """
     sure = [n for n, (value, std) in fall.by_dof.items() if value > ONE_SIDED * std]
-    return bool(not fall.cost < tolerance.cost or any(_dof_cost(fall, n) >= tolerance.cost for n in sure))
+    return any(_dof_cost(fall, n) >= tolerance.cost for n in sure)
 
 
 def _errors(asked: Setting, state: State, found: FittedHypothesis) -> LeftOut | None:
@@ -200,39 +209,3 @@ def _left(asked: Setting, state: State, actuators: Array, errors: LeftOut | None
     floor = _floor(asked, state, errors) if errors is not None else float("nan")
     out["cost"] = errors.total / floor - 1.0 if errors is not None and floor > 0 else None
     return out
-
-
-def costliest_first(steps: Sequence[SearchStep], costs: Mapping[str, Cost]) -> list[SearchStep]:
-    """Return the steps of a search, a name ahead of those found before it that surely cost less.
-
-    What is found first brings most while the others are missing still: with many samples that may be a small fault of
-    the model that the whole log shows, and what the predictions suffer from comes after it. Names whose costs do not
-    differ by two standard errors stay in the order of the search, and so does every step that gives no name.
-
-    Args:
-        steps: what was found one after the other.
-        costs: of the names of the fit; a group of names has that of the one that stands for it.
-    """
-    gains = [next((costs[n].gain for n in s["effects"] if n in costs), None) for s in steps]
-    named = [k for k, s in enumerate(steps) if s["verdict"] in NAMING and gains[k] is not None]
-    order: list[int] = []
-    for k in named:
-        at = len(order)
-        while at and _surely_costlier(gains[k], gains[order[at - 1]]):
-            at -= 1
-        order.insert(at, k)
-    out = list(steps)
-    for place, k in zip(named, order, strict=True):
-        out[place] = steps[k]
-    return out
-
-
-def _surely_costlier(one: Gain | None, other: Gain | None) -> bool:
-    if one is None or other is None:
-        return False
-    return one.value - other.value > SURELY * float(np.hypot(one.std, other.std))
-
-
-def names_by_worth(names: Sequence[str], costs: Mapping[str, Cost]) -> list[str]:
-    """Return names in their order, those that matter first."""
-    return sorted(names, key=lambda n: n in costs and not costs[n].matters)

@@ -1,0 +1,159 @@
+"""Names in the order of what they cost the predictions, and without those that are not known to improve them."""
+
+from __future__ import annotations
+
+import importlib
+
+import numpy as np
+import pytest
+
+from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.answers.effect_costs import Cost
+from auvnn.diagnosis.answers.told_names import costliest_first, known_to_pay
+from auvnn.diagnosis.answers.tolerance import Tolerance
+from auvnn.diagnosis.cross_validation.errors import Gain
+from auvnn.models import GreyBox
+from tests.small_logs import make_log, small_vehicle
+
+diagnosing = importlib.import_module("auvnn.diagnosis.diagnose")
+NAMES = ["net_buoyancy", "constant_force"]
+
+
+@pytest.fixture(scope="module")
+def model():
+    return GreyBox(small_vehicle())
+
+
+def found_in(model, truth, **options):
+    log = make_log(model.with_effects(truth), runs=4, duration=12.0, noise=1.0, seed=4)
+    return diagnose(model, log, NAMES, advice=False, whiteness=False, **options)
+
+
+def step(verdict, *effects):
+    return {"verdict": verdict, "effects": list(effects), "p_value": 0.0}
+
+
+def costing(**gains):
+    """Return costs with falls of the error {name: (value, std)}."""
+    return {
+        n: Cost(None if g is None else Gain(*g, {}, 0.3, 0.2), np.zeros(6), np.zeros(6), True)
+        for n, g in gains.items()
+    }
+
+
+def names_of(steps):
+    return [s["effects"][0] if s["effects"] else s["verdict"] for s in steps]
+
+
+def test_a_name_that_surely_costs_more_goes_ahead():
+    steps = [step("named", "a"), step("ambiguous", "b", "c"), step("adequate")]
+    costs = costing(a=(0.0023, 0.0030), b=(0.0407, 0.0079))
+    found = costliest_first(steps, costs)
+    assert names_of(found) == ["b", "a", "adequate"] and found[0]["effects"] == ["b", "c"]
+    # Two standard errors of the difference decide.
+    near = costing(a=(0.10, 0.03), b=(0.19, 0.04))
+    assert names_of(costliest_first(steps, near)) == ["a", "b", "adequate"]
+    far = costing(a=(0.10, 0.03), b=(0.21, 0.04))
+    assert names_of(costliest_first(steps, far)) == ["b", "a", "adequate"]
+
+
+def test_every_name_goes_ahead_of_those_that_surely_cost_less_and_of_no_other():
+    steps = [step("named", n) for n in "abc"]
+    assert names_of(costliest_first(steps, costing(a=(0.1, 0.01), b=(0.2, 0.01), c=(0.3, 0.01)))) == [
+        "c",
+        "b",
+        "a",
+    ]
+    # c costs more than a, but stands behind b, from which it does not differ surely.
+    among = costing(a=(0.1, 0.01), b=(0.2, 0.2), c=(0.3, 0.01))
+    assert names_of(costliest_first(steps, among)) == ["a", "b", "c"]
+
+
+def test_steps_without_a_name_or_with_one_whose_cost_is_unknown_stay_where_they_are():
+    steps = [
+        step("named", "a"),
+        step("named", "b"),
+        step("withdrawn", "a"),
+        step("named", "c"),
+        step("unknown"),
+    ]
+    found = costliest_first(steps, costing(b=(0.1, 0.01), c=(0.3, 0.01)))
+    assert names_of(found) == ["a", "c", "a", "b", "unknown"]
+    lost = costing(b=(0.1, 0.01), c=(np.inf, np.inf))
+    assert costliest_first(steps, lost) == steps
+    assert costliest_first(steps, costing(b=None, c=(0.3, 0.01))) == steps
+    assert costliest_first(steps, {}) == steps
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_what_costs_most_is_said_first_whatever_was_found_first(model, monkeypatch, turned):
+    def found_in_another_order(asked, state):
+        named = [s for s in state.steps if s["verdict"] == "named"]
+        assert len(named) == 2
+        rest = [s for s in state.steps if s["verdict"] != "named"]
+        return state.but(steps=(*(named[::-1] if turned else named), *rest))
+
+    monkeypatch.setattr(diagnosing, "settled", found_in_another_order)
+    found = found_in(model, {"net_buoyancy": {"force": 8.0}, "constant_force": {"X": 5.0}})
+    costs = {n: found.matters[n]["gain"]["value"] for n in found.missing}
+    assert list(found.missing) == sorted(costs, key=lambda n: -costs[n]) and found.verdict == "named"
+    assert [s["effects"] for s in found.steps if s["effects"]] == [[n] for n in found.missing]
+    assert [c["effect"] for c in found.candidates[:2]] == list(found.missing)
+    assert found.missing[0] in found.story[0] and found.missing[1] in found.story[1]
+
+
+def falling(value, std, **by_dof):
+    """Return a cost by its fall in total, (value, std), and by velocity; the error after is 0.2 in each."""
+    gain = Gain(value, std, by_dof, 0.3, 0.2, dict.fromkeys(by_dof, 0.2))
+    return Cost(gain, np.zeros(6), np.zeros(6), True)
+
+
+USUAL = Tolerance.of(None)
+
+
+@pytest.mark.parametrize(
+    ("second", "told"),
+    [
+        (falling(0.02, 0.01), True),
+        (falling(0.002, 0.003), False),
+        (falling(-0.1, 0.01), False),
+        # Surely, and by more than the tolerance, in one velocity.
+        (falling(0.002, 0.003, u=(0.06, 0.02), v=(-0.05, 0.1)), True),
+        (falling(0.002, 0.003, u=(0.06, 0.05)), False),
+        (falling(0.002, 0.003, u=(0.0001, 0.00001)), False),
+        (falling(np.inf, np.inf), True),
+        (Cost(None, np.zeros(6), np.zeros(6), True), True),
+    ],
+)
+def test_a_further_name_is_told_where_it_is_known_to_improve_predictions(second, told):
+    steps = [step("named", "cg_offset"), step("ambiguous", "tether", "payload"), step("adequate")]
+    costs = {"cg_offset": falling(0.001, 0.01), "tether": second}
+    kept, gone = known_to_pay(steps, costs, USUAL)
+    assert kept == (steps if told else [steps[0], steps[2]])
+    assert gone == ([] if told else ["tether", "payload"])
+    # A single name stays, whatever it costs, and with a tolerance of zero each does.
+    assert known_to_pay(steps, costs, Tolerance.of(0.0)) == (steps, [])
+    alone = [steps[1], steps[2]]
+    assert known_to_pay(alone, costs, USUAL) == (alone, [])
+
+
+def test_what_a_name_needs_beside_it_stays():
+    steps = [step("named", "drag_only_current"), step("named", "ocean_current"), step("named", "tether")]
+    costs = {
+        "drag_only_current": falling(0.1, 0.01),
+        "ocean_current": falling(0.0, 0.1),
+        "tether": falling(0.0, 0.1),
+    }
+    assert known_to_pay(steps, costs, USUAL) == (steps[:2], ["tether"])
+
+
+def test_the_answer_says_which_name_was_left_out(model, monkeypatch):
+    """Of two forces one is said to cost nothing: it is no name then, and the warnings have it."""
+    told = importlib.import_module("auvnn.diagnosis.answers.told_names")
+    monkeypatch.setattr(told, "_pays", lambda fall, tolerance: False)
+    found = found_in(model, {"net_buoyancy": {"force": 8.0}, "constant_force": {"X": 5.0}})
+    (name,) = found.missing
+    (other,) = {*NAMES} - {name}
+    assert [s["effects"] for s in found.steps if s["effects"]] == [[name]] and {*found.matters} == {name}
+    assert any(w.startswith(f"not named: {other}") for w in found.warnings)
+    assert not any(line.startswith(f"Missing: {other}") for line in found.story)
