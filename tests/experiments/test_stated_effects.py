@@ -102,9 +102,20 @@ def test_days_are_counted_by_world_and_in_all(second_day):
 
 def test_the_readme_says_what_the_second_days_say(second_day):
     text = (HERE / "README.md").read_text()
-    for name in ("days.jsonl", "days-before.jsonl"):
+    for name in ("days.jsonl", "days-before.jsonl", "improved.jsonl"):
         rows = [json.loads(x) for x in (HERE / name).read_text().splitlines()]
         assert len({r["seed"] for r in rows}) == len(rows) > 0
         whole = second_day.counts(rows)[-1]
         found = re.search(r"accepted (\d+) of (\d+), better than the regression (\d+)", whole)
         assert found is not None and found[0] in text
+
+
+def test_the_readme_says_what_the_whole_loop_says(second_day):
+    rows = [json.loads(x) for x in (HERE / "improved.jsonl").read_text().splitlines()]
+    text = (HERE / "README.md").read_text()
+    assert all(line in text for line in second_day.counts(rows))
+    assert {r["seed"] for r in rows} == {
+        json.loads(x)["seed"] for x in (HERE / "days.jsonl").read_text().splitlines()
+    }
+    found = sum(r["effect"] in r["steps"] for r in rows)
+    assert f"is among the steps in {found} of {len(rows)}" in text
