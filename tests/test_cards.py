@@ -87,6 +87,10 @@ def test_answers_of_the_fits_say_themselves(model, made):
         by_effect={k: {"accepted": False, **v} for k, v in own.items()},
     )
     assert "b adds nothing to what the others bring: leave it out" in idle._repr_html_()
+    line = {**better.baseline, "total": 0.5 * better.baseline["model"]["total"]}
+    beaten = replace(better, baseline=line)
+    assert "a plain regression" in beaten._repr_html_() and "still predict" in beaten._repr_html_()
+    assert "still predict" not in better._repr_html_()
     # What was fitted says how sure it is, also of the model that is handed on.
     assert "±" in better.model._repr_html_()
 

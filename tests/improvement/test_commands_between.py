@@ -193,3 +193,13 @@ def test_about_the_same_share_is_no_reason_to_begin_anew(model, between, monkeyp
     walk, asked = walked(model, between[0], monkeypatch, lambda names: near if names else path)
     assert walk.model.commands == path and len(asked) == 2
     assert not any("fitted again" in w for w in walk.story)
+
+
+def test_commands_are_asked_for_beside_what_comes_nearest_where_there_is_no_name(model, between, monkeypatch):
+    class Unknown:
+        verdict, missing, nearest, story, steps = "unknown", [], [NAME], ["Nothing."], []
+
+    path = path_of(model, between[0], [NAME])
+    monkeypatch.setattr(causes, "diagnose", lambda *_, **__: Unknown)
+    walk, asked = walked(model, between[0], monkeypatch, lambda names: path if names else None)
+    assert walk.model.commands == path and asked[1] == (NAME,)

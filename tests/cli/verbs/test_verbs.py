@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -193,6 +194,24 @@ def test_add_says_which_effect_adds_nothing(auvnn, made, monkeypatch, tmp_path):
     assert "not accepted: gyro_bias" in verdict and "leave it out" in verdict
     assert "does not fall enough" not in verdict
     assert "gyro_bias is not known to improve the prediction" in out
+
+
+def test_add_says_in_the_verdict_that_a_regression_still_predicts_better(auvnn, made, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    adding = importlib.import_module("auvnn.improvement.add")
+    compared = adding.compare_with_baseline
+
+    def halved(*arguments, **options):
+        line = compared(*arguments, **options)
+        return {**line, "total": 0.5 * line["model"]["total"]}
+
+    words = ["model=rov95", f"log={made / 'log.parquet'}", "effect=ocean_current"]
+    status, plain, _ = auvnn("add", *words, "out=plain")
+    assert status == 0 and "still predict" not in plain
+    monkeypatch.setattr(adding, "compare_with_baseline", halved)
+    status, out, _ = auvnn("add", *words, "out=beaten")
+    (verdict,) = (line for line in out.splitlines() if line.startswith("result "))
+    assert status == 0 and "accepted, but mind: a plain regression" in verdict and "auvnn improve" in verdict
 
 
 def test_train(report, made):
