@@ -66,7 +66,9 @@ class WindowFilter:
             # Of the sums the best initial states were taken out: here they are variables as the force is.
             self.free = 12
             root = np.linalg.solve(states.square + np.diag(LOOSE**-2.0), states.across)
-            whole = states.across.transpose(0, 2, 1) @ root
+            # A step that led far away has sums that overflow: no likelihood follows from them, and it is not taken.
+            with np.errstate(over="ignore", invalid="ignore"):
+                whole = states.across.transpose(0, 2, 1) @ root
             plain = plain + whole[:, : 1 + n, : 1 + n]
             force = force + whole[:, 1 + n :, 1 + n :]
             own = own + whole[:, 1 + n :, : 1 + n]
