@@ -190,3 +190,36 @@ def test_the_names_are_those_of_the_catalogue_and_the_readme_tells_what_came_out
     assert all(f"`{r['groups'][0][0]}` (" in text for r in wrong)
     assert all(r["first"] == (r["hidden"] in (r["groups"] or [[]])[0]) for r in expected.values())
     assert f"| {round(float(np.median([r['seconds'] for r in expected.values()])))} s |" in text
+
+
+def test_the_readme_tells_what_came_out_of_other_logs(study):
+    rows = json.loads((HERE / "expected-150.json").read_text())
+    text = (HERE / "README.md").read_text().partition("## Other logs")[2].partition("\n## ")[0]
+    told = {n: (said, s) for n, said, s in re.findall(r"^\| `?(\w+)`? \| ([^|]*?) \| (\d+) \|$", text, re.M)}
+    assert set(told) == {r["hidden"] for r in rows} <= set(study[1].CHANGES)
+    for row in rows:
+        said = ", then ".join(" or ".join(f"`{e}`" for e in group) for group in row["groups"])
+        assert told[row["hidden"]] == (told[row["hidden"]][0], f"{row['seconds']:.0f}")
+        assert told[row["hidden"]][0].replace("**", "") == (said or row["verdict"])
+    hidden = [r for r in rows if r["hidden"] != "nothing"]
+    wrong = [r for r in rows if r["groups"] and r["hidden"] not in r["groups"][0]]
+    assert f"{sum(r['first'] for r in hidden)} of {len(hidden)} are named first and none has a wrong" in text
+    assert not wrong
+
+
+def test_another_seed_is_another_log(study, tmp_path, monkeypatch):
+    """Of a change the same headings and noise come with the same seed, others with another one."""
+    run = study[1]
+    seeds = []
+
+    def refuse(self, path, seed):
+        seeds.append(seed)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run, "simulator", lambda folder: None)
+    monkeypatch.setattr(run, "fitted", lambda module, out: out)
+    monkeypatch.setattr(run, "Plant", type("Plant", (), {"__init__": lambda *_, **__: None, "write": refuse}))
+    for more in ((), (150,)):
+        with pytest.raises(KeyboardInterrupt):
+            run.main("", tmp_path / "out", ["ocean_current"], *more)
+    assert seeds == [51, 151]
