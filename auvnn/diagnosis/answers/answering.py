@@ -194,7 +194,7 @@ def _length(state: State) -> float:
     return round(float((times[:, -1] - times[:, 0]).max()), 3)
 
 
-def _warnings(asked: Setting, state: State, unsure: Sequence[str]) -> list[str]:
+def _warnings(asked: Setting, state: State, unsure: Sequence[str] = ()) -> list[str]:
     log, found = asked.log, [*asked.model.vehicle.warnings, *asked.log.quality().reservations]
     if len(log.runs) < 2:
         found.append("the log holds one run: what is left out in turn are stretches of it")
