@@ -81,6 +81,17 @@ def answered(case: Case, model: Any, hidden: dict[str, dict[str, float]]) -> dic
     }
 
 
+def of(case: Case) -> dict[str, Any]:
+    """Return what a row says of its case."""
+    return {
+        "world": case.world,
+        "vehicle": case.vehicle,
+        "effect": case.hidden,
+        "size": case.size,
+        "seed": case.seed,
+    }
+
+
 def one(case: Case) -> dict[str, Any]:
     """Return the row of a case."""
     plain = auvnn.load(case.vehicle)
@@ -88,13 +99,7 @@ def one(case: Case) -> dict[str, Any]:
     described = EFFECTS.get(case.hidden).describe(plain.vehicle, plain.actuation)
     first = {p.name: hidden[case.hidden].get(p.name, p.null) for p in described}
     after = {p.name: p.null + LEFT * (first[p.name] - p.null) for p in described}
-    row = {
-        "world": case.world,
-        "vehicle": case.vehicle,
-        "effect": case.hidden,
-        "size": case.size,
-        "seed": case.seed,
-    }
+    row: dict[str, Any] = of(case)
     better = auvnn.add(plain, day(case, hidden, 1)[0], case.hidden, horizons=("5",))
     row |= {"accepted": better.accepted, "before": first, "after": after}
     row["changed"] = answered(case, better.model, {case.hidden: after})

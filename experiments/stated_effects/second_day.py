@@ -36,11 +36,7 @@ def one(case: Case) -> dict[str, Any]:
     told = better.to_dict()
     errors = {w["step"]: w["error"] for w in told["waterfall"]}
     return {
-        "world": case.world,
-        "vehicle": case.vehicle,
-        "effect": case.hidden,
-        "size": case.size,
-        "seed": case.seed,
+        **days.of(case),
         "accepted": told["accepted"],
         "as given": errors["as given"],
         "with it": errors[case.hidden],
@@ -60,11 +56,7 @@ def whole(case: Case) -> dict[str, Any]:
     told = auvnn.improve(plain, first, test=second).to_dict()
     *steps, floor = told["waterfall"]
     return {
-        "world": case.world,
-        "vehicle": case.vehicle,
-        "effect": case.hidden,
-        "size": case.size,
-        "seed": case.seed,
+        **days.of(case),
         "accepted": len(steps) > 1,
         "as given": steps[0]["error"],
         "with it": steps[-1]["error"],
