@@ -175,8 +175,8 @@ def still_beaten(baseline: Any) -> str:
     verb = "predict" if len(better) > 1 else "predicts"
     size = f" ({figure(own)})" if math.isfinite(own) else ", which diverges"
     return (
-        f"{who} still {verb} better than this model{size}: more is missing than was added, `auvnn improve` looks for "
-        "all of it"
+        f"{who} still {verb} better than this model{size}: more is missing than was added; `auvnn improve`, or `auvnn "
+        "diagnose` of this model, looks for it"
     )
 
 

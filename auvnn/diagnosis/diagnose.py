@@ -86,7 +86,8 @@ def diagnose(
         tolerance: what does not matter: a number for the cost in free running, with a fifth of it for the force as a
             share of the actuators', or a mapping with `cost` and `force`; by default 0.1 and 0.02. At 0 everything
             matters that is there.
-        costs: also work out what each name costs in free running, which takes about as long as naming it.
+        costs: also work out what each name costs in free running, which takes about as long as naming it. Several names
+            are told in the order that follows, and not those that are not known to improve predictions beside the first.
         workers: how many fit effects side by side; the answer is the same. Worth it where a diagnosis takes minutes.
         executor: who fits: `serial`, `processes`, `ray` or `dask`; by default processes where there are several workers.
         address: of a Ray or Dask cluster that is running.

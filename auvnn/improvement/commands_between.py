@@ -78,13 +78,12 @@ def path_of(model: GreyBox, log: Log, names: Sequence[str] = ()) -> CommandPath 
         model: as known.
         log: measurements.
         names: effects that are fitted with them: what is missing hides what commands do.
+
+    Raises:
+        FitError: the fit does not settle on anything finite.
     """
     windows, layout = windows_for(model, log), lay_out(model, names)
-    try:
-        fit = one_after_another(layout, windows, names)
-    except UNSOLVED:
-        return None
-    return asked(layout, fit, windows).path(interval_of(windows))
+    return asked(layout, one_after_another(layout, windows, names), windows).path(interval_of(windows))
 
 
 def one_after_another(layout: Layout, windows: Windows, names: Sequence[str]) -> FittedHypothesis:

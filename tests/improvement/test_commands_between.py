@@ -7,6 +7,7 @@ import json
 import pytest
 
 import auvnn
+from auvnn.estimation.prediction_error import FitError
 from auvnn.improvement import commands_between
 from auvnn.improvement.commands_between import path_of
 from auvnn.improvement.loop import causes
@@ -160,6 +161,7 @@ def walked(model, log, monkeypatch, answers):
     monkeypatch.setattr(causes, "path_of", answer)
     walk = Walk(model, log, None, [NAME, "thruster_lag"], 8, 1e4, None, None)
     walk.commands()
+    walk.compare()
     walk.refit()
     walk.diagnose()
     return walk, asked
@@ -174,6 +176,8 @@ def test_commands_are_asked_for_again_beside_the_names(model, between, monkeypat
     assert walk.state.model.commands == walk.model.commands == path
     assert [s.step for s in walk.steps if s.kind == "a cause with a name"] == [NAME]
     assert all(s.model.commands == path for s in walk.steps)
+    # What had been taken before is told as tried: with commands that are held.
+    assert any(s.reason == causes.OTHERWISE and not s.accepted for s in walk.tried)
     told = [w for w in walk.story if w.startswith(f"Beside {NAME}")]
     assert len(told) == 1 and path.words() in told[0] and "fitted again" in told[0]
 
@@ -185,6 +189,7 @@ def test_what_predicts_worse_with_other_commands_is_taken_back(model, between, m
     assert walk.state.model.commands == walk.model.commands == truth
     assert walk.judge.driven.commands == truth and all(s.model.commands == truth for s in walk.steps)
     assert any("predicts worse" in w for w in walk.story)
+    assert any(s.reason == causes.OTHERWISE for s in walk.tried) and len(walk.diagnoses) < 3
 
 
 def test_about_the_same_share_is_no_reason_to_begin_anew(model, between, monkeypatch):
@@ -203,3 +208,23 @@ def test_commands_are_asked_for_beside_what_comes_nearest_where_there_is_no_name
     monkeypatch.setattr(causes, "diagnose", lambda *_, **__: Unknown)
     walk, asked = walked(model, between[0], monkeypatch, lambda names: path if names else None)
     assert walk.model.commands == path and asked[1] == (NAME,)
+
+
+def test_a_statement_for_another_rate_is_not_taken_for_that_of_this_log(model, between, monkeypatch):
+    """Held beside the names as before: nothing is fitted again, and the statement stays for its own rate."""
+    stated = CommandPath("linear", 0.5, 1.0)
+    walk, asked = walked(with_commands(model, stated), between[0], monkeypatch, lambda names: None)
+    assert len(asked) == 2 and walk.model.commands == stated
+    assert not any("fitted again" in w for w in walk.story)
+
+
+def test_a_fit_that_fails_is_no_answer_to_how_commands_go(model, between, monkeypatch):
+    path = path_of(model, between[0], [NAME])
+
+    def answers(names):
+        if names:
+            raise FitError("lost")
+        return path
+
+    walk, _ = walked(model, between[0], monkeypatch, answers)
+    assert walk.model.commands == path and any("lost" in w for w in walk.warnings)

@@ -45,6 +45,7 @@ class Diagnosis(Answer):
     Attributes:
         verdict: named, ambiguous, partial, unknown or adequate.
         missing: names to add, those that matter first; of an ambiguous verdict the rivals, as `OneOf`.
+        unsure: names beside which all else is told, though they are not known to improve predictions; not in `missing`.
         stated: of the names that are told, such as the model has already, with the values that it states.
         matters: name to what it costs, how large its force is, and whether that is beyond the tolerance.
         nearest: names that explain a part and are not the cause; of a partial verdict those that predict.
@@ -89,6 +90,7 @@ class Diagnosis(Answer):
     stochastic: dict[str, Any] = field(default_factory=dict)
     inseparable: dict[str, list[list[str]]] = field(default_factory=dict)
     stated: dict[str, dict[str, float]] = field(default_factory=dict)
+    unsure: list[str] = field(default_factory=list)
 
     @property
     def surfaces(self) -> list[dict[str, Any]]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from auvnn.answer_types import Candidate, NextExperiment
+from auvnn.answer_types import Candidate, NextExperiment, SearchStep
 from auvnn.diagnosis.advise import advise
 from auvnn.diagnosis.answers.answer import Diagnosis, Names, OneOf
 from auvnn.diagnosis.answers.bounds import reservations
@@ -39,7 +39,9 @@ def answer(asked: Setting, state: State) -> Diagnosis:
     notes: list[str] = list(state.notes)
     without = _fits_without(asked, state)
     found = _worth(asked, state, without, notes)
-    steps, unsure = known_to_pay(costliest_first(state.steps, found.names), found.names, asked.tolerance)
+    steps, unsure = known_to_pay(
+        costliest_first(state.steps, found.names, asked.tolerance), found.names, asked.tolerance
+    )
     gone = {e for s in steps if s["verdict"] == "withdrawn" for e in s["effects"]}
     given = [e for s in steps for e in s["effects"] if e not in gone]
     standing = [s for s in steps if s["verdict"] != "withdrawn" and not {*s["effects"]} <= gone]
@@ -62,7 +64,7 @@ def answer(asked: Setting, state: State) -> Diagnosis:
         unexplained=_unexplained(state, verdict),
         depends_on=depends.shares,
         inseparable=depends.inseparable,
-        next_experiment=_next(asked, state, notes),
+        next_experiment=_next(asked, state, steps, notes),
         warnings=[*_warnings(asked, state, unsure), *notes, *asked.notes],
         absorbed=asked.absorbed,
         derivative={
@@ -83,6 +85,7 @@ def answer(asked: Setting, state: State) -> Diagnosis:
         tolerance=asked.tolerance.to_dict(),
         judged_by=found.words,
         stated=stated,
+        unsure=unsure,
     )
 
 
@@ -175,15 +178,17 @@ def _tests(asked: Setting, state: State, notes: list[str]) -> dict[str, Any]:
     return {"before": before, "after": after}
 
 
-def _next(asked: Setting, state: State, notes: list[str]) -> NextExperiment | None:
+def _next(
+    asked: Setting, state: State, steps: Sequence[SearchStep], notes: list[str]
+) -> NextExperiment | None:
     vehicle = asked.model.vehicle
+    first = next(({*s["effects"]} for s in steps if s["verdict"] == "ambiguous"), set())
+    group = next((g for g in state.groups if first & {e.effects[-1] for e in g}), ())
     # Manoeuvres are made of forces: a glider has none, and a measured attitude follows none.
-    if not (asked.advice and state.groups) or vehicle.glides:
+    if not (asked.advice and group) or vehicle.glides:
         return None
     try:
-        return advise(
-            asked.model, asked.layout, list(state.groups[0]), (HORIZON, WARMUP), asked.say
-        ).to_dict()
+        return advise(asked.model, asked.layout, list(group), (HORIZON, WARMUP), asked.say).to_dict()
     except (np.linalg.LinAlgError, FitError):
         notes.append("which manoeuvre would decide could not be worked out: the candidates diverge on them")
         return None

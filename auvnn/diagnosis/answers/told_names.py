@@ -18,25 +18,29 @@ SURELY = 2.0
 NAMING = ("named", "ambiguous")
 
 
-def costliest_first(steps: Sequence[SearchStep], costs: Mapping[str, Cost]) -> list[SearchStep]:
+def costliest_first(
+    steps: Sequence[SearchStep], costs: Mapping[str, Cost], tolerance: Tolerance
+) -> list[SearchStep]:
     """Return the steps of a search, a name ahead of those found before it that surely cost less.
 
     What is found first brings most while the others are missing still: with many samples that may be a small fault of
     the model that the whole log shows, and what the predictions suffer from comes after it. Names whose costs do not
-    differ by two standard errors stay in the order of the search, and so does every step that gives no name.
+    differ by two standard errors stay in the order of the search, and so does every step that gives no name, and all of
+    them where the tolerance is zero.
 
     Args:
         steps: what was found one after the other.
         costs: of the names of the fit; a group of names has that of the one that stands for it.
+        tolerance: what does not matter.
     """
-    gains = [next((costs[n].gain for n in s["effects"] if n in costs), None) for s in steps]
+    if tolerance.strict:
+        return list(steps)
+    gains = [_largest(s, costs) for s in steps]
     named = [k for k, s in enumerate(steps) if s["verdict"] in NAMING and gains[k] is not None]
     order: list[int] = []
     for k in named:
-        at = len(order)
-        while at and _surely_costlier(gains[k], gains[order[at - 1]]):
-            at -= 1
-        order.insert(at, k)
+        cheaper = (i for i, other in enumerate(order) if _surely_costlier(gains[k], gains[other]))
+        order.insert(next(cheaper, len(order)), k)
     out = list(steps)
     for place, k in zip(named, order, strict=True):
         out[place] = steps[k]
@@ -51,22 +55,45 @@ def known_to_pay(
     A name after the first one must let the error on what is left out fall by more than the standard error of that
     fall, in total, or surely and by the tolerance in one velocity: `add` would not accept it either. Where the
     tolerance is zero, and of names whose cost is unknown, nothing is asked. What a name that stays needs beside it
-    stays with it.
+    stays with it; and of several that do not pay the one that brings most, because each may stand in for the other.
 
     Args:
         steps: in the order in which they are told.
         costs: of the names of the fit; a group of names has that of the one that stands for it.
         tolerance: what does not matter.
     """
-    naming = [s for s in steps if s["verdict"] in NAMING]
+    withdrawn = {e for s in steps if s["verdict"] == "withdrawn" for e in s["effects"]}
+    naming = [s for s in steps if s["verdict"] in NAMING and not {*s["effects"]} <= withdrawn]
     if tolerance.strict or len(naming) < 2:
         return list(steps), []
-    gains = [next((costs[n].gain for n in s["effects"] if n in costs), None) for s in naming]
-    stays = [not k or g is None or _pays(g, tolerance) for k, g in enumerate(gains)]
-    told = {n for s, stay in zip(naming, stays, strict=True) if stay for n in s["effects"]}
-    needed = {other for n in told for other in needed_beside(n, ())}
-    gone = [s for s, stay in zip(naming, stays, strict=True) if not stay and not needed & {*s["effects"]}]
-    return [s for s in steps if s not in gone], [n for s in gone for n in s["effects"]]
+    # A group of which one is missing goes as a whole; several that were named together go each by itself.
+    units = [
+        unit
+        for s in naming[1:]
+        for unit in ([s["effects"]] if s["verdict"] == "ambiguous" else [[e] for e in s["effects"]])
+    ]
+    idle = {}
+    for unit in units:
+        fall = next((costs[n].gain for n in unit if n in costs), None)
+        if fall is not None and not _pays(fall, tolerance):
+            idle[tuple(unit)] = fall.value
+    if len(idle) > 1:
+        del idle[max(idle, key=lambda unit: idle[unit])]
+    gone = {n for unit in idle for n in unit}
+    needed = {other for s in naming for n in s["effects"] if n not in gone for other in needed_beside(n, ())}
+    gone -= needed
+    kept = []
+    for s in steps:
+        left = [n for n in s["effects"] if n not in gone or s["verdict"] not in NAMING]
+        if left or not s["effects"]:
+            kept.append(s if left == s["effects"] else SearchStep(**{**s, "effects": left}))
+    return kept, [n for s in naming for n in s["effects"] if n in gone]
+
+
+def _largest(step: SearchStep, costs: Mapping[str, Cost]) -> Gain | None:
+    """Return the gain of a step's name, the largest of several that were named together; None where none is known."""
+    gains = [g for n in step["effects"] if n in costs and (g := costs[n].gain) is not None]
+    return max(gains, key=lambda g: g.value, default=None)
 
 
 def _pays(fall: Gain, tolerance: Tolerance) -> bool:

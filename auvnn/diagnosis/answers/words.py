@@ -84,11 +84,9 @@ def tell(diagnosis: Diagnosis) -> list[str]:
                 else "What is left is not noise, and no further effect of the catalogue explains it."
             )
         elif lines:
-            lines.append(
-                "With that the model is adequate: what is left does not matter within the tolerance."
-                if diagnosis.small_remainder
-                else "With that the model is adequate: what is left looks like noise."
-            )
+            also = f", and with {', '.join(diagnosis.unsure)} (see the warnings)," if diagnosis.unsure else ""
+            left = "does not matter within the tolerance" if diagnosis.small_remainder else "looks like noise"
+            lines.append(f"With that{also} the model is adequate: what is left {left}.")
     lines += judged_words.costs(diagnosis)
     if diagnosis.nearest:
         one = len(diagnosis.nearest) == 1

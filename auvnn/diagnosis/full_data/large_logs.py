@@ -269,7 +269,7 @@ def _describe(
         "looked_at": count,
         "global_p_value": bonferroni(tests),
         "candidates": sorted(rows, key=lambda r: -r["evidence"]),
-        "parameters": fitted.values(layout, effects),
+        "parameters": fitted.values(layout, [n for n in effects if n not in found.unsure]),
         "coefficients": fitted.values(layout, [n for n in fitted.names if n not in effects]),
         "misfit": float(np.sqrt(sums.cost / max(sums.count[usable].sum(), 1.0))),
         "adequate": not fitted.lasting,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -34,6 +35,7 @@ PATIENCE = 0.3
 ROUNDS, CHANGES = 3, 2
 # Shares of the next command that are about the same.
 SHARES = 0.1
+OTHERWISE = "fitted to commands that go otherwise between samples"
 HELD = "commands are held until the next sample, or the log does not tell."
 
 
@@ -60,7 +62,7 @@ class Causes(Trials):
         except FAILURES as problem:
             self._failed("asking how commands go between samples", problem)
             return
-        other = gone(self.model, float(np.median([run.dt for run in self.log.runs])))
+        other = gone(self.model, self._interval())
         if path is not None or other:
             self.told(GONE if path is None else path.words())
             self.model = with_commands(self.model, path)
@@ -113,7 +115,8 @@ class Causes(Trials):
             self.told(
                 f"Diagnose: on the liveliest {part.duration:.0f} s of the log's {self.log.duration:.0f} s."
             )
-        self._rounds(part, self.began)
+        share = self.limit * PATIENCE
+        self._rounds(part, self.began + share)
         for _ in range(CHANGES):
             # Names that predict a part, or come nearest, hide as much of the commands as those that are causes.
             names = self.state.recipe.effects or tuple(
@@ -124,19 +127,26 @@ class Causes(Trials):
             path, same = self._beside(names, part)
             if same:
                 return
-            kept = self.model, self.judge, self.state, self.steps, self.ground, self.adequate
+            kept = self.model, self.judge, self.state, self.ground, self.adequate, self.regression
+            steps, diagnoses = self.steps, list(self.diagnoses)
             self._begin_anew(path, names)
             self.refit()
-            self._rounds(part, time.monotonic())
+            # Both times together may take twice the share of one.
+            self._rounds(part, min(time.monotonic(), self.began + share) + share)
             won = gain(kept[2].left, self.state.left)
-            if not won.value > -won.std:
-                self.model, self.judge, self.state, self.steps, self.ground, self.adequate = kept
+            worse = not won.value > -won.std
+            lost = self.steps if worse else steps
+            self.tried += [replace(s, accepted=False, reason=OTHERWISE, model=None) for s in lost]
+            if worse:
+                self.model, self.judge, self.state, self.ground, self.adequate, self.regression = kept
+                self.steps, self.diagnoses = steps, diagnoses
                 self.told("With that it predicts worse: commands are taken as before.")
                 return
 
     def _beside(self, names: Sequence[str], part: Log) -> tuple[CommandPath | None, bool]:
         """Return how commands go by a fit with names, and whether they are taken so: what is missing hides it."""
-        before = self.model.commands
+        stated = self.model.commands
+        before = stated if gone(self.model, self._interval()) else None
         self.say("asking how commands go between samples, beside the names")
         try:
             path = path_of(self.model, part, names)
@@ -145,7 +155,8 @@ class Causes(Trials):
             return before, True
         if path is None or before is None:
             return path, path is before
-        alike = (path.between_samples, path.samples) == (before.between_samples, before.samples)
+        same = ("between_samples", "samples", "interpolated")
+        alike = all(getattr(path, k) == getattr(before, k) for k in same)
         return path, alike and abs(path.share_of_next - before.share_of_next) < SHARES
 
     def _begin_anew(self, path: CommandPath | None, names: Sequence[str]) -> None:
@@ -155,21 +166,25 @@ class Causes(Trials):
         )
         self.model = with_commands(self.model, path)
         self.judge = Judge.of(self.log, self.model.actuation, self.model)
+        self.regression = self.judge.regression(self.how)
         self.state, self.steps = as_given(self.model, self.judge), []
         self.ground, self.adequate = None, False
 
-    def _rounds(self, part: Log, began: float) -> None:
+    def _interval(self) -> float:
+        """Return the usual interval between samples of the log, s."""
+        return float(np.median([run.dt for run in self.log.runs]))
+
+    def _rounds(self, part: Log, until: float) -> None:
         """Ask for causes, add those that pay, and ask again, until none is named or none pays.
 
         Args:
             part: of the log, that is diagnosed.
-            began: when the time for it began.
+            until: when the time for it is up, as `time.monotonic` has it.
         """
         for number in range(ROUNDS):
             if self.late() or self._full():
                 return
             self.say(f"diagnosing what is missing ({number + 1})")
-            patience = max(self.limit * PATIENCE - (time.monotonic() - began), 0.0)
             # What this loop has put in was fitted to this log.
             usable = candidates_for(self.model, self.log, self.effects, stated=True)[0]
             asked = [n for n in usable if n not in self.state.recipe.effects]
@@ -186,7 +201,7 @@ class Causes(Trials):
                     costs=False,
                     # What a name is worth is decided by free running here, and time is bounded.
                     stochastic=False,
-                    progress=self._until(time.monotonic() + patience),
+                    progress=self._until(until),
                 )
             except _TooLong:
                 self.told(

@@ -29,6 +29,9 @@ def found_in(model, truth, **options):
     return diagnose(model, log, NAMES, advice=False, whiteness=False, **options)
 
 
+USUAL = Tolerance.of(None)
+
+
 def step(verdict, *effects):
     return {"verdict": verdict, "effects": list(effects), "p_value": 0.0}
 
@@ -48,25 +51,24 @@ def names_of(steps):
 def test_a_name_that_surely_costs_more_goes_ahead():
     steps = [step("named", "a"), step("ambiguous", "b", "c"), step("adequate")]
     costs = costing(a=(0.0023, 0.0030), b=(0.0407, 0.0079))
-    found = costliest_first(steps, costs)
+    found = costliest_first(steps, costs, USUAL)
     assert names_of(found) == ["b", "a", "adequate"] and found[0]["effects"] == ["b", "c"]
     # Two standard errors of the difference decide.
     near = costing(a=(0.10, 0.03), b=(0.19, 0.04))
-    assert names_of(costliest_first(steps, near)) == ["a", "b", "adequate"]
+    assert names_of(costliest_first(steps, near, USUAL)) == ["a", "b", "adequate"]
     far = costing(a=(0.10, 0.03), b=(0.21, 0.04))
-    assert names_of(costliest_first(steps, far)) == ["b", "a", "adequate"]
+    assert names_of(costliest_first(steps, far, USUAL)) == ["b", "a", "adequate"]
 
 
 def test_every_name_goes_ahead_of_those_that_surely_cost_less_and_of_no_other():
     steps = [step("named", n) for n in "abc"]
-    assert names_of(costliest_first(steps, costing(a=(0.1, 0.01), b=(0.2, 0.01), c=(0.3, 0.01)))) == [
-        "c",
-        "b",
-        "a",
-    ]
-    # c costs more than a, but stands behind b, from which it does not differ surely.
+    rising = costing(a=(0.1, 0.01), b=(0.2, 0.01), c=(0.3, 0.01))
+    assert names_of(costliest_first(steps, rising, USUAL)) == ["c", "b", "a"]
+    # c surely costs more than a, whatever stands between them.
     among = costing(a=(0.1, 0.01), b=(0.2, 0.2), c=(0.3, 0.01))
-    assert names_of(costliest_first(steps, among)) == ["a", "b", "c"]
+    assert names_of(costliest_first(steps, among, USUAL)) == ["c", "a", "b"]
+    # In the model's own world nothing but the evidence counts.
+    assert costliest_first(steps, among, Tolerance.of(0.0)) == steps
 
 
 def test_steps_without_a_name_or_with_one_whose_cost_is_unknown_stay_where_they_are():
@@ -77,12 +79,12 @@ def test_steps_without_a_name_or_with_one_whose_cost_is_unknown_stay_where_they_
         step("named", "c"),
         step("unknown"),
     ]
-    found = costliest_first(steps, costing(b=(0.1, 0.01), c=(0.3, 0.01)))
+    found = costliest_first(steps, costing(b=(0.1, 0.01), c=(0.3, 0.01)), USUAL)
     assert names_of(found) == ["a", "c", "a", "b", "unknown"]
     lost = costing(b=(0.1, 0.01), c=(np.inf, np.inf))
-    assert costliest_first(steps, lost) == steps
-    assert costliest_first(steps, costing(b=None, c=(0.3, 0.01))) == steps
-    assert costliest_first(steps, {}) == steps
+    assert costliest_first(steps, lost, USUAL) == steps
+    assert costliest_first(steps, costing(b=None, c=(0.3, 0.01)), USUAL) == steps
+    assert costliest_first(steps, {}, USUAL) == steps
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -106,9 +108,6 @@ def falling(value, std, **by_dof):
     """Return a cost by its fall in total, (value, std), and by velocity; the error after is 0.2 in each."""
     gain = Gain(value, std, by_dof, 0.3, 0.2, dict.fromkeys(by_dof, 0.2))
     return Cost(gain, np.zeros(6), np.zeros(6), True)
-
-
-USUAL = Tolerance.of(None)
 
 
 @pytest.mark.parametrize(
@@ -137,12 +136,38 @@ def test_a_further_name_is_told_where_it_is_known_to_improve_predictions(second,
     assert known_to_pay(alone, costs, USUAL) == (alone, [])
 
 
+def test_a_name_beside_which_the_first_one_was_withdrawn_is_the_first():
+    steps = [step("named", "a"), step("named", "tether"), step("withdrawn", "a"), step("adequate")]
+    assert known_to_pay(steps, {"tether": falling(0.001, 0.01)}, USUAL) == (steps, [])
+
+
+def test_names_of_one_step_are_judged_each_by_itself():
+    steps = [step("named", "cg_offset"), step("named", "tether", "payload"), step("adequate")]
+    costs = {n: falling(0.1, 0.01) for n in ("cg_offset", "payload")} | {"tether": falling(0.001, 0.01)}
+    kept, gone = known_to_pay(steps, costs, USUAL)
+    assert [s["effects"] for s in kept] == [["cg_offset"], ["payload"], []] and gone == ["tether"]
+    # In the order they count with the larger of the two.
+    late = [step("named", "fin_lag"), steps[1]]
+    first = costliest_first(late, {**costs, "fin_lag": falling(0.02, 0.01)}, USUAL)[0]
+    assert first["effects"] == ["tether", "payload"]
+
+
+def test_of_several_that_do_not_pay_the_one_that_brings_most_stays():
+    """Each may stand in for the other: without both the error might be larger by far."""
+    steps = [step("named", n) for n in ("cg_offset", "tether", "payload", "fin_lag")]
+    costs = {"cg_offset": falling(0.1, 0.01)} | {
+        n: falling(v, 0.01) for n, v in (("tether", 0.001), ("payload", 0.003), ("fin_lag", -0.002))
+    }
+    kept, gone = known_to_pay(steps, costs, USUAL)
+    assert names_of(kept) == ["cg_offset", "payload"] and gone == ["tether", "fin_lag"]
+
+
 def test_what_a_name_needs_beside_it_stays():
     steps = [step("named", "drag_only_current"), step("named", "ocean_current"), step("named", "tether")]
     costs = {
         "drag_only_current": falling(0.1, 0.01),
         "ocean_current": falling(0.0, 0.1),
-        "tether": falling(0.0, 0.1),
+        "tether": falling(-0.1, 0.1),
     }
     assert known_to_pay(steps, costs, USUAL) == (steps[:2], ["tether"])
 
