@@ -34,8 +34,8 @@ GONE = (
 )
 
 
-def gone(model: GreyBox, interval: float) -> bool:
-    """Return whether a model states how commands go in a log in which they were taken as held.
+def states_for(model: GreyBox, interval: float) -> bool:
+    """Return whether a model states how commands go between samples of such a log.
 
     Args:
         model: as known.
@@ -61,13 +61,15 @@ def by_their_path(fits: Fits, model: GreyBox, names: Sequence[str], say: Callabl
     interval = interval_of(windows)
     path = law.path(interval)
     if path is None:
-        return _stated(replace(fits, notes=(*fits.notes, GONE)), None) if gone(model, interval) else fits
+        return (
+            _stated(replace(fits, notes=(*fits.notes, GONE)), None) if states_for(model, interval) else fits
+        )
     say(f"commands change between samples ({law.name}): fitting again")
     try:
         again = fitted_by(ByWindows(law.applied(windows)), model, names, say)
     except InputError:
         # What was found with held commands stands: a fit to others has nowhere to begin.
-        return _stated(fits, None) if gone(model, interval) else fits
+        return _stated(fits, None) if states_for(model, interval) else fits
     return _stated(replace(again, notes=(*fits.notes, *again.notes, path.words())), path)
 
 

@@ -228,3 +228,22 @@ def test_a_fit_that_fails_is_no_answer_to_how_commands_go(model, between, monkey
 
     walk, _ = walked(model, between[0], monkeypatch, answers)
     assert walk.model.commands == path and any("lost" in w for w in walk.warnings)
+
+
+def test_a_diagnosis_that_begins_anew_has_no_more_than_twice_the_time(model, between, monkeypatch):
+    """Prediction shall have its turn: a share of the time each, and together no more than twice that."""
+    ends = []
+    monkeypatch.setattr(Walk, "_rounds", lambda self, part, until: ends.append(until - self.began))
+    path = CommandPath("linear", 0.5, 0.2)
+    walk = Walk(model, between[0], None, [NAME], 8, 100.0, None, None)
+    monkeypatch.setattr(causes, "path_of", lambda *_: path)
+    walk.compare()
+    walk.diagnoses.append({"nearest": [NAME]})
+    walk.diagnose()
+    share = 100.0 * causes.PATIENCE
+    assert ends[0] == pytest.approx(share) and share < ends[1] <= 2.0 * share + 1e-6
+    # Long after its time is up it has twice the share, and not one more from then on.
+    monkeypatch.setattr(causes, "path_of", lambda *_: None)
+    walk.began -= 2.5 * share
+    walk.diagnose()
+    assert ends[-1] == pytest.approx(2.0 * share)

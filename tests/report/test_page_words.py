@@ -116,6 +116,12 @@ def test_an_effect_that_adds_nothing_is_said_to_be_what_is_not_accepted(unseen, 
     assert words in PageText(drawer("improvement").page(answer)).text
 
 
+def test_a_name_that_is_not_known_to_pay_is_told_apart(unseen):
+    told = PageText(drawer("diagnosis").page(diagnosis("named", unsure=["tether", "payload"]))).text
+    assert "not known to improve predictions: tether and payload." in told
+    assert "not known to improve" not in PageText(drawer("diagnosis").page(diagnosis("named"))).text
+
+
 def test_a_model_that_a_regression_still_beats_is_told_after_the_verdict(unseen):
     line = {
         "total": 0.04,

@@ -145,6 +145,7 @@ class Diagnosis(Answer):
             "verdict",
             "missing",
             "stated",
+            "unsure",
             "steps",
             "candidates",
             "unexplained",

@@ -55,7 +55,8 @@ def known_to_pay(
     A name after the first one must let the error on what is left out fall by more than the standard error of that
     fall, in total, or surely and by the tolerance in one velocity: `add` would not accept it either. Where the
     tolerance is zero, and of names whose cost is unknown, nothing is asked. What a name that stays needs beside it
-    stays with it; and of several that do not pay the one that brings most, because each may stand in for the other.
+    stays with it; and of several that do not pay the one that brings most, because each may stand in for the other,
+    unless it surely makes predictions worse.
 
     Args:
         steps: in the order in which they are told.
@@ -72,16 +73,18 @@ def known_to_pay(
         for s in naming[1:]
         for unit in ([s["effects"]] if s["verdict"] == "ambiguous" else [[e] for e in s["effects"]])
     ]
-    idle = {}
+    idle: dict[tuple[str, ...], Gain] = {}
     for unit in units:
         fall = next((costs[n].gain for n in unit if n in costs), None)
         if fall is not None and not _pays(fall, tolerance):
-            idle[tuple(unit)] = fall.value
+            idle[tuple(unit)] = fall
     if len(idle) > 1:
-        del idle[max(idle, key=lambda unit: idle[unit])]
+        best = max(idle, key=lambda unit: idle[unit].value)
+        if idle[best].value > -idle[best].std:
+            del idle[best]
     gone = {n for unit in idle for n in unit}
-    needed = {other for s in naming for n in s["effects"] if n not in gone for other in needed_beside(n, ())}
-    gone -= needed
+    stay = [n for s in naming for n in s["effects"] if n not in gone]
+    gone -= {other for n in stay for other in needed_beside(n, stay)}
     kept = []
     for s in steps:
         left = [n for n in s["effects"] if n not in gone or s["verdict"] not in NAMING]

@@ -12,7 +12,7 @@ from auvnn.answer_types import SearchStep
 from auvnn.diagnosis.cross_validation.errors import gain
 from auvnn.diagnosis.diagnose import diagnose
 from auvnn.diagnosis.hypotheses.candidates import candidates_for
-from auvnn.improvement.commands_between import GONE, gone, path_of
+from auvnn.improvement.commands_between import GONE, path_of, states_for
 from auvnn.improvement.loop.answer import CAUSE, REFITTED
 from auvnn.improvement.loop.excerpt import liveliest
 from auvnn.improvement.loop.judge import Judge
@@ -62,7 +62,7 @@ class Causes(Trials):
         except FAILURES as problem:
             self._failed("asking how commands go between samples", problem)
             return
-        other = gone(self.model, self._interval())
+        other = states_for(self.model, self._interval())
         if path is not None or other:
             self.told(GONE if path is None else path.words())
             self.model = with_commands(self.model, path)
@@ -146,7 +146,7 @@ class Causes(Trials):
     def _beside(self, names: Sequence[str], part: Log) -> tuple[CommandPath | None, bool]:
         """Return how commands go by a fit with names, and whether they are taken so: what is missing hides it."""
         stated = self.model.commands
-        before = stated if gone(self.model, self._interval()) else None
+        before = stated if states_for(self.model, self._interval()) else None
         self.say("asking how commands go between samples, beside the names")
         try:
             path = path_of(self.model, part, names)

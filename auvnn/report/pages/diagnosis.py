@@ -72,8 +72,9 @@ class DiagnosisPage(Page):
             out += [f"Besides, it lacks {listing(lacks)}."] if lacks else []
             out += [f"Besides, it has {listing(other)} at other values than the log."] if other else []
             out += [_candidate_words(by_name[m]) for m in further[:3] if m in by_name]
-        told = [str(w) for w in view.texts("judged_words")]
-        out += told
+        if unsure := view.texts("unsure"):
+            out.append(f"Found beside it, but not known to improve predictions: {listing(unsure)}.")
+        out += [str(w) for w in view.texts("judged_words")]
         if left is not None and left < 0.01 and verdict != "adequate":
             out.append("Next to nothing of the residual is left unexplained.")
         elif left is not None and verdict != "adequate":

@@ -94,7 +94,10 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
     # In the model's own world rates are those of evidence alone. A world that departs from every assumption leaves a
     # force in each log: there, as for users, what does not matter does not count.
     tolerance = None if case.world else 0.0
-    found = diagnose(model, log, candidates, advice=False, whiteness=False, tolerance=tolerance)
+    # What names cost decides in which order, and which of several, are told; with no tolerance it decides nothing.
+    found = diagnose(
+        model, log, candidates, advice=False, whiteness=False, tolerance=tolerance, costs=bool(case.world)
+    )
     diagnosed = time.monotonic()
     row: dict[str, Any] = {
         "verdict": found.verdict,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from auvnn.diagnosis.cross_validation.errors import Gain
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
 
+answering = importlib.import_module("auvnn.diagnosis.answers.answering")
 diagnosing = importlib.import_module("auvnn.diagnosis.diagnose")
 NAMES = ["net_buoyancy", "constant_force"]
 
@@ -160,6 +162,11 @@ def test_of_several_that_do_not_pay_the_one_that_brings_most_stays():
     }
     kept, gone = known_to_pay(steps, costs, USUAL)
     assert names_of(kept) == ["cg_offset", "payload"] and gone == ["tether", "fin_lag"]
+    # But none that surely makes predictions worse.
+    worse = {"cg_offset": costs["cg_offset"]} | {
+        n: falling(v, 0.01) for n, v in (("tether", -0.02), ("payload", -0.03), ("fin_lag", -0.05))
+    }
+    assert names_of(known_to_pay(steps, worse, USUAL)[0]) == ["cg_offset"]
 
 
 def test_what_a_name_needs_beside_it_stays():
@@ -172,6 +179,30 @@ def test_what_a_name_needs_beside_it_stays():
     assert known_to_pay(steps, costs, USUAL) == (steps[:2], ["tether"])
 
 
+def test_what_a_name_could_act_with_goes_where_something_else_is_there_for_that():
+    steps = [step("named", n) for n in ("ocean_current", "drag_only_current", "current_shear")]
+    costs = {n: falling(0.1, 0.01) for n in ("ocean_current", "drag_only_current")}
+    costs["current_shear"] = falling(0.001, 0.01)
+    assert known_to_pay(steps, costs, USUAL) == (steps[:2], ["current_shear"])
+
+
+@pytest.mark.parametrize(
+    ("told", "group"), [(["b", "c"], ["b", "c"]), (["e", "f"], ["e", "f"]), (None, None)]
+)
+def test_the_next_experiment_is_about_the_first_group_that_is_told(model, monkeypatch, told, group):
+    """Of two groups one may be told first that was found later, and one that does not pay is not told at all."""
+    explained = SimpleNamespace
+    groups = tuple(tuple(explained(effects=("a", n)) for n in names) for names in (("b", "c"), ("e", "f")))
+    steps = [step("named", "a"), *([step("ambiguous", *told)] if told else [])]
+    monkeypatch.setattr(
+        answering,
+        "advise",
+        lambda _, __, found, *___: explained(to_dict=lambda: [e.effects[-1] for e in found]),
+    )
+    asked = explained(model=model, advice=True, layout=None, say=print)
+    assert answering._next(asked, explained(groups=groups), steps, []) == group
+
+
 def test_the_answer_says_which_name_was_left_out(model, monkeypatch):
     """Of two forces one is said to cost nothing: it is no name then, and the warnings have it."""
     told = importlib.import_module("auvnn.diagnosis.answers.told_names")
@@ -181,4 +212,8 @@ def test_the_answer_says_which_name_was_left_out(model, monkeypatch):
     (other,) = {*NAMES} - {name}
     assert [s["effects"] for s in found.steps if s["effects"]] == [[name]] and {*found.matters} == {name}
     assert any(w.startswith(f"not named: {other}") for w in found.warnings)
+    assert found.unsure == found.to_dict()["unsure"] == [other]
+    assert any(
+        f"With that, and with {other} (see the warnings), the model is adequate" in x for x in found.story
+    )
     assert not any(line.startswith(f"Missing: {other}") for line in found.story)

@@ -8,6 +8,7 @@ import signal
 import sys
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -224,3 +225,18 @@ def test_numbers_that_cannot_be_are_refused(paths, option):
         diagnose_files(GreyBox(vehicle()), paths, **{option: 0})
     with pytest.raises(ConfigError, match="window=soon"):
         diagnose_files(GreyBox(vehicle()), paths, window="soon")  # pyright: ignore[reportArgumentType]
+
+
+def test_names_that_are_not_told_are_not_told_of_the_whole_log(monkeypatch):
+    """Of the fit to all of the log the answer holds the names that it gives, and no other as a coefficient."""
+    explanation = SimpleNamespace(effects=("tether", "payload"), fitted=SimpleNamespace(sigma=np.ones(18)))
+    fitted = SimpleNamespace(
+        names=("added_mass", "tether", "payload"), values=lambda layout, names: list(names), lasting=False,
+        sums=SimpleNamespace(cost=1.0, count=np.ones(18)), steps=1, settled=True,
+    )  # fmt: skip
+    plan = SimpleNamespace(runs=1, samples=1, duration=1.0, windows=1)
+    looked = SimpleNamespace(scores={})
+    for unsure, told in (([], ["tether", "payload"]), (["payload"], ["tether"])):
+        found = SimpleNamespace(explanation=explanation, unsure=unsure)
+        data = many._describe(plan, 1, 1, {}, looked, None, fitted, found)
+        assert data["parameters"] == told and data["coefficients"] == ["added_mass"]
