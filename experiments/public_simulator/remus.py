@@ -5,13 +5,13 @@ from __future__ import annotations
 import importlib
 import math
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from logged import DURATION, NOISE, RATE, STEP, Changed, acceleration, measured, shares_off
 
-STEP, RATE, RUNS, DURATION = 0.01, 20, 3, 60.0
+FILE = "python_vehicle_simulator/vehicles/remus100.py"
 # The vehicle has changed between commits: other limits, areas and damping, and a stern plane with the opposite sign.
 COMMIT = "25b1e153fd4b694706f7059e4662eaab97c39ee0"
 # The class has lags of 1 s on fins and propeller; newer versions of its MATLAB original have a tenth of that.
@@ -20,18 +20,6 @@ LAG = 0.1
 STALL = 1.5
 # Propeller of the class, whose numbers stand inside its `dynamics`: diameter, K_T at J = 0 and 0.6632, wake, deduction.
 DIAMETER, KT, KT_MAX, J_MAX, KQ, WAKE, DEDUCTION = 0.14, 0.4566, 0.1798, 0.6632, 0.07, 0.944, 0.1
-NOISE = {
-    "linear": 0.006,
-    "angular": 0.003,
-    "tilt": 0.003,
-    "heading": 0.008,
-    "horizontal": 0.05,
-    "depth": 0.01,
-}
-COLUMNS = (
-    *("qw", "qx", "qy", "qz", "u", "v", "w", "p", "q", "r", "x", "y", "z"),
-    *("thruster_1", "fin_1", "fin_2"),
-)
 # Ends between which settings are drawn: change of heading, rad, change of depth, m, and revolutions per minute.
 SETTINGS = ((-1.5, 1.5), (-3.0, 4.0), (700.0, 1500.0))
 
@@ -56,31 +44,10 @@ def _is_known(vehicle: Any) -> bool:
     return bool(np.allclose(limits, (math.pi / 6, math.pi / 6, 1.0, 1.0)) and moved[4] > 0.0)
 
 
-class Plant:
-    """The vehicle, with what is changed of it.
+class Plant(Changed):
+    """The vehicle, with what is changed of it; its commands are rudder, stern plane and revolutions per minute."""
 
-    Args:
-        module: of the simulator.
-        change: of the vehicle's numbers, before it drives.
-        command: of what is commanded, [rudder, stern plane, revolutions per minute].
-        sensors: of velocities as they are logged, (6,).
-        later: of the vehicle's numbers in the middle of a run.
-    """
-
-    def __init__(
-        self,
-        module: Any,
-        change: Callable[[Any], None] | None = None,
-        command: Callable[[np.ndarray], np.ndarray] | None = None,
-        sensors: Callable[[np.ndarray], np.ndarray] | None = None,
-        later: Callable[[Any], None] | None = None,
-    ) -> None:
-        """Keep what is changed: each run has a vehicle of its own."""
-        self.kinematics = importlib.import_module(f"{module.__name__.split('.')[0]}.lib.gnc").attitudeEuler
-        self.module, self.change = module, change
-        self.command = command or (lambda given: given)
-        self.sensors = sensors or (lambda nu: nu)
-        self.later = later
+    commands = ("thruster_1", "fin_1", "fin_2")
 
     def vehicle(self) -> Any:
         """Return a new vehicle, as it is when a run begins."""
@@ -93,6 +60,9 @@ class Plant:
     def run(self, seed: int) -> np.ndarray:
         """Return the rows of one run, (samples, 1 + columns): the autopilot holds headings and depths in turn."""
         vehicle, rng = self.vehicle(), np.random.default_rng(seed)
+        attitude_euler = importlib.import_module(
+            f"{self.module.__name__.split('.')[0]}.lib.gnc"
+        ).attitudeEuler
         eta, nu = np.array([0.0, 0.0, 8.0, 0.0, 0.0, rng.uniform(-3, 3)]), np.array([1.2, 0, 0, 0, 0, 0])
         actual, integral = np.array([0.0, 0.0, 1000.0]), np.zeros(2)
         until = rng.uniform(6, 14, 20).cumsum()
@@ -107,21 +77,10 @@ class Plant:
             heading, depth, speed = aims[int(np.searchsorted(until, t))]
             given = _autopilot(eta, nu, heading, depth, speed, integral, rng)
             if i % every == 0:
-                rows.append([t, *_measured(eta, self.sensors(nu), rng), given[2] / vehicle.nMax, *given[:2]])
+                rows.append([t, *measured(eta, self.sensors(nu), rng), given[2] / vehicle.nMax, *given[:2]])
             moved, actual = vehicle.dynamics(eta, nu, actual, self.command(given), STEP)
-            eta, nu = self.kinematics(eta, nu, STEP), moved
+            eta, nu = attitude_euler(eta, nu, STEP), moved
         return np.array(rows)
-
-    def write(self, path: Path, seed: int) -> Path:
-        """Write a log of all runs."""
-        import polars
-
-        runs = [self.run(100 * seed + k) for k in range(RUNS)]
-        rows = np.concatenate(runs)
-        numbers = np.repeat(np.arange(RUNS), [len(r) for r in runs])
-        columns = {"run": numbers, "t": rows[:, 0], **{c: rows[:, 1 + k] for k, c in enumerate(COLUMNS)}}
-        polars.DataFrame(columns).write_parquet(path)
-        return path
 
 
 def _autopilot(
@@ -147,22 +106,6 @@ def _autopilot(
     stern = -(2.0 * errors[0] + 0.8 * rate[0] + 0.3 * integral[0])
     rudder = -(0.9 * errors[1] + 0.8 * rate[1] + 0.05 * integral[1])
     return np.array([*np.clip([rudder, stern], -0.5, 0.5), speed])
-
-
-def _measured(eta: np.ndarray, nu: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return quaternion, velocities and position with the noise of usual sensors."""
-    noise = rng.standard_normal(12)
-    turn = eta[3:] + noise[:3] * [NOISE["tilt"], NOISE["tilt"], NOISE["heading"]]
-    (cr, cp, cy), (sr, sp, sy) = np.cos(turn / 2), np.sin(turn / 2)
-    attitude = [
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    ]
-    velocity = nu + noise[3:9] * ([NOISE["linear"]] * 3 + [NOISE["angular"]] * 3)
-    place = eta[:3] + noise[9:] * [NOISE["horizontal"], NOISE["horizontal"], NOISE["depth"]]
-    return np.concatenate([attitude, velocity, place])
 
 
 def description(vehicle: Any) -> dict[str, Any]:
@@ -244,15 +187,11 @@ def disagreement(vehicle: Any, model: Any, count: int = 400) -> list[float]:
 
     Args:
         vehicle: of the simulator.
-        model: of the same vehicle, without lags.
+        model: of the same vehicle; its lags are left out.
         count: states that are drawn: 0.8 to 2.2 m/s ahead, 0.15 m/s across, 0.2 rad/s, 0.3 rad, fins at 0.2 rad.
     """
-    import torch
-
-    from auvnn.models import Inputs
-    from auvnn.physics.attitude import euler_to_quat, quat_to_matrix
-
-    rng, forces = np.random.default_rng(0), []
+    effects = [e for e in model.copied_effects() if e.name not in ("propeller_lag", "fin_lag")]
+    model, rng, both = model.rebuilt(effects), np.random.default_rng(0), []
     full = model.vehicle.thrusters[0].max_forward
     for _ in range(count):
         nu = np.array([rng.uniform(0.8, 2.2), *rng.normal(0, 0.15, 2), *rng.normal(0, 0.2, 3)])
@@ -260,13 +199,6 @@ def disagreement(vehicle: Any, model: Any, count: int = 400) -> list[float]:
         actual = np.array([*rng.normal(0, 0.2, 2), rng.uniform(700, 1500)])
         moved, _ = vehicle.dynamics(eta.copy(), nu.copy(), actual, actual, STEP)
         share = actual[2] / vehicle.nMax
-        at, speed, command, thrust, fins, now = (
-            torch.tensor(x, dtype=torch.float64)
-            for x in (eta, nu, [share], [full * share**2], actual[:2], 0.0)
-        )
-        turned = quat_to_matrix(euler_to_quat(at[3:]))
-        with torch.no_grad():
-            mine = model.nu_dot(at[:3], turned, speed, thrust, Inputs(command, fins), now).numpy()
-        forces.append(vehicle.M @ np.stack([mine, (moved - nu) / STEP], axis=1))
-    mine, theirs = np.stack(forces).transpose(2, 0, 1)
-    return (np.sqrt(((mine - theirs) ** 2).mean(0)) / np.sqrt((theirs**2).mean(0))).tolist()
+        mine = acceleration(model, eta, nu, [share], [full * share**2], actual[:2])
+        both.append(vehicle.M @ np.stack([mine, (moved - nu) / STEP], axis=1))
+    return shares_off(both)

@@ -1,9 +1,9 @@
-"""Changes hidden in a public simulator's REMUS 100: is each one named, by a model of that vehicle fitted to clean logs?
+"""Changes hidden in a public simulator's vehicle: is each one named, by a model of that vehicle fitted to a clean log?
 
 python experiments/public_simulator/run.py CHECKOUT OUT [seed=50] [NAME ...]
 
-Of the K-th change the log has the seed K more than that which is given: another one is another log, with other headings,
-depths, revolutions and noise.
+CHECKOUT is one of the PythonVehicleSimulator (REMUS 100) or of bluerov2_dynamics (BlueROV2 Heavy). Of the K-th change the
+log has the seed K more than that which is given: another one is another log, with other settings and noise.
 """
 
 from __future__ import annotations
@@ -11,102 +11,89 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+import bluerov2
+import bluerov2_changes
+import remus
+import remus_changes
 import yaml
-from remus import Plant, description, disagreement, simulator
+from logged import Changed
 
 import auvnn
 
 # Of the log with nothing hidden; the next change's is one more.
 SEED = 50
-# Fitted to the clean log: what the class has no number for in the package's terms.
-FITTED = ("linear_damping", "quadratic_damping", "coupled_damping")
 
 
-def _set(**values: Any) -> Callable[[Any], None]:
-    def change(vehicle: Any) -> None:
-        for name, value in values.items():
-            # A number that the class does not have would hide nothing.
-            if not hasattr(vehicle, name):
-                raise SystemExit(f"the simulator's vehicle has no {name}")
-            setattr(vehicle, name, value)
+@dataclass(frozen=True)
+class Study:
+    """A vehicle of a simulator, and what is hidden in it.
 
-    return change
+    Attributes:
+        simulator: the module of the vehicle from a checkout.
+        plant: the vehicle, with what is changed of it.
+        changes: what is hidden by its name.
+        given: of a new vehicle, and of the answer's folder: the model that its user has.
+        disagreement: of a new vehicle and a model: by how much its forces are off.
+        fitted: to the clean log: what there is no number for.
+        also: further names that are true of a change.
+    """
 
-
-def _buoyant(vehicle: Any) -> None:
-    vehicle.B = vehicle.W + 3.0
-
-
-def _more_added_mass(vehicle: Any) -> None:
-    # Its damping goes by the whole mass, and stays as it is.
-    vehicle.MA = 1.5 * vehicle.MA
-    vehicle.Minv = np.linalg.inv(vehicle.MRB + vehicle.MA)
-
-
-def _more_drag(vehicle: Any) -> None:
-    vehicle.CD_0 *= 1.5
+    simulator: Callable[[Path], Any]
+    plant: type[Changed]
+    changes: Mapping[str, Mapping[str, Any]]
+    given: Callable[[Any, Path], str]
+    disagreement: Callable[[Any, Any], list[float]]
+    fitted: tuple[str, ...]
+    also: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
-def _off_centre(vehicle: Any) -> None:
-    vehicle.r_bg = vehicle.r_bg + np.array([0.0, 0.003, 0.0])
+def _described(vehicle: Any, out: Path) -> str:
+    path = out / "given.yaml"
+    path.write_text(yaml.safe_dump(remus.description(vehicle), sort_keys=False))
+    return str(path)
 
 
-def _weak_fins(vehicle: Any) -> None:
-    vehicle.CL_delta_r, vehicle.CL_delta_s = 0.75 * vehicle.CL_delta_r, 0.75 * vehicle.CL_delta_s
+REMUS = Study(
+    remus.simulator,
+    remus.Plant,
+    remus_changes.CHANGES,
+    _described,
+    remus.disagreement,
+    ("linear_damping", "quadratic_damping", "coupled_damping"),
+)
+# The built-in vehicle has the numbers of the same paper.
+BLUEROV2 = Study(
+    bluerov2.simulator,
+    bluerov2.Plant,
+    bluerov2_changes.CHANGES,
+    lambda vehicle, out: "bluerov2_heavy",
+    bluerov2.disagreement,
+    ("thruster_lag",),
+    bluerov2_changes.ALSO,
+)
 
 
-def _load(vehicle: Any) -> None:
-    # Half a kilogram at the bow.
-    mass, place = 0.5, np.array([0.5, 0.0, 0.05])
-    cross = np.array([[0, -place[2], place[1]], [place[2], 0, -place[0]], [-place[1], place[0], 0]])
-    moved = np.eye(6)
-    moved[:3, 3:] = cross.T
-    weight = vehicle.MRB[0, 0]
-    vehicle.MRB = vehicle.MRB + moved.T @ np.diag([mass] * 3 + [0] * 3) @ moved
-    vehicle.Minv = np.linalg.inv(vehicle.MRB + vehicle.MA)
-    vehicle.r_bg = (weight * vehicle.r_bg + mass * place) / (weight + mass)
-    vehicle.W += 9.81 * mass
+def study_of(folder: Path) -> Study:
+    """Return the study whose simulator a checkout is of."""
+    return BLUEROV2 if (folder / bluerov2.FILE).exists() else REMUS
 
 
-# What is hidden by the name that it has in the catalogue: what changes of the vehicle, its commands or its sensors.
-CHANGES: dict[str, dict[str, Any]] = {
-    "nothing": {},
-    "ocean_current": {"change": _set(V_c=0.3, beta_c=1.0)},
-    "thruster_gain": {"command": lambda given: given * [1.0, 1.0, 0.8**0.5]},
-    "net_buoyancy": {"change": _buoyant},
-    "added_mass": {"change": _more_added_mass},
-    "cg_offset": {"change": _off_centre},
-    "quadratic_damping": {"change": _more_drag},
-    "fin_gain": {"change": _weak_fins},
-    "fin_offset": {"command": lambda given: given + np.array([0.05, 0.0, 0.0])},
-    "fin_lag": {"change": _set(T_delta=0.4)},
-    "propeller_lag": {"change": _set(T_n=0.6)},
-    "payload": {"later": _load},
-    "gyro_bias": {"sensors": lambda nu: nu + np.array([0, 0, 0, 0, 0, 0.01])},
-    "velocity_scale": {"sensors": lambda nu: nu * [1.03, 1.03, 1.03, 1, 1, 1]},
-}
-
-
-def fitted(module: Any, out: Path) -> Path:
+def fitted(study: Study, module: Any, out: Path) -> Path:
     """Return the model of the vehicle as its user would have it: fitted to a log in which nothing is hidden."""
     folder = out / "model"
     if not folder.exists():
-        vehicle = Plant(module).vehicle()
-        given = description(vehicle)
-        (out / "given.yaml").write_text(yaml.safe_dump(given, sort_keys=False))
-        plain = auvnn.load(str(out / "given.yaml")).without_absent()
-        effects = [e for e in plain.copied_effects() if e.name not in ("propeller_lag", "fin_lag")]
-        shares = zip("XYZKMN", disagreement(vehicle, plain.rebuilt(effects)), strict=True)
-        print(
-            "forces of the model, off by: " + ", ".join(f"{k} {100 * x:.0f} %" for k, x in shares), flush=True
-        )
-        log = auvnn.Log.read(Plant(module).write(out / "clean.parquet", 1))
-        better = auvnn.add(str(out / "given.yaml"), log, list(FITTED))
+        vehicle = study.plant(module).vehicle()
+        given = study.given(vehicle, out)
+        off = study.disagreement(vehicle, auvnn.load(given).without_absent())
+        shares = ", ".join(f"{k} {100 * x:.1f} %" for k, x in zip("XYZKMN", off, strict=True))
+        print(f"forces of the model, off by: {shares}", flush=True)
+        log = auvnn.Log.read(study.plant(module).write(out / "clean.parquet", 1))
+        better = auvnn.add(given, log, list(study.fitted))
         steps = ", ".join(f"{s['step']} {s['error']:.3f}" for s in better.waterfall if s["error"] is not None)
         print(f"model: error of 5 s on the run that was held out: {steps}", flush=True)
         better.model.save(folder)
@@ -115,28 +102,30 @@ def fitted(module: Any, out: Path) -> Path:
 
 def main(checkout: str, out: Path, wanted: list[str], seed: int = SEED) -> None:
     """Hide each change in turn and print what is said of it."""
-    unknown = sorted({*wanted} - {*CHANGES})
+    study = study_of(Path(checkout))
+    unknown = sorted({*wanted} - {*study.changes})
     if unknown:
-        raise SystemExit(f"{', '.join(unknown)}: no such change; there are {', '.join(CHANGES)}")
-    module = simulator(Path(checkout))
+        raise SystemExit(f"{', '.join(unknown)}: no such change; there are {', '.join(study.changes)}")
+    module = study.simulator(Path(checkout))
     out.mkdir(parents=True, exist_ok=True)
-    model = fitted(module, out)
-    for k, (name, plant) in enumerate(CHANGES.items()):
+    model = fitted(study, module, out)
+    for k, (name, changed) in enumerate(study.changes.items()):
         if wanted and name not in wanted:
             continue
-        log = Plant(module, **plant).write(out / f"{name}.parquet", seed + k)
+        log = study.plant(module, **changed).write(out / f"{name}.parquet", seed + k)
         began = time.monotonic()
         found = auvnn.diagnose(str(model), log)
         groups = [s["effects"] for s in found.steps if s["effects"]]
+        true = (name, *study.also.get(name, ()))
         row = {
             "hidden": name,
             "verdict": found.verdict,
             "groups": groups,
-            "first": bool(groups) and name in groups[0],
+            "first": bool(groups) and any(n in groups[0] for n in true),
             "seconds": round(time.monotonic() - began, 1),
         }
         said = ", then ".join(" or ".join(g) for g in groups) or found.verdict
-        print(f"{name:<18} {said} ({found.verdict}, {row['seconds']:.0f} s)", flush=True)
+        print(f"{name:<22} {said} ({found.verdict}, {row['seconds']:.0f} s)", flush=True)
         done = out / "answers.json"
         known = json.loads(done.read_text()) if done.exists() else []
         kept = [r for r in known if r["hidden"] != name] + [row]
