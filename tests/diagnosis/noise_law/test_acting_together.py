@@ -34,11 +34,19 @@ LEFT_OUT = ["added_mass_coriolis"]
 def test_where_a_simulators_simplification_was_found_the_other_one_is_asked_for():
     assert [comes_with(n, LEFT_OUT, OPEN) for n in WATER] == [["drag_only_current"]] * 3
     assert comes_with("payload", LEFT_OUT, OPEN) == []
-    # Without such a name, where water moves already, and where it may not be named, nothing is.
-    assert comes_with("ocean_current", [], OPEN) == comes_with("ocean_current", ["payload"], OPEN) == []
+    # Beside another name, where water moves already, and where it may not be named, nothing is.
+    assert comes_with("ocean_current", ["payload"], OPEN) == []
     assert comes_with("current_shear", [*LEFT_OUT, "ocean_current"], OPEN) == []
     assert comes_with("ocean_current", LEFT_OUT, WATER) == []
     assert comes_with("ocean_current", LEFT_OUT, OPEN, ["linear_damping", "waves"]) == []
+
+
+def test_before_any_name_what_moves_the_water_is_fitted_with_it_where_it_is_fitted_anyway():
+    """A simulator may put the current into the drag alone: then a current that all terms feel explains next to nothing."""
+    assert [comes_with(n, [], OPEN) for n in [*WATER, "payload"]] == [["drag_only_current"]] * 3 + [[]]
+    assert comes_with("ocean_current", [], OPEN, ["waves"]) == comes_with("ocean_current", [], WATER) == []
+    layout = lay_out(GreyBox(small_vehicle()), OPEN)
+    assert worth_fitting_together(layout, [], OPEN) == []
 
 
 def test_of_a_wave_only_a_test_says_where_its_fit_begins():
@@ -60,8 +68,9 @@ def test_they_are_fitted_whatever_their_tests_promise(monkeypatch, chosen, expec
     assert asked == expected
 
 
+@pytest.mark.parametrize("chosen", [LEFT_OUT, []])
 @pytest.mark.parametrize(("more", "together"), [(ODDS + 1.0, True), (ODDS - 1.0, False)])
-def test_two_names_stand_where_they_are_likelier_by_what_a_name_needs(monkeypatch, more, together):
+def test_two_names_stand_where_they_are_likelier_by_what_a_name_needs(monkeypatch, more, together, chosen):
     monkeypatch.setattr(leader_fits, "within_record", lambda *_: True)
     layout, begun = lay_out(GreyBox(small_vehicle()), [*LEFT_OUT, *OPEN]), []
 
@@ -75,9 +84,9 @@ def test_two_names_stand_where_they_are_likelier_by_what_a_name_needs(monkeypatc
     tested: Any = SimpleNamespace(scores=scores, at=layout)
     current: Any = SimpleNamespace(evidence=0.0)
     best: Any = LeaderFits(layout, fits, lambda _: None)._one(
-        "ocean_current", Round(tested, current, [], LEFT_OUT), None
+        "ocean_current", Round(tested, current, [], chosen), None
     )
-    alone, pair = [*LEFT_OUT, "ocean_current"], [*LEFT_OUT, "drag_only_current", "ocean_current"]
+    alone, pair = [*chosen, "ocean_current"], [*chosen, "drag_only_current", "ocean_current"]
     assert begun == [(alone, [0.0, 0.0, 0.0, 0.0]), (pair, [0.0, 0.0, 0.0, 1.0])]
     assert list(best.explanation) == (pair if together else alone)
 

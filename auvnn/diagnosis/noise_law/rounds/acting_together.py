@@ -4,8 +4,9 @@ A simulator may put the current into the drag alone. A model in which fins and a
 a log only without a current: the test for one promises nothing, and its fit ends at zero. How much of the current only
 the drag feels (`drag_only_current`) has no test either as long as the model has no current. So the two are fitted
 together, and named together where they are likelier than the current alone by the odds of a name. These fits take time.
-They are made where a name was found that the catalogue knows to be confused with the effect that cannot act alone: the
-Coriolis forces of the added mass, which the same simulators leave out.
+They are made where nothing is named yet and the current is fitted anyway, and where a name was found that the catalogue
+knows to be confused with the effect that cannot act alone: the Coriolis forces of the added mass, which the same
+simulators leave out.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ def comes_with(
     """
     names = {*open_to}
     acting = [n for n in EFFECTS.names() if n in names and name in effect_class(n).acts_with]
-    acting = [n for n in acting if any(confused(n, c) for c in chosen)]
+    if chosen:
+        acting = [n for n in acting if any(confused(n, c) for c in chosen)]
     # Where one of those beside which it acts was found, its own test says whether it is missing.
     return [n for n in acting if needed_beside(n, (*chosen, *there))]
 
@@ -51,7 +53,7 @@ def worth_fitting_together(
         open_to: effects that may be named.
         there: effects that the model has, beside these names.
     """
-    names, present = list(open_to), list(there)
+    names, present = list(open_to) if chosen else [], list(there)
     return [n for n in names if comes_with(n, chosen, names, present) and not shapes(layout, n).any()]
 
 
