@@ -84,6 +84,16 @@ class Fall(TypedDict):
     std: float
 
 
+class RefittedCoefficients(TypedDict):
+    """What refitting the stated coefficients brings on what was left out: errors of free running over a horizon, s."""
+
+    before: float
+    after: float
+    horizon: float
+    gain: Fall
+    coefficients: list[MovedCoefficient]
+
+
 class OwnFall(TypedDict):
     """What one effect adds to the others on held-out data."""
 

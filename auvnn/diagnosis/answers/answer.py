@@ -14,6 +14,7 @@ from auvnn.answer_types import (
     EffectCost,
     MovedCoefficient,
     NextExperiment,
+    RefittedCoefficients,
     SearchStep,
 )
 from auvnn.answers import PLOTTED, Answer
@@ -53,6 +54,7 @@ class Diagnosis(Answer):
         left: degree of freedom to the force without a name, and the smallest that this log would have shown.
         small_remainder: whether a force is left that does not matter.
         moved: stated coefficients that were moved by more than two of their standard deviations.
+        refitted: of an adequate verdict, what refitting the stated coefficients brings; None where that does not matter.
         tolerance: what does not matter.
         judged_by: how the costs were worked out.
         baseline: error of the model as given, of a plain regression and of persistence, and where it loses to them.
@@ -91,6 +93,7 @@ class Diagnosis(Answer):
     inseparable: dict[str, list[list[str]]] = field(default_factory=dict)
     stated: dict[str, dict[str, float]] = field(default_factory=dict)
     unsure: list[str] = field(default_factory=list)
+    refitted: RefittedCoefficients | None = None
 
     @property
     def surfaces(self) -> list[dict[str, Any]]:
@@ -130,7 +133,10 @@ class Diagnosis(Answer):
         """What each name costs and what is left, as plain sentences."""
         from auvnn.diagnosis.answers import judged_words
         from auvnn.diagnosis.answers.moved_coefficients import moved_words
+        from auvnn.diagnosis.answers.refitted_coefficients import refitted_words
 
+        if self.refitted is not None:
+            return [*refitted_words(self.refitted), *judged_words.left(self)]
         told = judged_words.predicts(self) if self.verdict == "partial" else judged_words.costs(self)
         return [*told, *judged_words.left(self), *moved_words(self.moved)]
 
@@ -158,6 +164,7 @@ class Diagnosis(Answer):
             "left",
             "small_remainder",
             "moved",
+            "refitted",
             "tolerance",
             "judged_by",
             "judged_words",

@@ -15,6 +15,7 @@ from auvnn.diagnosis.answers.bounds import reservations
 from auvnn.diagnosis.answers.effect_costs import Worth, worth
 from auvnn.diagnosis.answers.joint import joint
 from auvnn.diagnosis.answers.moved_coefficients import moved
+from auvnn.diagnosis.answers.refitted_coefficients import refitted_coefficients
 from auvnn.diagnosis.answers.table import fill_candidate
 from auvnn.diagnosis.answers.told_names import costliest_first, known_to_pay, names_by_worth
 from auvnn.diagnosis.hypotheses.candidates import HORIZON, WARMUP
@@ -86,6 +87,7 @@ def answer(asked: Setting, state: State) -> Diagnosis:
         judged_by=found.words,
         stated=stated,
         unsure=unsure,
+        refitted=refitted_coefficients(asked, state) if verdict == "adequate" else None,
     )
 
 

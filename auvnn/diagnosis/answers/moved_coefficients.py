@@ -13,10 +13,25 @@ FAR, NAMED = 2.0, 6
 
 
 def moved(layout: Layout, found: FittedHypothesis) -> list[MovedCoefficient]:
-    """Return stated coefficients that moved by more than two of their standard deviations, the furthest first.
+    """Return stated coefficients that moved by more than two of their standard deviations, the furthest first; `within`.
+
+    Args:
+        layout: stated values.
+        found: the fit.
+    """
+    return within(layout, found, FAR)
+
+
+def within(layout: Layout, found: FittedHypothesis, least: float) -> list[MovedCoefficient]:
+    """Return stated coefficients that moved by more than so many of their standard deviations, the furthest first.
 
     Each is a factor on what the vehicle's file states, which is one; `deviations` says by how many of the stated standard
     deviations it has left that. Groups that were asked for as effects are reported as effects.
+
+    Args:
+        layout: stated values.
+        found: the fit.
+        least: stated standard deviations.
     """
     out: list[MovedCoefficient] = []
     for name, own in layout.places(found.names).items():
@@ -31,7 +46,7 @@ def moved(layout: Layout, found: FittedHypothesis) -> list[MovedCoefficient]:
             strict=True,
         ):
             away = float((value - mean) / size)
-            if abs(away) > FAR:
+            if abs(away) > least:
                 out.append(
                     {
                         "group": name,
@@ -48,7 +63,7 @@ def moved_words(found: list[MovedCoefficient]) -> list[str]:
     """Return that in words, one sentence or none."""
     if not found:
         return []
-    told = [_one(m) for m in found[:NAMED]]
+    told = [told_as(m) for m in found[:NAMED]]
     more = f", and {len(found) - NAMED} more" if len(found) > NAMED else ""
     return [
         "Stated coefficients moved by more than two of their standard deviations (how many in brackets): "
@@ -58,7 +73,12 @@ def moved_words(found: list[MovedCoefficient]) -> list[str]:
     ]
 
 
-def _one(one: MovedCoefficient) -> str:
+def told_as(one: MovedCoefficient) -> str:
+    """Return one coefficient in words: its name, what it became, and by how many stated standard deviations.
+
+    Args:
+        one: the coefficient.
+    """
     name = f"{one['group']}.{one['coefficient']}"
     size = f"times {one['fitted'] / one['stated']:.3g}" if one["stated"] else f"{one['fitted']:.3g}"
     return f"{name} {size} ({one['deviations']:+.1f})"

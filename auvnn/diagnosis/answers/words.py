@@ -10,6 +10,7 @@ import numpy as np
 from auvnn.answer_types import Parameters
 from auvnn.diagnosis.answers import judged_words
 from auvnn.diagnosis.answers.moved_coefficients import moved_words
+from auvnn.diagnosis.answers.refitted_coefficients import refitted_words
 from auvnn.diagnosis.noise_law.words import stochastic_words
 from auvnn.effects import EFFECTS
 
@@ -50,8 +51,9 @@ def tell(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.verdict == "adequate":
         return [
             _adequate(diagnosis),
+            *refitted_words(diagnosis.refitted),
             *judged_words.left(diagnosis),
-            *moved_words(diagnosis.moved),
+            *(moved_words(diagnosis.moved) if diagnosis.refitted is None else []),
         ]
     if diagnosis.verdict == "partial":
         return [

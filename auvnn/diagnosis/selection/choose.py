@@ -100,7 +100,7 @@ class Chooser(Pruning):
         # Evidence counts an effect of many parameters low while it is small; a test that is clear even among
         # all the others lets it be judged by what it does on runs left out.
         clear = {s.effect for s in significant if s.p_value < ALPHA / len(scores)}
-        beside = Beside(self.layout, self.windows, at, base, chosen, current)
+        beside = Beside(self.layout, self.windows, at, base, chosen, current, tuple(scores))
         tried, failed = fitted_beside(beside, leading, self.pool, self.say)
         more = rivals_to_fit(tried, significant, current)
         tried += fitted_beside(beside, more, self.pool, self.say)[0]

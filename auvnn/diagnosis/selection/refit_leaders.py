@@ -1,16 +1,24 @@
-"""The leading effects of a round, each refitted beside what was found: none has to wait for another."""
+"""The leading effects of a round, each refitted beside what was found: none has to wait for another.
+
+What moves the water is refitted a second time, together with how much of that the drag alone feels: in a simulator that
+puts the current into the drag alone, a current that all terms feel explains next to nothing.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
+from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, log_evidence
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess, shapes
 from auvnn.diagnosis.hypotheses.within_record import within_record
 from auvnn.diagnosis.score_tests.score import Score
+from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
+from auvnn.diagnosis.selection.acting_together import begin_beside, comes_with
+from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.executors import Executor
@@ -32,6 +40,7 @@ class Beside:
         base: effects that are free anyway.
         chosen: effects found before.
         current: the fit without any of those that remain.
+        open_to: effects that may be named.
     """
 
     layout: Layout
@@ -40,6 +49,7 @@ class Beside:
     base: list[str]
     chosen: list[str]
     current: FittedHypothesis
+    open_to: Sequence[str] = ()
 
 
 def fitted_beside(
@@ -70,17 +80,31 @@ def fitted_beside(
 def _fitted(beside: Beside, candidate: Score) -> FittedHypothesis | str:
     """Return an effect fitted, or why it could not be: a task of an executor."""
     try:
-        return refitted(beside, candidate)
+        alone = refitted(beside, candidate)
     except (FitError, np.linalg.LinAlgError) as problem:
         return str(problem)
+    for other in comes_with(candidate.effect, beside.chosen, beside.open_to, beside.base):
+        with suppress(FitError, np.linalg.LinAlgError):
+            alone = _likelier(beside.layout, alone, refitted(beside, candidate, other))
+    return alone
 
 
-def refitted(beside: Beside, candidate: Score) -> FittedHypothesis:
+def _likelier(layout: Layout, alone: FittedHypothesis, pair: FittedHypothesis) -> FittedHypothesis:
+    """Return two effects for one where they are likelier by as much as a name needs."""
+    sums = [e.fitted.statistics for e in (alone, pair)]
+    factor = min(variance_inflation(s.slope, s.total, s.run) for s in sums)
+    gain = log_evidence(layout, pair, factor).evidence - log_evidence(layout, alone, factor).evidence
+    return pair if gain > ODDS else alone
+
+
+def refitted(beside: Beside, candidate: Score, other: str | None = None) -> FittedHypothesis:
     """Return an effect fitted beside what was found, from where its test points.
 
     Args:
         beside: what was found.
         candidate: its test.
+        other: an effect that acts beside it only, and is fitted with it; from the null of the former, for what its test
+            says holds for it alone.
 
     Raises:
         FitError: it has nowhere to begin.
@@ -91,7 +115,10 @@ def refitted(beside: Beside, candidate: Score) -> FittedHypothesis:
     start, shape = initial_guess(beside.layout, name, candidate.estimate), shapes(beside.layout, name)
     found: FittedHypothesis | None = None
     problem: FitError | None = None
-    for share in SHARES:
+    together = [] if other is None else [other]
+    for effect in together:
+        set_parameters(guess, [effect], begin_beside(beside.layout, effect))
+    for share in SHARES if other is None else (0.0,):
         begin = np.where(shape, start, known + share * (start - known))
         set_parameters(guess, [name], begin)
         try:
@@ -99,7 +126,7 @@ def refitted(beside: Beside, candidate: Score) -> FittedHypothesis:
                 beside.layout,
                 beside.windows,
                 beside.base,
-                [*beside.chosen, name],
+                [*beside.chosen, *together, name],
                 start=current.fitted,
                 guess=replace(at, model=guess),
                 sigma=current.fitted.sigma,

@@ -15,6 +15,7 @@ from auvnn.diagnosis.hypotheses.refine_step import refine_step
 from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
 from auvnn.diagnosis.residuals.forces import exerts_less
 from auvnn.diagnosis.score_tests.score import Score
+from auvnn.diagnosis.selection.acting_together import in_order
 from auvnn.diagnosis.selection.choose import ALPHA, LITTLE
 from auvnn.diagnosis.selection.model_comparison import forms_that_leave
 from auvnn.diagnosis.stages.state import Setting, State
@@ -82,7 +83,7 @@ def search_round(
     if choice.best is None:
         verdict = "unknown" if p_value < ALPHA_UNKNOWN else rest(asked, state.current)
         return state.step(verdict, [], p_value).but(ended=True, last_tests=(state.current, tested))
-    new = [e for e in choice.best.effects if e not in chosen]
+    new = in_order([e for e in choice.best.effects if e not in chosen])
     alike = {e.effects[-1]: group[0].effects[-1] for group in state.groups for e in group[1:]}
     for name in new:
         state = state.apart(name)

@@ -43,6 +43,8 @@ class DiagnosisPage(Page):
             return f"What the model has at other values: {listing(missing)}"
         if verdict == "named" and missing:
             return f"What is missing: {listing(missing)}"
+        if verdict == "adequate" and view.mapping("refitted"):
+            return "No effect is missing that this log could show; the stated coefficients are off"
         return {
             "ambiguous": f"What is missing: {listing(missing, 'or')}",
             "partial": f"Something is missing, a part of which can be predicted by {listing(view.texts('nearest'))}",

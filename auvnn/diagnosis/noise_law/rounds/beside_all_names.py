@@ -26,10 +26,10 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis, predicts_better
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
-from auvnn.diagnosis.noise_law.rounds.acting_together import last_names
 from auvnn.diagnosis.noise_law.rounds.leaders import RIVALS
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import RIVALS_SHARE
 from auvnn.diagnosis.noise_law.rounds.path import with_last
+from auvnn.diagnosis.selection.acting_together import last_names
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.diagnosis.selection.rivals import Rivals
 from auvnn.effects import effect_class

@@ -15,13 +15,13 @@ from auvnn.diagnosis.hypotheses.within_record import within_record
 from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
 from auvnn.diagnosis.noise_law.rounds.a_round import Round
-from auvnn.diagnosis.noise_law.rounds.acting_together import (
+from auvnn.diagnosis.noise_law.rounds.leaders import contained_in, rivals_of
+from auvnn.diagnosis.selection.acting_together import (
     begin_beside,
     comes_with,
     last_names,
     worth_fitting_together,
 )
-from auvnn.diagnosis.noise_law.rounds.leaders import contained_in, rivals_of
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.executors import Executor

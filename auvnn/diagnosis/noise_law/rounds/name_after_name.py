@@ -18,7 +18,6 @@ from auvnn.diagnosis.noise_law.hypothesis import (
     tied,
 )
 from auvnn.diagnosis.noise_law.rounds.a_round import Round, RoundResult
-from auvnn.diagnosis.noise_law.rounds.acting_together import named_with
 from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import (
     RIVALS_SHARE,
@@ -33,6 +32,7 @@ from auvnn.diagnosis.noise_law.rounds.path import Path
 from auvnn.diagnosis.noise_law.under_law import NULL_STEPS, UnderLaw
 from auvnn.diagnosis.residuals.forces import exerts_less
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
+from auvnn.diagnosis.selection.acting_together import named_with
 from auvnn.diagnosis.selection.choose import ALPHA, LITTLE
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused, forms_that_leave
 from auvnn.diagnosis.stages.state import Setting
@@ -143,7 +143,7 @@ class NameAfterName(UnderLaw):
             if len(group) > 1:
                 path.groups.append([current.explanation, *(h.explanation for h in group[1:])])
             path.chosen.append(group[0].name)
-            for name in named_with(group[0], path.chosen):
+            for name in named_with(group[0].explanation.effects, path.chosen):
                 path.steps.append({**path.steps[-1], "verdict": "named", "effects": [name]})
                 path.chosen.append(name)
                 # Told in the order of the steps, whoever goes on from there: first what moves the water.

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, shapes
-from auvnn.diagnosis.noise_law.hypothesis import Hypothesis
 from auvnn.diagnosis.selection.model_comparison import confused
 from auvnn.effects import EFFECTS, effect_class
 from auvnn.effects.acting_beside import needed_beside
@@ -79,11 +78,20 @@ def last_names(effects: Sequence[str]) -> list[str]:
     return [*[n for n in effects[:-1] if effects[-1] in effect_class(n).acts_with], effects[-1]]
 
 
-def named_with(found: Hypothesis, chosen: Sequence[str]) -> list[str]:
+def in_order(effects: Sequence[str]) -> list[str]:
+    """Return names in the order in which they are told: what acts beside others only comes after them.
+
+    Args:
+        effects: names that were found together.
+    """
+    return sorted(effects, key=lambda n: bool({*effect_class(n).acts_with} & {*effects}))
+
+
+def named_with(effects: Sequence[str], chosen: Sequence[str]) -> list[str]:
     """Return the names that come with the last effect of an explanation.
 
     Args:
-        found: the explanation.
+        effects: of the explanation.
         chosen: names that were found before, the last effect among them.
     """
-    return [n for n in found.explanation.effects if n not in chosen]
+    return [n for n in effects if n not in chosen]

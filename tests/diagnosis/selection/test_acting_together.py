@@ -13,12 +13,12 @@ from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.hypothesis import p_value_of
 from auvnn.diagnosis.noise_law.rounds import leader_fits
 from auvnn.diagnosis.noise_law.rounds.a_round import Round
-from auvnn.diagnosis.noise_law.rounds.acting_together import comes_with, last_names, worth_fitting_together
 from auvnn.diagnosis.noise_law.rounds.beside_all_names import refitted
 from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import Branch, shared
 from auvnn.diagnosis.noise_law.rounds.path import Path
 from auvnn.diagnosis.noise_law.search import _to_ask
+from auvnn.diagnosis.selection.acting_together import comes_with, last_names, worth_fitting_together
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of
@@ -42,7 +42,7 @@ def test_where_a_simulators_simplification_was_found_the_other_one_is_asked_for(
 
 
 def test_before_any_name_what_moves_the_water_is_fitted_with_it_where_it_is_fitted_anyway():
-    """A simulator may put the current into the drag alone: then a current that all terms feel explains next to nothing."""
+    """With a current in the drag alone, as in simulators, one that all terms feel explains next to nothing."""
     assert [comes_with(n, [], OPEN) for n in [*WATER, "payload"]] == [["drag_only_current"]] * 3 + [[]]
     assert comes_with("ocean_current", [], OPEN, ["waves"]) == comes_with("ocean_current", [], WATER) == []
     layout = lay_out(GreyBox(small_vehicle()), OPEN)
