@@ -25,6 +25,7 @@ EFFECTS = Catalogue(
         "trapped_water": "auvnn.effects.trapped_water:TrappedWater",
         "linear_damping": "auvnn.effects.linear_damping:LinearDamping",
         "quadratic_damping": "auvnn.effects.quadratic_damping:QuadraticDamping",
+        "unstated_damping": "auvnn.effects.unstated_damping:UnstatedDamping",
         "drag_curve": "auvnn.effects.drag_curve:DragCurve",
         "coupled_damping": "auvnn.effects.coupled_damping:CoupledDamping",
         "cross_flow_drag": "auvnn.effects.cross_flow_drag:CrossFlowDrag",

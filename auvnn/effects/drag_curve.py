@@ -26,10 +26,10 @@ class DragCurve(Effect):
     cause = "the drag grows with another power of the speed"
     symbol = "n"
     reference = "Hoerner (1965), Fluid-Dynamic Drag, chapter 2"
-    confused_with = ("quadratic_damping", "linear_damping", "thrust_inflow_loss")
+    confused_with = ("quadratic_damping", "linear_damping", "unstated_damping", "thrust_inflow_loss")
     manoeuvre = "coast_down"
     told_apart_by = "coasting without thrust over at least four to one in speed"
-    plainer = ("quadratic_damping", "linear_damping")
+    plainer = ("quadratic_damping", "linear_damping", "unstated_damping")
     is_drag = True
 
     @classmethod

@@ -106,5 +106,6 @@ CHANGES: dict[str, dict[str, Any]] = {
     "velocity_scale": {"sensors": lambda nu: nu * [1.03, 1.03, 1.03, 1, 1, 1]},
     "velocity_misalignment": {"sensors": _turned},
 }
-# The class lets a current act in the drag alone, which has a name of its own.
-ALSO = {"ocean_current": ("drag_only_current",)}
+# The class lets a current act in the drag alone, which has a name of its own; the linear damping that is hidden is one
+# that the model does not state at all, which has had one since these changes were first asked for.
+ALSO = {"ocean_current": ("drag_only_current",), "linear_damping": ("unstated_damping",)}

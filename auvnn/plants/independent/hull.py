@@ -107,6 +107,15 @@ def _coupled(hull: Hull, values: Values, vehicle: Vehicle) -> None:
         hull.quadratic[AXES.index(name[0]), SPEEDS.index(name[1])] -= value
 
 
+def _unstated(hull: Hull, values: Values, vehicle: Vehicle) -> None:
+    # Names such as "linear_Y": what resists a unit of velocity, or of its square, in that degree of freedom.
+    hull.linear, hull.quadratic = hull.linear.copy(), hull.quadratic.copy()
+    for name, value in values.items():
+        kind, axis = name.split("_")
+        matrix = hull.linear if kind == "linear" else hull.quadratic
+        matrix[AXES.index(axis), AXES.index(axis)] += value
+
+
 def _inertia(hull: Hull, values: Values, vehicle: Vehicle) -> None:
     hull.lumps[0].inertia = _both_sides(hull.lumps[0].inertia, _each(values, AXES[3:]))
 
@@ -128,6 +137,7 @@ CHANGES: dict[str, Callable[[Hull, Values, Vehicle], None]] = {
     "linear_damping": _linear,
     "quadratic_damping": _quadratic,
     "coupled_damping": _coupled,
+    "unstated_damping": _unstated,
     "inertia": _inertia,
     "cg_offset": _cg,
     "net_buoyancy": _net_buoyancy,
