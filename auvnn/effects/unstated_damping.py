@@ -56,16 +56,16 @@ class UnstatedDamping(Effect):
 
     def settle(self, vehicle: Any, actuation: str) -> None:
         """Keep where each coefficient stands in its matrix."""
-        place = np.zeros((2, len(self.parameters_of), 6, 6))
+        place = np.zeros((len(self.parameters_of), 2, 6, 6))
         for j, p in enumerate(self.parameters_of):
             kind, _, axis = p.name.partition("_")
             i = AXES.index(axis)
-            place[KINDS.index(kind), j, i, i] = 1.0
+            place[j, KINDS.index(kind), i, i] = 1.0
         self.keep("place", place)
 
     def body(self, body: Body, moment: Moment | None) -> Body:
         """Add to the damping, of which there may have been none."""
-        more = torch.tensordot(self.theta, self.kept("place"), dims=([0], [1])).to(body.added_mass)
+        more = torch.tensordot(self.theta, self.kept("place"), dims=1).to(body.added_mass)
         if self._has("linear"):
             body = body.but(linear=more[0] if body.linear is None else body.linear + more[0])
         if self._has("quadratic"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ MOTION = ("qw", "qx", "qy", "qz", "u", "v", "w", "p", "q", "r", "x", "y", "z")
 Change = Callable[[Any], None]
 
 
-class Changed:
+class Changed(ABC):
     """A vehicle of a simulator, with what is changed of it.
 
     Args:
@@ -49,9 +50,9 @@ class Changed:
         self.command = command or (lambda given: given)
         self.sensors = sensors or (lambda nu: nu)
 
+    @abstractmethod
     def run(self, seed: int) -> np.ndarray:
         """Return the rows of one run, (samples, 1 + columns)."""
-        raise NotImplementedError
 
     def write(self, path: Path, seed: int) -> Path:
         """Write a log of all runs."""

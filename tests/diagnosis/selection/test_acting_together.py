@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from auvnn import diagnose, load, simulate
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.hypothesis import p_value_of
 from auvnn.diagnosis.noise_law.rounds import leader_fits
@@ -18,7 +19,8 @@ from auvnn.diagnosis.noise_law.rounds.leader_fits import LeaderFits
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import Branch, shared
 from auvnn.diagnosis.noise_law.rounds.path import Path
 from auvnn.diagnosis.noise_law.search import _to_ask
-from auvnn.diagnosis.selection.acting_together import comes_with, last_names, worth_fitting_together
+from auvnn.diagnosis.selection import refit_leaders
+from auvnn.diagnosis.selection.acting_together import comes_with, in_order, last_names, worth_fitting_together
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of
@@ -202,3 +204,73 @@ def test_a_pair_with_a_third_effect_is_no_pair_of_the_other_branch():
     branches = [Branch(one, one, (two,)), Branch(other, other, ())]
     assert [h.explanation.effects for _, h in shared(branches)] == [("waves", "payload")]
     assert shared([Branch(one, one, (three,)), Branch(other, other, ())]) == []
+
+
+def test_they_are_told_in_the_order_in_which_one_needs_the_other():
+    assert in_order(["drag_only_current", "ocean_current"]) == ["ocean_current", "drag_only_current"]
+    assert in_order(["payload", "added_mass"]) == ["payload", "added_mass"]
+    # Beside a current that was there before, it may come first.
+    assert in_order(["drag_only_current", "payload"]) == ["drag_only_current", "payload"]
+
+
+@pytest.fixture(scope="module")
+def in_the_drag_alone():
+    """A log of a vehicle in a current that its drag alone feels, as simulators have it."""
+    hidden = {"ocean_current": {"v_north": 0.15, "v_east": -0.1}, "drag_only_current": {"share": 1.0}}
+    return simulate("bluerov2_heavy", hidden=hidden, runs=3, duration=20, rate=20, noise="realistic", seed=5)
+
+
+def test_the_first_search_finds_a_current_that_the_drag_alone_feels(in_the_drag_alone):
+    asked = [
+        *LEFT_OUT,
+        "ocean_current",
+        "drag_only_current",
+        "drag_curve",
+        "quadratic_damping",
+        "turning_forces",
+    ]
+    found = diagnose(load("bluerov2_heavy"), in_the_drag_alone, effects=asked, stochastic=False, advice=False)
+    # In one step: neither stands without the other.
+    assert found.steps[0]["effects"] == found.missing == ["ocean_current", "drag_only_current"]
+    values = {c["effect"]: c["parameters"] for c in found.candidates}
+    for name, parameter, truth in (
+        ("ocean_current", "v_north", 0.15),
+        ("ocean_current", "v_east", -0.1),
+        ("drag_only_current", "share", 1.0),
+    ):
+        told = values[name][parameter]
+        assert abs(told["value"] - truth) < 3.0 * told["std"] and told["std"] < 0.1
+
+
+@pytest.mark.parametrize("ahead", [ODDS + 1.0, ODDS - 1.0])
+def test_a_pair_of_the_first_search_must_be_likelier_by_what_a_name_needs(monkeypatch, ahead):
+    asked = []
+
+    def fit(beside, candidate, other=None):
+        asked.append(other)
+        sums = SimpleNamespace(slope=None, total=None, run=None)
+        return SimpleNamespace(
+            fitted=SimpleNamespace(statistics=sums), evidence=0.0 if other is None else ahead
+        )
+
+    monkeypatch.setattr(refit_leaders, "refitted", fit)
+    monkeypatch.setattr(refit_leaders, "variance_inflation", lambda *_: 1.0)
+    monkeypatch.setattr(refit_leaders, "log_evidence", lambda layout, e, factor: e)
+    beside: Any = SimpleNamespace(layout=None, chosen=[], open_to=OPEN, base=[])
+    found = refit_leaders._fitted(beside, SimpleNamespace(effect="ocean_current"))  # type: ignore[arg-type]
+    assert asked == [None, "drag_only_current"]
+    assert found.evidence == (ahead if ahead > ODDS else 0.0)
+    asked.clear()
+    refit_leaders._fitted(beside, SimpleNamespace(effect="payload"))  # type: ignore[arg-type]
+    assert asked == [None]
+
+
+def test_a_pair_that_cannot_be_fitted_leaves_the_effect_alone(monkeypatch):
+    def fit(beside, candidate, other=None):
+        if other is not None:
+            raise FitError("no")
+        return "alone"
+
+    monkeypatch.setattr(refit_leaders, "refitted", fit)
+    beside: Any = SimpleNamespace(layout=None, chosen=[], open_to=OPEN, base=[])
+    assert refit_leaders._fitted(beside, SimpleNamespace(effect="ocean_current")) == "alone"  # type: ignore[arg-type]
