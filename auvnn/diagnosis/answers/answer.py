@@ -54,7 +54,7 @@ class Diagnosis(Answer):
         left: degree of freedom to the force without a name, and the smallest that this log would have shown.
         small_remainder: whether a force is left that does not matter.
         moved: stated coefficients that were moved by more than two of their standard deviations.
-        refitted: of an adequate verdict, what refitting the stated coefficients brings; None where that does not matter.
+        refitted: what refitting the stated coefficients brings beside the names; None where that does not matter.
         tolerance: what does not matter.
         judged_by: how the costs were worked out.
         baseline: error of the model as given, of a plain regression and of persistence, and where it loses to them.
@@ -135,10 +135,11 @@ class Diagnosis(Answer):
         from auvnn.diagnosis.answers.moved_coefficients import moved_words
         from auvnn.diagnosis.answers.refitted_coefficients import refitted_words
 
-        if self.refitted is not None:
-            return [*refitted_words(self.refitted), *judged_words.left(self)]
         told = judged_words.predicts(self) if self.verdict == "partial" else judged_words.costs(self)
-        return [*told, *judged_words.left(self), *moved_words(self.moved)]
+        if self.refitted is None:
+            return [*told, *judged_words.left(self), *moved_words(self.moved)]
+        off = refitted_words(self.refitted, None if self.verdict == "adequate" else self.matters)
+        return [*told, *off, *judged_words.left(self)]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON answer."""

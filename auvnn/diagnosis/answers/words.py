@@ -10,7 +10,7 @@ import numpy as np
 from auvnn.answer_types import Parameters
 from auvnn.diagnosis.answers import judged_words
 from auvnn.diagnosis.answers.moved_coefficients import moved_words
-from auvnn.diagnosis.answers.refitted_coefficients import refitted_words
+from auvnn.diagnosis.answers.refitted_coefficients import above_all, refitted_words
 from auvnn.diagnosis.noise_law.words import stochastic_words
 from auvnn.effects import EFFECTS
 
@@ -96,13 +96,16 @@ def tell(diagnosis: Diagnosis) -> list[str]:
             f"{_series(diagnosis.nearest)} {'comes' if one else 'come'} nearest, and "
             f"{'leaves' if one else 'leave'} too much of it to be the cause."
         )
+    off = refitted_words(diagnosis.refitted, diagnosis.matters)
+    # What costs the predictions most is told first.
+    lines = [*off, *lines] if above_all(diagnosis.refitted, diagnosis.matters) else [*lines, *off]
     return [
         *lines,
         *_where(diagnosis),
         *judged_words.left(diagnosis),
         *stochastic_words(diagnosis.stochastic),
         *_dependence(diagnosis),
-        *moved_words(diagnosis.moved),
+        *(moved_words(diagnosis.moved) if diagnosis.refitted is None else []),
     ]
 
 

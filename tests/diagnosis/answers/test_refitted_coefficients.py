@@ -86,6 +86,17 @@ def test_nothing_is_worked_out_where_costs_decide_nothing(log, options, monkeypa
     assert found.refitted is None
 
 
+def test_what_is_within_the_tolerance_is_not_told(log):
+    found = diagnose(
+        GreyBox(vehicle()),
+        log,
+        effects=["net_buoyancy"],
+        advice=False,
+        tolerance={"cost": 99.0, "force": 0.9},
+    )
+    assert found.verdict == "adequate" and found.refitted is None
+
+
 def test_a_log_that_is_too_short_to_leave_a_part_out_has_an_answer_without_it():
     short = make_log(GreyBox(vehicle(1.4)), runs=1, duration=4.0, noise=1.0, seed=6)
     found = diagnose(GreyBox(vehicle()), short, effects=["net_buoyancy"], advice=False)
@@ -102,5 +113,73 @@ def test_many_coefficients_are_told_in_part():
         "coefficients": [one] * 9,
     }
     (words,) = refitted_words(many)
+    assert words.startswith("That holds with the stated coefficients refitted")
     assert words.count("added_mass.X times 1.2 (+2.0)") == 6 and "and 3 more" in words
     assert "0.5 over 5 s of free running, refitted by 0.1" in words
+
+
+def told(value):
+    return {
+        "before": 0.5,
+        "after": 0.5 - value,
+        "horizon": 5.0,
+        "gain": {"value": value, "std": 0.01},
+        "coefficients": [],
+    }
+
+
+@pytest.mark.parametrize(
+    ("gains", "begin"),
+    [([0.2], "Above all"), ([0.4], "Beside that"), ([0.2, 0.4], "Beside that"), ([None], "Above all")],
+)
+def test_beside_names_it_says_which_of_them_predictions_suffer_from_most(gains, begin):
+    matters = {
+        str(k): {"gain": None if g is None else {"value": g, "std": 0.01}} for k, g in enumerate(gains)
+    }
+    (words,) = refitted_words(told(0.3), matters)
+    assert words.startswith(f"{begin} the stated coefficients are off")
+    assert "the model, with what is named, errs by 0.5" in words
+
+
+@pytest.fixture(scope="module")
+def heavier():
+    """A vehicle whose drag is off within what is stated of it, and that a force pushes down besides."""
+    truth = GreyBox(vehicle(1.4)).with_effects({"net_buoyancy": {"force": -6.0}})
+    log = make_log(truth, runs=3, duration=30.0, noise=1.0, seed=4)
+    return diagnose(GreyBox(vehicle()), log, effects=["net_buoyancy", "cg_offset"], advice=False), log
+
+
+def test_beside_a_name_only_the_coefficients_are_as_stated(heavier):
+    found, log = heavier
+    assert found.missing == ["net_buoyancy"]
+    named = GreyBox(vehicle()).with_effects({"net_buoyancy": {"force": -6.0}})
+    scale = scale_of(log)
+    assert found.refitted["before"] == pytest.approx(roll(named, log, "5", scale).total(scale), rel=0.1)
+    # The name is not what the coefficients bring.
+    bare = roll(GreyBox(vehicle()), log, "5", scale).total(scale)
+    assert found.refitted["before"] < 0.95 * bare
+    assert found.refitted["after"] < 0.5 * found.refitted["before"]
+    assert {c["group"] for c in found.refitted["coefficients"]} <= {
+        "added_mass",
+        "linear_damping",
+        "quadratic_damping",
+        "inertia",
+    }
+
+
+def test_what_predictions_suffer_from_most_is_said_first(heavier):
+    found, _ = heavier
+    gain = found.matters["net_buoyancy"]["gain"]["value"]
+    first = "Above all" if found.refitted["gain"]["value"] > gain else "Missing: net_buoyancy"
+    assert found.story[0].startswith(first)
+    more = replace(found, refitted={**found.refitted, "gain": {"value": 0.5 * gain, "std": 0.0}})
+    assert more.story[0].startswith("Missing: net_buoyancy")
+    assert any(line.startswith("Beside that the stated") for line in more.story)
+
+
+def test_where_something_without_a_name_is_left_coefficients_take_up_what_they_can_of_it(heavier):
+    """So nothing is said of them."""
+    _, log = heavier
+    found = diagnose(GreyBox(vehicle()), log, effects=["gyro_bias"], advice=False)
+    assert found.verdict in ("unknown", "partial") and found.refitted is None
+    assert not any("stated coefficients are off" in line for line in found.story)
