@@ -112,7 +112,8 @@ def main(checkout: str, out: Path, wanted: list[str], seed: int = SEED) -> None:
     for k, (name, changed) in enumerate(study.changes.items()):
         if wanted and name not in wanted:
             continue
-        log = study.plant(module, **changed).write(out / f"{name}.parquet", seed + k)
+        log = auvnn.Log.read(study.plant(module, **changed).write(out / f"{name}.parquet", seed + k))
+        error = auvnn.compare(str(model), log).to_dict()["rollout"]["5"]["total"]
         began = time.monotonic()
         found = auvnn.diagnose(str(model), log)
         groups = [s["effects"] for s in found.steps if s["effects"]]
@@ -122,10 +123,11 @@ def main(checkout: str, out: Path, wanted: list[str], seed: int = SEED) -> None:
             "verdict": found.verdict,
             "groups": groups,
             "first": bool(groups) and any(n in groups[0] for n in true),
+            "error": round(error, 3),
             "seconds": round(time.monotonic() - began, 1),
         }
         said = ", then ".join(" or ".join(g) for g in groups) or found.verdict
-        print(f"{name:<22} {said} ({found.verdict}, {row['seconds']:.0f} s)", flush=True)
+        print(f"{name:<22} {said} ({found.verdict}, {row['seconds']:.0f} s; errs by {error:.3f})", flush=True)
         done = out / "answers.json"
         known = json.loads(done.read_text()) if done.exists() else []
         kept = [r for r in known if r["hidden"] != name] + [row]

@@ -378,3 +378,35 @@ def test_the_names_hidden_in_the_rov_are_those_of_the_catalogue(rov):
     assert {*study.changes, *(n for names in study.also.values() for n in names)} - {"nothing"} <= set(
         EFFECTS.names()
     )
+
+
+def test_the_page_on_the_rov_tells_what_came_out(rov):
+    study = rov[1].BLUEROV2
+    text = (HERE / "bluerov2.md").read_text()
+    first, other = (
+        {r["hidden"]: r for r in json.loads((HERE / f"expected-bluerov2{which}.json").read_text())}
+        for which in ("-first", "")
+    )
+    told = {
+        n: cells
+        for n, *cells in re.findall(
+            r"^\| `?(\w+)`? \| (.*?) \| (.*?) \| [^|]* \| ([\d., ]+) \| ([\d, ]+) \|$", text, re.M
+        )
+    }
+    assert set(told) == set(first) == set(other) == set(study.changes)
+    for name, (before, after, errors, seconds) in told.items():
+        for row, said in ((first[name], before), (other[name], after)):
+            expected = ", then ".join(" or ".join(f"`{e}`" for e in group) for group in row["groups"])
+            assert said.replace("**", "") == (expected or row["verdict"]), name
+        assert errors == f"{first[name]['error']:.2f}, {other[name]['error']:.2f}"
+        assert seconds == f"{first[name]['seconds']:.0f}, {other[name]['seconds']:.0f}"
+    for words, rows in (("First logs", first), ("Other logs, by present rules", other)):
+        right = {n: {n, *study.also.get(n, ())} for n in rows}
+        hits = [r for n, r in rows.items() if n != "nothing" and right[n] & {*(r["groups"] or [[]])[0]}]
+        wrong = [r for n, r in rows.items() if r["groups"] and not right[n] & {*r["groups"][0]}]
+        alone = sum(len(r["groups"][0]) == 1 for r in hits)
+        assert (
+            f"- {words}: {len(hits)} of {len(rows) - 1} are named first, {alone} of them alone, and a wrong name comes "
+            f"first in {len(wrong)} of {len(rows)}." in text
+        )
+        assert round(float(np.median([r["seconds"] for r in rows.values()]))) == 99
