@@ -92,6 +92,7 @@ class RefittedCoefficients(TypedDict):
     horizon: float
     gain: Fall
     coefficients: list[MovedCoefficient]
+    command: str
 
 
 class OwnFall(TypedDict):

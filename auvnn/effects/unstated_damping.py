@@ -10,6 +10,7 @@ import torch
 from auvnn.effects.base import AXES, Effect
 from auvnn.effects.hooks import Body, Moment, Parameter
 from auvnn.effects.sizes import translational_drag, usual_speeds
+from auvnn.physics.drag import element_transform
 
 KINDS = ("linear", "quadratic")
 
@@ -84,19 +85,19 @@ def _unit(kind: str, axis: str) -> str:
 
 
 def _coefficients(vehicle: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Return what is stated of both kinds in each degree of freedom, (2, 6); of displaced elements its order."""
+    """Return what is stated of both kinds in each degree of freedom, (2, 6), displaced elements in it."""
     out = np.zeros((2, 6))
     for k, kind in enumerate(KINDS):
         matrix = getattr(vehicle, f"{kind}_damping")
         if matrix is not None:
             out[k] += np.diag(matrix)
         for element in vehicle.damping_elements:
-            own = np.asarray(getattr(element, kind))
-            turn = np.abs(element.axes)
-            force, arm = turn @ own[:3], np.abs(element.position)
-            turned = np.array([arm[1] + arm[2], arm[0] + arm[2], arm[0] + arm[1]]) ** (2 + k) * force.max()
-            out[k] += np.concatenate([force, turn @ own[3:] + turned])
-    return out
+            place, axes = (torch.tensor(np.array(x)) for x in (element.position, element.axes))
+            # What resists a unit of velocity in each degree of freedom: T^T D |T nu|^k T nu.
+            out[k] += np.asarray(getattr(element, kind)) @ np.abs(element_transform(place, axes).numpy()) ** (
+                2 + k
+            )
+    return np.where(out > 1e-9 * out.max(), out, 0.0)
 
 
 def _stated(vehicle: Any) -> np.ndarray[Any, np.dtype[np.bool_]]:

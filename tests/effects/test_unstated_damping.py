@@ -8,8 +8,11 @@ import torch
 
 import auvnn
 from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.hypotheses.put_into_model import holding
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.effects.unstated_damping import UnstatedDamping
 from auvnn.errors import ConfigError
+from auvnn.estimation.priors import set_parameters
 from auvnn.models import GreyBox
 from auvnn.testing import plain_vehicle
 from auvnn.vehicle import Vehicle
@@ -38,10 +41,13 @@ def test_it_is_asked_for_where_something_is_not_stated_and_only_there():
     assert UnstatedDamping.lacks(partly, "thrusters") == ()
     full = plain_vehicle(linear_damping=[40.0] * 6, quadratic_damping=[40.0] * 6)
     assert UnstatedDamping.lacks(full, "thrusters")
-    # Displaced elements of the drag are stated drag: along their axes, and about the others by their lever arms.
+    # Displaced elements of the drag are stated drag: along their axes, and by their lever arms about others.
     element = {"position": [0.5, 0.3, 0.2], "axes": np.eye(3).tolist()}
     element |= {"linear": [5.0, 5, 5, 0, 0, 0], "quadratic": [9.0, 9, 9, 0, 0, 0]}
     assert UnstatedDamping.lacks(plain_vehicle(damping_elements=[element]), "thrusters")
+    ahead = {**element, "position": [0.5, 0.0, 0.0], "linear": [5.0] + [0] * 5, "quadratic": [9.0] + [0] * 5}
+    assert "linear_X" not in names(plain_vehicle(damping_elements=[ahead]))
+    assert {"linear_M", "linear_N", "quadratic_N"} <= {*names(plain_vehicle(damping_elements=[ahead]))}
     central = plain_vehicle(damping_elements=[{**element, "position": [0.0, 0.0, 0.0]}])
     assert names(central) == [f"{kind}_{a}" for kind in ("linear", "quadratic") for a in "KMN"]
 
@@ -136,3 +142,40 @@ def test_where_all_is_stated_the_table_says_why_it_was_not_asked(sideways):
     found = diagnose(GreyBox(full), log, effects=["unstated_damping", "net_buoyancy"], advice=False)
     row = next(c for c in found.candidates if c["effect"] == "unstated_damping")
     assert row["needs"] == ["damping that is not stated"]
+
+
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [
+        ("unstated_damping", {"linear_Y": 30.0, "linear_N": 4.0}),
+        ("coupled_damping", {"Nv": 12.0}),
+        ("payload", {"mass": 3.0, "x": 0.2, "time": 0.0}),
+    ],
+)
+def test_factors_on_stated_coefficients_leave_alone_what_the_models_effects_add(effect, values):
+    """What a fit has is what the model with its values in it has: the factors are on the vehicle's own numbers."""
+    vehicle = small_vehicle(0.1, linear_damping=[25.0, 0.0, 40.0, 4.0, 5.0, 0.0])
+    model = GreyBox(vehicle).with_effects({effect: values})
+    layout = lay_out(model, ["net_buoyancy", "drag_curve"])
+    groups = ["added_mass", "linear_damping", "quadratic_damping", "inertia"]
+    theta = np.linspace(0.8, 1.2, len(layout.of(groups)))
+    fitted = layout.model.rebuilt(layout.model.copied_effects())
+    set_parameters(fitted, groups, theta)
+    told = holding(model, layout, groups, theta, ())
+    for made in (fitted, told):
+        assert made.effect(effect).values() == model.effect(effect).values()
+    state = torch.tensor([0.3, 0.5, -0.2, 0.1, 0.2, 0.6], dtype=torch.float64)
+    eta = torch.tensor([0.0, 0, 5, 0, 0, 0], dtype=torch.float64)
+    command = torch.full((8,), 0.2, dtype=torch.float64)
+    with torch.no_grad():
+        torch.testing.assert_close(
+            fitted(eta, state, command), told(eta, state, command), rtol=1e-9, atol=1e-12
+        )
+
+
+def test_a_second_fit_finds_that_it_has_changed(sideways):
+    """The same effect is in the model at other values, beside factors on the damping that is stated."""
+    vehicle, log = sideways
+    before = GreyBox(vehicle).with_effects({"unstated_damping": {"linear_Y": 20.0, "linear_N": 2.5}})
+    better = auvnn.add(before, log, ["unstated_damping"], refit=True)
+    assert better.model.effect("unstated_damping").values()["linear_Y"] == pytest.approx(30.0, rel=0.2)

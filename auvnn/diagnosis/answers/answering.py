@@ -31,9 +31,6 @@ from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.effects.acting_beside import in_words, needed_beside
 from auvnn.estimation.prediction_error import FitError
 
-# Verdicts with which it is told what refitting the coefficients brings: where something without a name is missing, they
-# take up what they can of it.
-TOLD_WITH = ("adequate", "named", "ambiguous")
 # A force of one measured input surer than this is reported where no smooth function of the inputs was sure enough.
 SURE = 0.01
 
@@ -90,7 +87,7 @@ def answer(asked: Setting, state: State) -> Diagnosis:
         judged_by=found.words,
         stated=stated,
         unsure=unsure,
-        refitted=refitted_coefficients(asked, state) if verdict in TOLD_WITH else None,
+        refitted=refitted_coefficients(asked, state),
     )
 
 

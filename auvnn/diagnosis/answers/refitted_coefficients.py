@@ -20,6 +20,8 @@ from auvnn.diagnosis.cross_validation.left_out import left_out_by, left_out_foun
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.errors import InputError
+from auvnn.estimation.nuisance_elimination import NormalEquations
+from auvnn.estimation.priors import limits
 from auvnn.models import GreyBox
 
 # Standard errors by which the error must fall, and stated standard deviations from which on a coefficient is told.
@@ -30,44 +32,62 @@ NAMED = 6
 def refitted_coefficients(asked: Setting, state: State) -> RefittedCoefficients | None:
     """Return by how much free running on what is left out gains by the coefficients; None where that does not matter.
 
+    Nothing is said where something without a name is left: the coefficients take up what they can of it. Nor where
+    damping was learned: what stands for that in a diagnosis is not what the file states.
+
     Args:
         asked: what was asked.
         state: where the search ended.
     """
-    found = state.current
-    if not asked.costs or not asked.layout.nuisance or asked.tolerance.strict:
+    found, nuisance = state.current, asked.layout.nuisance
+    told = state.steps[0]["verdict"] not in ("unknown", "partial") and state.steps[-1]["verdict"] != "unknown"
+    if not told or not asked.costs or asked.tolerance.strict or not nuisance or "learned_drag" in nuisance:
         return None
     asked.say("asking what refitting the stated coefficients brings")
     try:
-        before = left_out_by(lambda _: _as_stated(asked, found), asked.log)
+        before = [left_out_by(lambda _, m=model: m, asked.log) for model in _as_stated(asked, found)]
         after = left_out_found(asked.layout, found, state.windows, asked.log)
     except (InputError, np.linalg.LinAlgError, FloatingPointError):
         # The verdict did not need it: a log too short to leave a part of it out has none.
         return None
-    if before.reason or after.reason or before.horizon != after.horizon:
+    best = min(before, key=lambda errors: errors.total)
+    if best.reason or after.reason or best.horizon != after.horizon:
         return None
-    fall = gain(before, after)
+    fall = gain(best, after)
     matters = fall.cost >= asked.tolerance.cost or costs_in_one(fall, asked.tolerance)
     if not (fall.beyond(SURELY) and matters):
         return None
+    vehicle = asked.model.vehicle
     return {
         "before": fall.before,
         "after": fall.after,
-        "horizon": float(before.horizon),
+        "horizon": float(best.horizon),
         "gain": {"value": fall.value, "std": fall.std},
         "coefficients": within(asked.layout, found, AWAY),
+        "command": "" if vehicle.reduced or vehicle.glides else "auvnn improve",
     }
 
 
-def _as_stated(asked: Setting, found: FittedHypothesis) -> GreyBox:
-    """Return the model with the names as they were fitted, and its coefficients as they were stated."""
+def _as_stated(asked: Setting, found: FittedHypothesis) -> list[GreyBox]:
+    """Return the model with its coefficients as they were stated, the names as they were fitted, and following them.
+
+    Names that were fitted beside other coefficients may be wrong beside these: whichever predicts better counts.
+    """
     if not found.effects:
-        return asked.model
-    theta = found.fitted.theta.copy()
-    for name, own in asked.layout.places(found.names).items():
-        if name not in found.effects:
-            theta[own] = asked.layout.means[name]
-    return at(asked.layout, found.names, theta).without_absent()
+        return [asked.model]
+    layout, fitted = asked.layout, found.fitted
+    places = layout.places(found.names)
+    own = np.concatenate(
+        [at for n, at in places.items() if n not in found.effects] or [np.zeros(0, dtype=int)]
+    )
+    others = np.concatenate([places[n] for n in found.effects])
+    stated = fitted.theta.copy()
+    stated[own] = np.concatenate([layout.means[n] for n in places if n not in found.effects] or [np.zeros(0)])
+    whole = NormalEquations(fitted.statistics.total + fitted.priors.square, np.zeros(len(stated)))
+    followed = stated.copy()
+    followed[others] -= whole.eliminate(own, others, rcond=1e-12).carry.T @ (stated - fitted.theta)[own]
+    low, high = limits(fitted.model, found.names, fitted.priors)
+    return [at(layout, found.names, v).without_absent() for v in (stated, np.clip(followed, low, high))]
 
 
 def refitted_words(
@@ -82,30 +102,31 @@ def refitted_words(
     if found is None:
         return []
     most = _furthest(found["coefficients"])
-    names = f": {', '.join(most)}" if most else ""
-    with_names, begin = "", "That holds with the stated coefficients refitted within their uncertainties"
+    names = (
+        f" (in brackets by how many of their stated standard deviations): {', '.join(most)}" if most else ""
+    )
+    with_names, begin = "", "That holds with the stated coefficients refitted"
     if matters is not None:
         with_names = ", with what is named,"
         begin = (
             f"{'Above all' if above_all(found, matters) else 'Beside that'} the stated coefficients are off"
         )
-        begin += ", within their uncertainties"
+    how = f"; `{found['command']}` makes that model" if found["command"] else ""
     return [
         f"{begin}{names}. With the values of its file the model{with_names} errs by {found['before']:.3g} over "
-        f"{found['horizon']:g} s of free running, refitted by {found['after']:.3g} on what was left out; `auvnn improve` "
-        "makes that model."
+        f"{found['horizon']:g} s of free running, refitted by {found['after']:.3g} on what was left out{how}."
     ]
 
 
 def above_all(found: RefittedCoefficients | None, matters: Mapping[str, EffectCost]) -> bool:
-    """Whether refitting the coefficients brings more than each name does.
+    """Whether refitting the coefficients is known to bring more than each name does.
 
     Args:
         found: from `refitted_coefficients`.
         matters: what each name costs.
     """
-    gains = [cost["gain"]["value"] for cost in matters.values() if cost["gain"] is not None]
-    return found is not None and all(found["gain"]["value"] > value for value in gains)
+    gains = [c["gain"]["value"] if c["gain"] is not None else float("nan") for c in matters.values()]
+    return found is not None and bool(gains) and all(found["gain"]["value"] > value for value in gains)
 
 
 def _furthest(moved: Sequence[MovedCoefficient]) -> list[str]:

@@ -69,24 +69,6 @@ def begin_beside(layout: Layout, name: str) -> NDArray[np.float64]:
     return np.array([min(p.null + 2.0 * p.scale, p.high) for p in layout.described(name)])
 
 
-def last_names(effects: Sequence[str]) -> list[str]:
-    """Return the last effect of an explanation, and before it those that act beside it only and so came with it.
-
-    Args:
-        effects: of the explanation.
-    """
-    return [*[n for n in effects[:-1] if effects[-1] in effect_class(n).acts_with], effects[-1]]
-
-
-def in_order(effects: Sequence[str]) -> list[str]:
-    """Return names in the order in which they are told: what acts beside others only comes after them.
-
-    Args:
-        effects: names that were found together.
-    """
-    return sorted(effects, key=lambda n: bool({*effect_class(n).acts_with} & {*effects}))
-
-
 def named_with(effects: Sequence[str], chosen: Sequence[str]) -> list[str]:
     """Return the names that come with the last effect of an explanation.
 

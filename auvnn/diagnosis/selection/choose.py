@@ -5,6 +5,7 @@ Forward, one effect at a time; and backward: what was taken before must still be
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -23,6 +24,7 @@ from auvnn.diagnosis.selection.prune import Pruning
 from auvnn.diagnosis.selection.refit_leaders import Beside, fitted_beside
 from auvnn.diagnosis.selection.rivals import Rivals
 from auvnn.effects import effect_class
+from auvnn.effects.acting_beside import in_place_of
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.executors import Executor
@@ -82,6 +84,7 @@ class Chooser(Pruning):
         base: list[str],
         chosen: list[str],
         current: FittedHypothesis,
+        places: float = math.inf,
     ) -> Choice:
         """Refit the leading effects beside those chosen before, and take the one that explains best.
 
@@ -91,6 +94,7 @@ class Chooser(Pruning):
             base: effects that are free anyway.
             chosen: effects found before.
             current: the fit without any of those that remain.
+            places: how many more names may be given.
         """
         significant = [s for s in scores.values() if s.degrees and s.p_value < ALPHA]
         leading = sorted(significant, key=lambda s: -s.evidence)[:LEADERS]
@@ -100,7 +104,9 @@ class Chooser(Pruning):
         # Evidence counts an effect of many parameters low while it is small; a test that is clear even among
         # all the others lets it be judged by what it does on runs left out.
         clear = {s.effect for s in significant if s.p_value < ALPHA / len(scores)}
-        beside = Beside(self.layout, self.windows, at, base, chosen, current, tuple(scores))
+        beside = Beside(
+            self.layout, self.windows, at, base, chosen, current, tuple(scores) if places > 1 else ()
+        )
         tried, failed = fitted_beside(beside, leading, self.pool, self.say)
         more = rivals_to_fit(tried, significant, current)
         tried += fitted_beside(beside, more, self.pool, self.say)[0]
@@ -159,15 +165,16 @@ class Chooser(Pruning):
         self, taken: FittedHypothesis, base: Sequence[str], name: str, other: FittedHypothesis
     ) -> FittedHypothesis:
         """Return an explanation refitted with the last effect of another one in the place of one of its own."""
-        member = other.effects[-1]
+        gone, new = in_place_of(name, taken.effects, other.effects)
         model = taken.fitted.model.rebuilt(taken.fitted.model.copied_effects())
-        set_parameters(model, [name], self.layout.means[name])
-        set_parameters(model, [member], parameters_of(other.fitted.model, [member]))
+        for effect in gone:
+            set_parameters(model, [effect], self.layout.means[effect])
+        set_parameters(model, new, parameters_of(other.fitted.model, new))
         return fit_hypothesis(
             self.layout,
             self.windows,
             base,
-            (*(e for e in taken.effects if e != name), member),
+            (*(e for e in taken.effects if e not in (*gone, *new)), *new),
             start=taken.fitted,
             guess=replace(self.layout, model=model),
             sigma=taken.fitted.sigma,

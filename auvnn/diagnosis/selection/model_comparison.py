@@ -11,6 +11,7 @@ from scipy.stats import chi2
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, log_evidence
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.effects import effect_class
+from auvnn.effects.acting_beside import last_names
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.metrics.windows import Windows
@@ -60,6 +61,10 @@ class ModelComparison:
         refuted += [e for e in near if self._refutes(best, e, at, base, factor)]
         return best, [e for e in standing if not any(e is r for r in refuted)]
 
+    def _size(self, explanation: FittedHypothesis) -> int:
+        """Return how many parameters the last effect of an explanation has, with what acts beside it only."""
+        return len(self.layout.of(last_names(explanation.effects)))
+
     def _refutes(
         self, other: FittedHypothesis, best: FittedHypothesis, at: Layout, base: list[str], factor: float
     ) -> bool:
@@ -68,14 +73,14 @@ class ModelComparison:
         Were the other one right, the parameters of the first would gain what chi-squared allows beside it, and less
         alone. Where each is needed beside the other, neither is the whole cause, and evidence says which comes first.
         """
-        extra = len(self.layout.columns[other.effects[-1]])
+        extra = self._size(other)
         if best.misfit - other.misfit <= chi2.isf(ALPHA_REFUTED, extra):
             return False
         try:
             both = log_evidence(self.layout, self.together(other, best, at, base), factor)
         except FitError:
             return False
-        own = len(self.layout.columns[best.effects[-1]])
+        own = self._size(best)
         return bool(other.misfit - both.misfit < chi2.isf(ALPHA_NEEDED, own))
 
     def told_apart(self, best: FittedHypothesis, other: FittedHypothesis) -> bool:
@@ -89,8 +94,7 @@ class ModelComparison:
         if 0.5 * (other.misfit - best.misfit) >= ODDS:
             return True
         mine, theirs = best.effects[-1], other.effects[-1]
-        size = {n: len(self.layout.columns[n]) for n in (mine, theirs)}
-        return size[theirs] > size[mine] and theirs not in effect_class(mine).plainer
+        return self._size(other) > self._size(best) and theirs not in effect_class(mine).plainer
 
     def together(
         self, best: FittedHypothesis, other: FittedHypothesis, at: Layout, base: list[str]
@@ -106,13 +110,14 @@ class ModelComparison:
         self.say(f"fitting {best.effects[-1]} and {other.effects[-1]} together")
         guess = at.model.rebuilt(at.model.copied_effects())
         for each in (best, other):
-            name = each.effects[-1]
-            set_parameters(guess, [name], parameters_of(each.fitted.model, [name]))
+            names = last_names(each.effects)
+            set_parameters(guess, names, parameters_of(each.fitted.model, names))
+        more = [n for n in last_names(other.effects) if n not in best.effects]
         return fit_hypothesis(
             self.layout,
             self.windows,
             base,
-            (*best.effects, other.effects[-1]),
+            (*best.effects, *more),
             start=best.fitted,
             guess=replace(at, model=guess),
             sigma=best.fitted.sigma,

@@ -79,14 +79,16 @@ def fitted_beside(
 
 def _fitted(beside: Beside, candidate: Score) -> FittedHypothesis | str:
     """Return an effect fitted, or why it could not be: a task of an executor."""
+    found: FittedHypothesis | str
     try:
-        alone = refitted(beside, candidate)
+        found = refitted(beside, candidate)
     except (FitError, np.linalg.LinAlgError) as problem:
-        return str(problem)
+        found = str(problem)
     for other in comes_with(candidate.effect, beside.chosen, beside.open_to, beside.base):
         with suppress(FitError, np.linalg.LinAlgError):
-            alone = _likelier(beside.layout, alone, refitted(beside, candidate, other))
-    return alone
+            pair = refitted(beside, candidate, other)
+            found = pair if isinstance(found, str) else _likelier(beside.layout, found, pair)
+    return found
 
 
 def _likelier(layout: Layout, alone: FittedHypothesis, pair: FittedHypothesis) -> FittedHypothesis:

@@ -15,11 +15,10 @@ from auvnn.diagnosis.hypotheses.refine_step import refine_step
 from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
 from auvnn.diagnosis.residuals.forces import exerts_less
 from auvnn.diagnosis.score_tests.score import Score
-from auvnn.diagnosis.selection.acting_together import in_order
 from auvnn.diagnosis.selection.choose import ALPHA, LITTLE
 from auvnn.diagnosis.selection.model_comparison import forms_that_leave
 from auvnn.diagnosis.stages.state import Setting, State
-from auvnn.effects.acting_beside import needed_beside
+from auvnn.effects.acting_beside import in_order, last_names, needed_beside
 from auvnn.estimation.prediction_error import FitError
 from auvnn.metrics.windows import Windows
 
@@ -71,11 +70,12 @@ def search_round(
         ended = state.step(rest(asked, state.current), [], p_value)
         return ended.but(ended=True, last_tests=(state.current, tested))
     chooser = asked.chooser(state.windows)
-    choice = chooser.choose(tested.scores, tested.at, base, chosen, state.current)
+    places = asked.most - len(chosen)
+    choice = chooser.choose(tested.scores, tested.at, base, chosen, state.current, places)
     others = tested.scores
     while passed := _what_others_leave(asked, state, choice.best):
         others = {n: s for n, s in others.items() if n not in passed}
-        choice = chooser.choose(others, tested.at, base, chosen, state.current)
+        choice = chooser.choose(others, tested.at, base, chosen, state.current, places)
     state = state.but(failed={**state.failed, **choice.failed}, tried=(*state.tried, *choice.tried))
     if not chosen:
         for explanation in choice.tried:
@@ -93,6 +93,9 @@ def search_round(
         verdict = "ambiguous" if len(rivals) > 1 else "named"
         state = state.but(groups=(*state.groups, tuple(rivals)) if len(rivals) > 1 else state.groups)
     state = state.step(verdict, new, p_value)
+    # What acts beside the one that is taken only is no rival of the others: it has a step of its own.
+    if beside := [e for e in last_names(choice.best.effects) if e not in (*chosen, *new)]:
+        state = state.step("named", beside, p_value)
     current, gone = choice.best, []
     if chosen:
         current, gone = chooser.withdrawn(choice.best, asked.base)

@@ -44,7 +44,7 @@ class DiagnosisPage(Page):
         if verdict == "named" and missing:
             return f"What is missing: {listing(missing)}"
         if verdict == "adequate" and view.mapping("refitted"):
-            return "No effect is missing that this log could show; the stated coefficients are off"
+            return "The stated coefficients are off, and nothing else is missing that matters"
         return {
             "ambiguous": f"What is missing: {listing(missing, 'or')}",
             "partial": f"Something is missing, a part of which can be predicted by {listing(view.texts('nearest'))}",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -111,11 +113,12 @@ def test_many_coefficients_are_told_in_part():
         "horizon": 5.0,
         "gain": {"value": 0.4, "std": 0.1},
         "coefficients": [one] * 9,
+        "command": "",
     }
     (words,) = refitted_words(many)
     assert words.startswith("That holds with the stated coefficients refitted")
     assert words.count("added_mass.X times 1.2 (+2.0)") == 6 and "and 3 more" in words
-    assert "0.5 over 5 s of free running, refitted by 0.1" in words
+    assert words.endswith("0.5 over 5 s of free running, refitted by 0.1 on what was left out.")
 
 
 def told(value):
@@ -125,12 +128,20 @@ def told(value):
         "horizon": 5.0,
         "gain": {"value": value, "std": 0.01},
         "coefficients": [],
+        "command": "",
     }
 
 
 @pytest.mark.parametrize(
     ("gains", "begin"),
-    [([0.2], "Above all"), ([0.4], "Beside that"), ([0.2, 0.4], "Beside that"), ([None], "Above all")],
+    [
+        ([0.2], "Above all"),
+        ([0.4], "Beside that"),
+        ([0.2, 0.4], "Beside that"),
+        ([None], "Beside that"),
+        ([], "Beside that"),
+        ([0.2, None], "Beside that"),
+    ],
 )
 def test_beside_names_it_says_which_of_them_predictions_suffer_from_most(gains, begin):
     matters = {
@@ -183,3 +194,39 @@ def test_where_something_without_a_name_is_left_coefficients_take_up_what_they_c
     found = diagnose(GreyBox(vehicle()), log, effects=["gyro_bias"], advice=False)
     assert found.verdict in ("unknown", "partial") and found.refitted is None
     assert not any("stated coefficients are off" in line for line in found.story)
+
+
+def test_nor_is_it_where_a_name_leaves_something_without_one():
+    """A force that no candidate explains is left beside the name."""
+    truth = GreyBox(vehicle(1.4)).with_effects(
+        {"net_buoyancy": {"force": -6.0}, "thruster_gain": {"thruster_1": 0.3}, "gyro_bias": {"p": 0.05}}
+    )
+    log = make_log(truth, runs=3, duration=30.0, noise=1.0, seed=4)
+    found = diagnose(GreyBox(vehicle()), log, effects=["net_buoyancy"], advice=False)
+    assert found.steps[-1]["verdict"] == "unknown" and found.refitted is None
+
+
+def test_names_may_follow_the_stated_coefficients(heavier, monkeypatch):
+    """What the coefficients bring is no more than what is lost with names that are fitted beside stated coefficients."""
+    found, log = heavier
+    named = GreyBox(vehicle())
+    best = min(
+        roll(named.with_effects({"net_buoyancy": {"force": f}}), log, "5", scale_of(log)).total(scale_of(log))
+        for f in np.linspace(-9.0, -3.0, 25)
+    )
+    fitted = next(c for c in found.candidates if c["effect"] == "net_buoyancy")["parameters"]["force"][
+        "value"
+    ]
+    stays = roll(named.with_effects({"net_buoyancy": {"force": fitted}}), log, "5", scale_of(log))
+    assert best * 0.999 <= found.refitted["before"] <= stays.total(scale_of(log)) * 1.001
+
+
+def test_a_model_with_learned_damping_is_told_nothing_of_its_coefficients(log, monkeypatch):
+    from auvnn.diagnosis.answers.refitted_coefficients import refitted_coefficients as worked_out
+
+    asked: Any = SimpleNamespace(
+        layout=SimpleNamespace(nuisance=("linear_damping", "learned_drag")), costs=True,
+        tolerance=SimpleNamespace(strict=False),
+    )  # fmt: skip
+    state: Any = SimpleNamespace(current=None, steps=[{"verdict": "adequate"}])
+    assert worked_out(asked, state) is None

@@ -29,10 +29,10 @@ from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
 from auvnn.diagnosis.noise_law.rounds.leaders import RIVALS
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import RIVALS_SHARE
 from auvnn.diagnosis.noise_law.rounds.path import with_last
-from auvnn.diagnosis.selection.acting_together import last_names
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.diagnosis.selection.rivals import Rivals
 from auvnn.effects import effect_class
+from auvnn.effects.acting_beside import last_names
 from auvnn.estimation.priors import parameters_of, set_parameters
 
 Array = NDArray[np.float64]

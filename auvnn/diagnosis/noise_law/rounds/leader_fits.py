@@ -19,10 +19,10 @@ from auvnn.diagnosis.noise_law.rounds.leaders import contained_in, rivals_of
 from auvnn.diagnosis.selection.acting_together import (
     begin_beside,
     comes_with,
-    last_names,
     worth_fitting_together,
 )
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
+from auvnn.effects.acting_beside import last_names
 from auvnn.estimation.priors import parameters_of, set_parameters
 from auvnn.executors import Executor
 from auvnn.executors.serial import SERIAL
