@@ -96,8 +96,10 @@ def test_each_repeat_has_a_seed_of_its_own():
 
 
 def test_all_is_the_catalogue_without_what_such_a_log_says_nothing_of():
-    # No fins, no stated battery, accelerations only where they are measured, and what does nothing by itself.
+    # No fins, no stated battery, no kind of drag that is not stated, accelerations only where they are measured, and what
+    # does nothing by itself.
     absent = {
+        "unstated_damping",
         "drag_only_current",
         "body_lift_stall",
         "fin_stall",
@@ -111,7 +113,7 @@ def test_all_is_the_catalogue_without_what_such_a_log_says_nothing_of():
     for more in ({}, {"noises": "none", "accelerations": False}):
         found = {c.hidden for c in cases({**OPTIONS, **more})}
         assert found == set(EFFECTS.names()) - {*absent, "accelerometer_tilt"}
-    assert "fin_stall" in {c.hidden for c in cases({**OPTIONS, "vehicles": "remus100"})}
+    assert {"fin_stall", "unstated_damping"} <= {c.hidden for c in cases({**OPTIONS, "vehicles": "remus100"})}
     assert [c.hidden for c in cases({**OPTIONS, "effects": "fin_stall", "repeats": 1})] == ["fin_stall"] * 2
 
 
