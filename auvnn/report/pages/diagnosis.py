@@ -63,7 +63,10 @@ class DiagnosisPage(Page):
         by_name = {str(c.get("effect")): c for c in candidates}
         leading = [by_name[m] for m in missing if m in by_name]
         left = finite(view.get("unexplained"))
-        out = [_first_sentence(verdict, missing, view.mapping("stated")), *common.baseline_words(view)[1:]]
+        first = _first_sentence(verdict, missing, view.mapping("stated"))
+        if verdict == "adequate" and view.mapping("refitted"):
+            first = "With the stated coefficients refitted nothing is missing that matters; as it is, the model predicts worse."
+        out = [first, *common.baseline_words(view)[1:]]
         if verdict in ("named", "ambiguous"):
             out += [_candidate_words(c) for c in leading[:3]]
             out += _rival_words(candidates, missing)

@@ -68,6 +68,7 @@ def test_it_is_in_the_story_the_json_and_the_report(found):
     view = View(data)
     assert "coefficients are off" in page.title(view)
     assert any("With the values of its file" in line for line in page.brief(view))
+    assert page.brief(view)[0].startswith("With the stated coefficients refitted nothing is missing")
 
 
 def test_where_the_coefficients_are_right_nothing_is_told():
