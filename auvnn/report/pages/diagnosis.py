@@ -65,7 +65,7 @@ class DiagnosisPage(Page):
         left = finite(view.get("unexplained"))
         first = _first_sentence(verdict, missing, view.mapping("stated"))
         if verdict == "adequate" and view.mapping("refitted"):
-            first = "With the stated coefficients refitted nothing is missing that matters; as it is, the model predicts worse."
+            first = "With the stated coefficients refitted nothing is missing that matters; as given the model errs more."
         out = [first, *common.baseline_words(view)[1:]]
         if verdict in ("named", "ambiguous"):
             out += [_candidate_words(c) for c in leading[:3]]
