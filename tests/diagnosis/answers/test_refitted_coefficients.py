@@ -12,6 +12,7 @@ import pytest
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.answers import refitted_coefficients
 from auvnn.diagnosis.answers.refitted_coefficients import refitted_words
+from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
 from auvnn.report.pages.diagnosis import DiagnosisPage
@@ -231,3 +232,19 @@ def test_a_model_with_learned_damping_is_told_nothing_of_its_coefficients(log, m
     )  # fmt: skip
     state: Any = SimpleNamespace(current=None, steps=[{"verdict": "adequate"}])
     assert worked_out(asked, state) is None
+
+
+def test_a_name_that_looks_like_the_coefficients_follows_them():
+    """Thrust and drag go together: beside the drag of the file another gain predicts better than the fitted one."""
+    gains = {f"thruster_{i + 1}": 0.8 for i in range(8)}
+    truth = GreyBox(vehicle(1.4)).with_effects({"thruster_gain": gains})
+    log, model = make_log(truth, runs=3, duration=30.0, noise=1.0, seed=4), GreyBox(vehicle())
+    found = diagnose(model, log, effects=["thruster_gain"], advice=False)
+    assert found.missing == ["thruster_gain"]
+    asked: Any = SimpleNamespace(model=model, layout=lay_out(model, ["thruster_gain"]))
+    stays, follows = (
+        roll(m, log, "5", scale_of(log)).total(scale_of(log))
+        for m in refitted_coefficients._as_stated(asked, found.explanation)
+    )
+    assert follows < 0.9 * stays
+    assert found.refitted is None or found.refitted["before"] == pytest.approx(follows, rel=1e-6)
