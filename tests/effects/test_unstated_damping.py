@@ -152,7 +152,8 @@ def test_where_all_is_stated_the_table_says_why_it_was_not_asked(sideways):
         ("payload", {"mass": 3.0, "x": 0.2, "time": 0.0}),
     ],
 )
-def test_factors_on_stated_coefficients_leave_alone_what_the_models_effects_add(effect, values):
+@pytest.mark.parametrize("effects", [(), ("linear_damping",), ("quadratic_damping", "added_mass")])
+def test_factors_on_stated_coefficients_leave_alone_what_the_models_effects_add(effect, values, effects):
     """What a fit has is what the model with its values in it has: the factors are on the vehicle's own numbers."""
     vehicle = small_vehicle(0.1, linear_damping=[25.0, 0.0, 40.0, 4.0, 5.0, 0.0])
     model = GreyBox(vehicle).with_effects({effect: values})
@@ -161,7 +162,7 @@ def test_factors_on_stated_coefficients_leave_alone_what_the_models_effects_add(
     theta = np.linspace(0.8, 1.2, len(layout.of(groups)))
     fitted = layout.model.rebuilt(layout.model.copied_effects())
     set_parameters(fitted, groups, theta)
-    told = holding(model, layout, groups, theta, ())
+    told = holding(model, layout, groups, theta, effects)
     for made in (fitted, told):
         assert made.effect(effect).values() == model.effect(effect).values()
     state = torch.tensor([0.3, 0.5, -0.2, 0.1, 0.2, 0.6], dtype=torch.float64)
