@@ -40,7 +40,8 @@ class Effect(nn.Module):
     `leaves`: effects that look like what its own form gets wrong. `remembers`: what `command` returns depends on earlier
     commands by one state per command: `follow`, `advance`. `acts_with`: effects without any of which it does nothing, so
     that it can neither be missing nor be hidden alone. `is_drag`: what it adds grows with the drag that others scale.
-    `turns`: what `command` returns is the propellers' speed as a command; `by_speed`: its `thrust` goes by that speed.
+    `scales`: its `body` multiplies the vehicle's own numbers, and acts before what others add to them. `turns`: what
+    `command` returns is the propellers' speed as a command; `by_speed`: its `thrust` goes by that speed.
     """
 
     name: ClassVar[str]
@@ -49,8 +50,7 @@ class Effect(nn.Module):
     reference: ClassVar[str]
     channels: ClassVar[tuple[str, ...]] = ()
     excludes: ClassVar[tuple[str, ...]] = ()
-    # Parameters of shape in which what the effect does is linear while it is small, the place of a load; and parameters
-    # that act on these levers: what the others do is the same whatever the levers are.
+    # Parameters of shape in which the effect is linear while it is small, and those that act on these levers.
     levers: ClassVar[tuple[str, ...]] = ()
     carried: ClassVar[tuple[str, ...]] = ()
     # For people: effects that leave a similar trace, and the manoeuvre (configs/excitation) that tells them apart.
@@ -66,6 +66,7 @@ class Effect(nn.Module):
     leaves: ClassVar[tuple[str, ...]] = ()
     acts_with: ClassVar[tuple[str, ...]] = ()
     is_drag: ClassVar[bool] = False
+    scales: ClassVar[bool] = False
 
     theta: nn.Parameter
     uncertainty: dict[str, float]  # standard deviations; of what is not in it the default holds
@@ -77,9 +78,8 @@ class Effect(nn.Module):
             ConfigError: a name is unknown, or a value is no number or out of bounds.
         """
         super().__init__()
-        self.parameters_of = parameters
+        self.parameters_of, self.uncertainty = parameters, {}
         self._index = {p.name: i for i, p in enumerate(parameters)}
-        self.uncertainty = {}
         start = [p.null for p in parameters]
         for key, value in (values or {}).items():
             if key not in self._index:

@@ -33,6 +33,8 @@ class AxisFactors(Effect):
     Off-diagonal entries (i, j) follow by sqrt(f_i f_j), which keeps a symmetric matrix positive definite.
     """
 
+    scales = True
+
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:
         """Return one factor per degree of freedom."""

@@ -19,6 +19,7 @@ class InertiaFactors(Effect):
     """
 
     name = "inertia"
+    scales = True
     cause = "the moments of inertia are not the nominal ones"
     symbol = "I_g"
     reference = "Fossen (2011), section 3.3"

@@ -89,15 +89,14 @@ class GreyBox(ShownModel, EquationsOfMotion):
         names = [e.name for e in members]
         for effect in members:
             if names.count(effect.name) > 1:
-                raise ConfigError(
-                    f"effect {effect.name} is given twice: give it once, with all its parameters"
-                )
+                raise ConfigError(f"effect {effect.name} is given twice: give it once, with all parameters")
             clash = [n for n in effect.excludes if n in names]
             if clash:
                 raise ConfigError(f"effects {effect.name} and {clash[0]} exclude each other: keep one")
         self.effects = nn.ModuleList(members)
         self._by_hook = {h: [e for e in members if h in e.hooks()] for h in HOOKS}
         self._by_hook["wrench"].sort(key=lambda e: not e.is_drag)
+        self._by_hook["body"].sort(key=lambda e: not e.scales)
         self.bottom: float | None = None  # its depth, m, for the altitude of simulated vehicles
         self.joint: JointCovariance | None = None  # of the effects' parameters, where a fit has said it
         self.commands: CommandPath | None = None  # between a log's samples, where they are not held

@@ -10,10 +10,11 @@ import auvnn
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.hypotheses.put_into_model import holding
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.effects.unstated_damping import UnstatedDamping
+from auvnn.effects.unstated_damping import KINDS, UnstatedDamping, _coefficients
 from auvnn.errors import ConfigError
 from auvnn.estimation.priors import set_parameters
 from auvnn.models import GreyBox
+from auvnn.plants.independent.hull import build
 from auvnn.testing import plain_vehicle
 from auvnn.vehicle import Vehicle
 from tests.small_logs import make_log, small_vehicle
@@ -92,6 +93,11 @@ def test_plausible_sizes_follow_the_drag_that_is_stated():
     assert sizes["linear_Y"] == pytest.approx(2.0 * sizes["linear_X"])
     turn = 0.128 * np.sqrt(9.81 / 1.0)
     assert sizes["linear_N"] * turn == pytest.approx(0.5 * 6.0 * turn**2)
+    # The other way round: quadratic drag that gives half of what the stated linear one does.
+    stated = plain_vehicle(linear_damping=[20.0, 30.0, 30.0, 2.0, 2.0, 3.0])
+    sizes = {p.name: p.scale for p in UnstatedDamping.describe(stated, "thrusters")}
+    assert sizes["quadratic_Y"] * speed**2 == pytest.approx(0.5 * 30.0 * speed)
+    assert sizes["quadratic_N"] * turn**2 == pytest.approx(0.5 * 3.0 * turn)
     units = {p.name: p.unit for p in UnstatedDamping.describe(plain_vehicle(), "thrusters")}
     assert (units["linear_X"], units["linear_N"]) == ("N s/m", "N m s")
     assert (units["quadratic_Z"], units["quadratic_K"]) == ("N s2/m2", "N m s2")
@@ -180,3 +186,47 @@ def test_a_second_fit_finds_that_it_has_changed(sideways):
     before = GreyBox(vehicle).with_effects({"unstated_damping": {"linear_Y": 20.0, "linear_N": 2.5}})
     better = auvnn.add(before, log, ["unstated_damping"], refit=True)
     assert better.model.effect("unstated_damping").values()["linear_Y"] == pytest.approx(30.0, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("kind", "dof"), [("linear", "N"), ("linear", "Y"), ("quadratic", "M"), ("quadratic", "X")]
+)
+def test_what_displaced_elements_resist_is_what_they_resist_in_the_model(kind, dof):
+    """Of a unit of velocity: the coefficient that a plausible size is taken from is the model's own drag there."""
+    turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    element = {"position": [0.5, 0.3, -0.2], "axes": turn.tolist()}
+    element |= {"linear": [0.0] * 6, "quadratic": [0.0] * 6, kind: [5.0, 7.0, 9.0, 0.3, 0.2, 0.1]}
+    vehicle = plain_vehicle(damping_elements=[element])
+    nu = torch.zeros(6, dtype=torch.float64)
+    nu[DOFS.index(dof)] = 1.0
+    eta = torch.tensor([0.0, 0, 5, 0, 0, 0], dtype=torch.float64)
+    still = plain_vehicle()
+    with torch.no_grad():
+        slopes = [GreyBox(v)(eta, nu, torch.zeros(6, dtype=torch.float64)).numpy() for v in (still, vehicle)]
+    force = -GreyBox(still).prepare().total.numpy() @ (slopes[1] - slopes[0])
+    assert _coefficients(vehicle)[KINDS.index(kind), DOFS.index(dof)] == pytest.approx(force[DOFS.index(dof)])
+
+
+def test_in_whatever_order_effects_stand_factors_are_on_the_vehicles_own_numbers():
+    vehicle = small_vehicle(0.1, linear_damping=[25.0, 0.0, 40.0, 4.0, 5.0, 0.0])
+    values = {
+        "unstated_damping": {"linear_Y": 30.0},
+        "coupled_damping": {"Nv": 12.0},
+        "linear_damping": {"Y": 2.0, "X": 2.0},
+        "quadratic_damping": {"Y": 1.5, "N": 1.5},
+    }
+    bodies, hulls = [], []
+    for names in (list(values), list(values)[::-1]):
+        ordered = {n: values[n] for n in names}
+        bodies.append(GreyBox(vehicle).with_effects(ordered).prepare().body)
+        nulls = {p: 0.0 for p in ("Yr", "Nv", "Zq", "Mw", "Kv", "Mu", "Xq", "Yp")}
+        full = {n: {**dict.fromkeys(DOFS, 1.0), **v} if n.endswith("c_damping") or n == "linear_damping" else v
+                for n, v in ordered.items()}  # fmt: skip
+        full["coupled_damping"] = {**nulls, **values["coupled_damping"]}
+        hulls.append(build(vehicle, full))
+    for body, hull in zip(bodies, hulls, strict=True):
+        assert body.linear is not None and body.quadratic is not None
+        np.testing.assert_allclose(np.diag(body.linear.detach()), [50.0, 30.0, 40.0, 4.0, 5.0, 0.0])
+        np.testing.assert_allclose(body.linear.detach(), hull.linear)
+        np.testing.assert_allclose(body.quadratic.detach(), hull.quadratic)
+        assert body.quadratic[5, 1].item() == pytest.approx(-12.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from auvnn.answer_types import MovedCoefficient
@@ -13,16 +15,16 @@ FAR, NAMED = 2.0, 6
 
 
 def moved(layout: Layout, found: FittedHypothesis) -> list[MovedCoefficient]:
-    """Return stated coefficients that moved by more than two of their standard deviations, the furthest first; `within`.
+    """Return stated coefficients that moved by more than two of their standard deviations, the furthest first.
 
     Args:
         layout: stated values.
         found: the fit.
     """
-    return within(layout, found, FAR)
+    return moved_beyond(layout, found, FAR)
 
 
-def within(layout: Layout, found: FittedHypothesis, least: float) -> list[MovedCoefficient]:
+def moved_beyond(layout: Layout, found: FittedHypothesis, least: float) -> list[MovedCoefficient]:
     """Return stated coefficients that moved by more than so many of their standard deviations, the furthest first.
 
     Each is a factor on what the vehicle's file states, which is one; `deviations` says by how many of the stated standard
@@ -63,22 +65,23 @@ def moved_words(found: list[MovedCoefficient]) -> list[str]:
     """Return that in words, one sentence or none."""
     if not found:
         return []
-    told = [told_as(m) for m in found[:NAMED]]
-    more = f", and {len(found) - NAMED} more" if len(found) > NAMED else ""
     return [
         "Stated coefficients moved by more than two of their standard deviations (how many in brackets): "
-        + ", ".join(told)
-        + more
-        + "."
+        f"{in_words(found)}."
     ]
 
 
-def told_as(one: MovedCoefficient) -> str:
-    """Return one coefficient in words: its name, what it became, and by how many stated standard deviations.
+def in_words(found: Sequence[MovedCoefficient]) -> str:
+    """Return the coefficients that went furthest: name, what it became, and by how many stated standard deviations.
 
     Args:
-        one: the coefficient.
+        found: the furthest first.
     """
+    more = [f"and {len(found) - NAMED} more"] if len(found) > NAMED else []
+    return ", ".join([*(_one(m) for m in found[:NAMED]), *more])
+
+
+def _one(one: MovedCoefficient) -> str:
     name = f"{one['group']}.{one['coefficient']}"
     size = f"times {one['fitted'] / one['stated']:.3g}" if one["stated"] else f"{one['fitted']:.3g}"
     return f"{name} {size} ({one['deviations']:+.1f})"

@@ -11,22 +11,19 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from auvnn.answer_types import EffectCost, MovedCoefficient, RefittedCoefficients
+from auvnn.answer_types import EffectCost, RefittedCoefficients
 from auvnn.diagnosis.answers.effect_costs import costs_in_one
-from auvnn.diagnosis.answers.moved_coefficients import told_as, within
+from auvnn.diagnosis.answers.moved_coefficients import in_words, moved_beyond
 from auvnn.diagnosis.cross_validation.errors import gain
-from auvnn.diagnosis.cross_validation.fitters import at
 from auvnn.diagnosis.cross_validation.left_out import left_out_by, left_out_found
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.diagnosis.noise_law.rounds.free_running_cost import as_stated
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.errors import InputError
-from auvnn.estimation.nuisance_elimination import NormalEquations
-from auvnn.estimation.priors import limits
 from auvnn.models import GreyBox
 
 # Standard errors by which the error must fall, and stated standard deviations from which on a coefficient is told.
 SURELY, AWAY = 2.0, 1.0
-NAMED = 6
 
 
 def refitted_coefficients(asked: Setting, state: State) -> RefittedCoefficients | None:
@@ -63,31 +60,19 @@ def refitted_coefficients(asked: Setting, state: State) -> RefittedCoefficients 
         "after": fall.after,
         "horizon": float(best.horizon),
         "gain": {"value": fall.value, "std": fall.std},
-        "coefficients": within(asked.layout, found, AWAY),
+        "coefficients": moved_beyond(asked.layout, found, AWAY),
         "command": "" if vehicle.reduced or vehicle.glides else "auvnn improve",
     }
 
 
-def _as_stated(asked: Setting, found: FittedHypothesis) -> list[GreyBox]:
-    """Return the model with its coefficients as they were stated, the names as they were fitted, and following them.
+def _as_stated(asked: Setting, found: FittedHypothesis) -> Sequence[GreyBox]:
+    """Return the model with its coefficients as stated: the names as they were fitted, and following the coefficients.
 
     Names that were fitted beside other coefficients may be wrong beside these: whichever predicts better counts.
     """
     if not found.effects:
         return [asked.model]
-    layout, fitted = asked.layout, found.fitted
-    places = layout.places(found.names)
-    own = np.concatenate(
-        [at for n, at in places.items() if n not in found.effects] or [np.zeros(0, dtype=int)]
-    )
-    others = np.concatenate([places[n] for n in found.effects])
-    stated = fitted.theta.copy()
-    stated[own] = np.concatenate([layout.means[n] for n in places if n not in found.effects] or [np.zeros(0)])
-    whole = NormalEquations(fitted.statistics.total + fitted.priors.square, np.zeros(len(stated)))
-    followed = stated.copy()
-    followed[others] -= whole.eliminate(own, others, rcond=1e-12).carry.T @ (stated - fitted.theta)[own]
-    low, high = limits(fitted.model, found.names, fitted.priors)
-    return [at(layout, found.names, v).without_absent() for v in (stated, np.clip(followed, low, high))]
+    return as_stated(asked.layout, found, [n for n in found.names if n not in found.effects])
 
 
 def refitted_words(
@@ -101,10 +86,8 @@ def refitted_words(
     """
     if found is None:
         return []
-    most = _furthest(found["coefficients"])
-    names = (
-        f" (in brackets by how many of their stated standard deviations): {', '.join(most)}" if most else ""
-    )
+    most = in_words(found["coefficients"])
+    names = f" (in brackets by how many of their stated standard deviations): {most}" if most else ""
     with_names, begin = "", "That holds with the stated coefficients refitted"
     if matters is not None:
         with_names = ", with what is named,"
@@ -127,9 +110,3 @@ def above_all(found: RefittedCoefficients | None, matters: Mapping[str, EffectCo
     """
     gains = [c["gain"]["value"] if c["gain"] is not None else float("nan") for c in matters.values()]
     return found is not None and bool(gains) and all(found["gain"]["value"] > value for value in gains)
-
-
-def _furthest(moved: Sequence[MovedCoefficient]) -> list[str]:
-    """Return the coefficients that went furthest, each in words, and how many more there are."""
-    more = [f"and {len(moved) - NAMED} more"] if len(moved) > NAMED else []
-    return [*(told_as(m) for m in moved[:NAMED]), *more]

@@ -60,14 +60,7 @@ def holding(
     refitted = [n for n in layout.nuisance if n not in effects and n not in model.effect_names]
     coefficients = [n for n in refitted if n in GROUPS or n not in EFFECTS]
     others = [n for n in refitted if n not in coefficients and n in names]
-    new = [n for n in effects if n not in model.effect_names]
-    # As in the layout: factors are on the vehicle's own numbers, and not on what the model's effects add to them.
-    keep = [
-        *(n for n in new if n in GROUPS),
-        *model.effect_names,
-        *(n for n in new if n not in GROUPS),
-        *others,
-    ]
+    keep = [*model.effect_names, *(n for n in effects if n not in model.effect_names), *others]
     body = GreyBox(model.vehicle, actuation=model.actuation).prepare().body
     for name in coefficients:
         body = full.effect(name).body(body, None)

@@ -119,11 +119,8 @@ def lay_out(model: GreyBox, candidates: Sequence[str], learned: Array | None = N
     present = [str(e.name) for e in effects]
     further = {n: s for n, s in exact_unless_stated(model).items() if n not in present}
     groups = [*uncertain, *([] if learned is None else ["learned_drag"]), *further]
-    # Coefficients are the vehicle's own numbers, whatever the model's effects add to them: their factors come first.
-    own = [effect_class(g).build(model.vehicle, model.actuation) for g in uncertain if g not in present]
-    effects = [*own, *effects]
     for name in dict.fromkeys([*groups, *candidates]):
-        if name in present or name in uncertain:
+        if name in present:
             continue
         effects.append(effect_class(name).build(model.vehicle, model.actuation))
     full = model.rebuilt(effects)

@@ -136,14 +136,14 @@ CHANGES: dict[str, Callable[[Hull, Values, Vehicle], None]] = {
     "added_mass": _added_mass,
     "linear_damping": _linear,
     "quadratic_damping": _quadratic,
+    "inertia": _inertia,
     "coupled_damping": _coupled,
     "unstated_damping": _unstated,
-    "inertia": _inertia,
     "cg_offset": _cg,
     "net_buoyancy": _net_buoyancy,
     "trapped_water": _trapped,
 }
-"""Effects that change what the vehicle is, once and for all."""
+"""Effects that change what the vehicle is, once and for all: factors on what it has, before anything is added to it."""
 
 
 def build(vehicle: Vehicle, effects: Mapping[str, Values]) -> Hull:
@@ -159,9 +159,9 @@ def build(vehicle: Vehicle, effects: Mapping[str, Values]) -> Hull:
         zero if vehicle.quadratic_damping is None else np.array(vehicle.quadratic_damping),
         [(e.position, e.axes, np.array(e.linear), np.array(e.quadratic)) for e in vehicle.damping_elements],
     )
-    for name, values in effects.items():
-        if name in CHANGES:
-            CHANGES[name](hull, values, vehicle)
+    for name, change in CHANGES.items():
+        if name in effects:
+            change(hull, effects[name], vehicle)
     if "payload" in effects:
         hull.lumps.append(_load(effects["payload"], vehicle))
     if "flooding" in effects:

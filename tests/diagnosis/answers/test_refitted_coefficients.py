@@ -11,8 +11,10 @@ import pytest
 
 from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.answers import refitted_coefficients
+from auvnn.diagnosis.answers.moved_coefficients import moved_beyond
 from auvnn.diagnosis.answers.refitted_coefficients import refitted_words
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
+from auvnn.errors import InputError
 from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
 from auvnn.report.pages.diagnosis import DiagnosisPage
@@ -54,6 +56,9 @@ def test_what_the_coefficients_in_the_file_cost_is_told(found, log):
     damping = [c for c in told["coefficients"] if c["group"].endswith("damping")]
     assert damping and all(c["fitted"] > 1.0 for c in damping)
     assert all(c["deviations"] == pytest.approx((c["fitted"] - 1.0) / 0.4) for c in damping)
+    # What moved by less than one of its stated standard deviations is not told.
+    every = moved_beyond(lay_out(GreyBox(vehicle()), ["net_buoyancy", "cg_offset"]), found.explanation, 0.0)
+    assert told["coefficients"] == [c for c in every if abs(c["deviations"]) > 1.0] != every
 
 
 def test_it_is_in_the_story_the_json_and_the_report(found):
@@ -101,10 +106,26 @@ def test_what_is_within_the_tolerance_is_not_told(log):
     assert found.verdict == "adequate" and found.refitted is None
 
 
-def test_a_log_that_is_too_short_to_leave_a_part_out_has_an_answer_without_it():
-    short = make_log(GreyBox(vehicle(1.4)), runs=1, duration=4.0, noise=1.0, seed=6)
-    found = diagnose(GreyBox(vehicle()), short, effects=["net_buoyancy"], advice=False)
-    assert found.refitted is None or np.isfinite(found.refitted["after"])
+@pytest.mark.parametrize("problem", [InputError("too short"), np.linalg.LinAlgError(), FloatingPointError()])
+def test_an_answer_needs_nothing_of_it(log, monkeypatch, problem):
+    """A log may be too short to leave a part of it out."""
+
+    def refuse(*_):
+        raise problem
+
+    monkeypatch.setattr(refitted_coefficients, "left_out_found", refuse)
+    found = diagnose(GreyBox(vehicle()), log, effects=["net_buoyancy"], advice=False)
+    assert found.verdict == "adequate" and found.refitted is None
+
+
+def test_parts_that_cannot_be_fitted_tell_nothing(log, monkeypatch):
+    usual = refitted_coefficients.left_out_found
+    monkeypatch.setattr(
+        refitted_coefficients,
+        "left_out_found",
+        lambda *a: replace(usual(*a), reason="the fit without run 1 failed"),
+    )
+    assert diagnose(GreyBox(vehicle()), log, effects=["net_buoyancy"], advice=False).refitted is None
 
 
 def test_many_coefficients_are_told_in_part():
@@ -242,7 +263,7 @@ def test_a_name_that_looks_like_the_coefficients_follows_them():
     found = diagnose(model, log, effects=["thruster_gain"], advice=False)
     assert found.missing == ["thruster_gain"]
     asked: Any = SimpleNamespace(model=model, layout=lay_out(model, ["thruster_gain"]))
-    stays, follows = (
+    follows, stays = (
         roll(m, log, "5", scale_of(log)).total(scale_of(log))
         for m in refitted_coefficients._as_stated(asked, found.explanation)
     )

@@ -107,18 +107,23 @@ def model_of(found: Hypothesis) -> GreyBox:
     return found.explanation.fitted.model.without_absent(found.explanation.effects)
 
 
-def as_stated(layout: Layout, found: FittedHypothesis) -> tuple[GreyBox, GreyBox]:
-    """Return the model with what its last effect varies as stated, the others refitted, and left where they are.
+def as_stated(
+    layout: Layout, found: FittedHypothesis, held: Sequence[str] | None = None
+) -> tuple[GreyBox, GreyBox]:
+    """Return the model with what some effects vary as stated, the others refitted, and left where they are.
 
     Args:
         layout: stated values.
         found: the fit, with sums by which the others follow.
+        held: effects of the fit that are as stated; the last one by default.
     """
     fitted, names = found.fitted, found.names
-    own = layout.places(names)[found.effects[-1]]
+    held = [found.effects[-1]] if held is None else list(held)
+    places, none = layout.places(names), np.zeros(0, dtype=np.int64)
+    own = np.concatenate([none, *(places[n] for n in held)])
     others = np.setdiff1d(np.arange(len(fitted.theta)), own)
     stated = fitted.theta.copy()
-    stated[own] = layout.means[found.effects[-1]]
+    stated[own] = np.concatenate([np.zeros(0), *(layout.means[n] for n in held)])
     whole = NormalEquations(fitted.statistics.total + fitted.priors.square, np.zeros(len(stated)))
     followed = stated.copy()
     followed[others] -= whole.eliminate(own, others, rcond=1e-12).carry.T @ (stated - fitted.theta)[own]
