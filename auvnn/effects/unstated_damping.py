@@ -94,9 +94,8 @@ def _coefficients(vehicle: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
         for element in vehicle.damping_elements:
             place, axes = (torch.tensor(np.array(x)) for x in (element.position, element.axes))
             # What resists a unit of velocity in each degree of freedom: T^T D |T nu|^k T nu.
-            out[k] += np.asarray(getattr(element, kind)) @ np.abs(element_transform(place, axes).numpy()) ** (
-                2 + k
-            )
+            reach = np.abs(element_transform(place, axes).numpy())
+            out[k] += np.asarray(getattr(element, kind)) @ reach ** (2 + k)
     return np.where(out > 1e-9 * out.max(), out, 0.0)
 
 

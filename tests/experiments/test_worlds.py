@@ -24,7 +24,7 @@ SAMPLES = {
 
 
 # Logs of the plan on which rules are made, with seeds that no rule has seen.
-MADE = "rows-made.jsonl"
+MADE, MADE_LATER = "rows-made.jsonl", "rows-made-49.jsonl"
 
 
 def rows_of(name):
@@ -64,7 +64,14 @@ def test_the_fresh_logs_of_each_world_give_what_is_told():
         assert (named, wrong) == said and f"{named} (" in text and f"{wrong} logs" in text
 
 
-@pytest.mark.parametrize("name", [*SAMPLES, MADE])
+def test_the_later_fresh_rows_are_every_seventh_log_of_that_plan():
+    options, _ = of_plan("worlds_made")
+    fresh = cases({**options, "shift": 49000000, "every": 7, "offset": 2})
+    done = [Case.of_row(r) for r in rows_of(MADE_LATER)]
+    assert {*done} == {*fresh} and len({*done}) == len(done)
+
+
+@pytest.mark.parametrize("name", [*SAMPLES, MADE, MADE_LATER])
 def test_the_rows_give_what_is_told(name):
     rows = rows_of(name)
     expected = json.loads((HERE / "expected.json").read_text())[name]

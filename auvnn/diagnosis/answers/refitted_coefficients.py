@@ -48,8 +48,9 @@ def refitted_coefficients(asked: Setting, state: State) -> RefittedCoefficients 
         # The verdict did not need it: a log too short to leave a part of it out has none.
         return None
     best = min(before, key=lambda errors: errors.total)
-    if best.reason or after.reason or best.horizon != after.horizon:
+    if best.horizon != after.horizon:
         return None
+    # Without a figure for either there is no fall that is sure.
     fall = gain(best, after)
     matters = fall.cost >= asked.tolerance.cost or costs_in_one(fall, asked.tolerance)
     if not (fall.beyond(SURELY) and matters):

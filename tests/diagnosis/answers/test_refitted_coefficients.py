@@ -263,9 +263,12 @@ def test_a_name_that_looks_like_the_coefficients_follows_them():
     found = diagnose(model, log, effects=["thruster_gain"], advice=False)
     assert found.missing == ["thruster_gain"]
     asked: Any = SimpleNamespace(model=model, layout=lay_out(model, ["thruster_gain"]))
-    follows, stays = (
-        roll(m, log, "5", scale_of(log)).total(scale_of(log))
-        for m in refitted_coefficients._as_stated(asked, found.explanation)
-    )
+    models = refitted_coefficients._as_stated(asked, found.explanation)
+    for made in models:
+        # The coefficients are those of the file; the names are not gone.
+        np.testing.assert_allclose(made.prepare().body.quadratic, model.prepare().body.quadratic)
+        assert made.effect_names == ["thruster_gain"]
+        assert all(0.3 < g < 0.95 for g in made.effect("thruster_gain").values().values())
+    follows, stays = (roll(m, log, "5", scale_of(log)).total(scale_of(log)) for m in models)
     assert follows < 0.9 * stays
     assert found.refitted is None or found.refitted["before"] == pytest.approx(follows, rel=1e-6)
