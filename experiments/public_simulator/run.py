@@ -2,8 +2,9 @@
 
 python experiments/public_simulator/run.py CHECKOUT OUT [seed=50] [NAME ...]
 
-CHECKOUT is one of the PythonVehicleSimulator (REMUS 100) or of bluerov2_dynamics (BlueROV2 Heavy). Of the K-th change the
-log has the seed K more than that which is given: another one is another log, with other settings and noise.
+CHECKOUT is one of the PythonVehicleSimulator (REMUS 100), of bluerov2_dynamics (BlueROV2 Heavy) or of cola2_core (Girona
+500). Of the K-th change the log has the seed K more than that which is given: another one is another log, with other
+settings and noise.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from typing import Any
 
 import bluerov2
 import bluerov2_changes
+import girona500
+import girona500_changes
 import remus
 import remus_changes
 import yaml
@@ -52,17 +55,22 @@ class Study:
     also: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
-def _described(vehicle: Any, out: Path) -> str:
-    path = out / "given.yaml"
-    path.write_text(yaml.safe_dump(remus.description(vehicle), sort_keys=False))
-    return str(path)
+def _described(description: Callable[[Any], Mapping[str, Any]]) -> Callable[[Any, Path], str]:
+    """Return what writes the model file of a vehicle from its numbers."""
+
+    def given(vehicle: Any, out: Path) -> str:
+        path = out / "given.yaml"
+        path.write_text(yaml.safe_dump(dict(description(vehicle)), sort_keys=False))
+        return str(path)
+
+    return given
 
 
 REMUS = Study(
     remus.simulator,
     remus.Plant,
     remus_changes.CHANGES,
-    _described,
+    _described(remus.description),
     remus.disagreement,
     ("linear_damping", "quadratic_damping", "coupled_damping"),
 )
@@ -76,11 +84,21 @@ BLUEROV2 = Study(
     ("thruster_lag",),
     bluerov2_changes.ALSO,
 )
+GIRONA500 = Study(
+    girona500.simulator,
+    girona500.Plant,
+    girona500_changes.CHANGES,
+    _described(girona500.description),
+    girona500.disagreement,
+    ("actuation_delay",),
+    girona500_changes.ALSO,
+)
 
 
 def study_of(folder: Path) -> Study:
     """Return the study whose simulator a checkout is of."""
-    return BLUEROV2 if (folder / bluerov2.FILE).exists() else REMUS
+    others = ((bluerov2.FILE, BLUEROV2), (girona500.FILE, GIRONA500))
+    return next((study for file, study in others if (folder / file).exists()), REMUS)
 
 
 def fitted(study: Study, module: Any, out: Path) -> Path:
