@@ -18,6 +18,7 @@ from auvnn.diagnosis.hypotheses.candidates import candidates_for
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.answer import answer_with_force, ends_early
+from auvnn.diagnosis.noise_law.commands.stated import stated_commands
 from auvnn.diagnosis.search import search
 from auvnn.diagnosis.stages.beyond_stated import beyond_stated
 from auvnn.diagnosis.stages.runaway import windows_that_hold
@@ -192,9 +193,11 @@ def searched(
         say=say,
         pool=pool,
         driven=driven,
+        commands=stated_commands(known, windows) if stochastic else None,
     )
     try:
-        state, told, words = search(asked, windows, until=ends_early if stochastic else None), {}, []
+        begin = windows if asked.commands is None else asked.commands.law.applied(windows)
+        state, told, words = search(asked, begin, until=ends_early if stochastic else None), {}, []
         if window is None:
             asked, state = search_over_shorter(asked, state, search)
         if stochastic:

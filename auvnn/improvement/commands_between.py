@@ -14,7 +14,8 @@ from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, lay_out
 from auvnn.diagnosis.noise_law.commands.early import clearly_between_samples
-from auvnn.diagnosis.noise_law.commands.holding import HELD, Holding, holding
+from auvnn.diagnosis.noise_law.commands.holding import holding
+from auvnn.diagnosis.noise_law.commands.law import HELD, Holding
 from auvnn.diagnosis.noise_law.commands.share import with_share
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.score_tests.shape_search import searched_start

@@ -194,7 +194,9 @@ def test_bluerov2_heavy_curve_is_eq_18() -> None:
         off = np.abs(table - eq_18(commands))
         # A curve that is off by more is found in a log as a dead band of the thrusters.
         assert off.max() < 0.045
-        assert (off[np.abs(commands) >= 0.05] < 0.0035 * np.abs(eq_18(commands))[np.abs(commands) >= 0.05]).all()
+        assert (
+            off[np.abs(commands) >= 0.05] < 0.0035 * np.abs(eq_18(commands))[np.abs(commands) >= 0.05]
+        ).all()
         assert thruster.curve.thrust[-1] == pytest.approx(30.4, abs=1e-9)
         assert thruster.max_forward == thruster.max_reverse == pytest.approx(30.62, abs=0.01)
 

@@ -6,6 +6,7 @@ Where the first search leaves nothing, its answer stands, but for names that ano
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -15,22 +16,19 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.commands.early import clearly_between_samples
-from auvnn.diagnosis.noise_law.commands.holding import (
-    HELD,
-    Holding,
-    cost_at_best,
-    cost_with,
-    holding,
-)
+from auvnn.diagnosis.noise_law.commands.holding import cost_at_best, cost_with, holding
 from auvnn.diagnosis.noise_law.commands.in_place_of_names import (
     in_place_of_names,
     replaced,
     replaces,
+    stand_for_another_law,
     without,
     without_timed,
 )
 from auvnn.diagnosis.noise_law.commands.later import late_by_a_share
+from auvnn.diagnosis.noise_law.commands.law import HELD, Holding
 from auvnn.diagnosis.noise_law.commands.share import with_share
+from auvnn.diagnosis.noise_law.commands.stated import unless_likelier
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncertain_wrench
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.noise_law.left_force import leaves_force
@@ -47,6 +45,7 @@ from auvnn.diagnosis.search import a_force_stays, search
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.diagnosis.stages.what_is_left import settled
 from auvnn.metrics.force_law import ForceLaw
+from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
 UNDECIDED = (
@@ -73,7 +72,10 @@ def ends_early(asked: Setting, state: State) -> bool:
             and leaves_force(asked, state, state.current)
             and (
                 clearly_coloured(state.current, state.windows, asked.floor)
-                or clearly_between_samples(asked.layout, state.current, state.windows)
+                or (
+                    asked.commands is None
+                    and clearly_between_samples(asked.layout, state.current, state.windows)
+                )
             )
         )
     except UNSOLVED:
@@ -87,20 +89,34 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         asked: what is asked.
         state: where the first search ended.
     """
-    began = state
+    began, stated = state, asked.commands
     if not state.leaves_something:
+        if stated is not None and not stand_for_another_law(asked, state):
+            return _names_alone(asked, began, state, {"commands": stated.law.to_dict()}, [])
+        if stated is not None:
+            asked.say("commands may go otherwise than the model states: searching again")
+            unstated = replace(asked, commands=None)
+            return answer_with_force(
+                unstated, search(unstated, stated.as_read(state.windows), until=ends_early)
+            )
         return _names_alone(asked, began, *_with_fewer_names(asked, state))
-    least, held = _held(asked.layout, state)
-    untimed, gone = without_timed(asked, state, least), dict[str, str]()
-    law = None if untimed is None else replaces(untimed, least, held, state.windows, asked.layout)
-    if untimed is not None and law is not None:
-        gone = replaced(untimed, least)
-        asked, least, held = without(asked, gone), untimed, law
-    with suppress(*UNSOLVED):
-        held = with_share(asked.layout, least, state.windows, held)
-    windows = held.applied(state.windows)
+    read = state.windows if stated is None else stated.as_read(state.windows)
+    least, held = _held(asked.layout, state, read)
+    if stated is not None:
+        with suppress(*UNSOLVED):
+            held = unless_likelier(asked.layout, stated.law, held, least, read)
+    gone = dict[str, str]()
+    if not held.stated:
+        untimed = without_timed(asked, state, least)
+        law = None if untimed is None else replaces(untimed, least, held, read, asked.layout)
+        if untimed is not None and law is not None:
+            gone = replaced(untimed, least)
+            asked, least, held = without(asked, gone), untimed, law
+        with suppress(*UNSOLVED):
+            held = with_share(asked.layout, least, read, held)
+    windows = held.applied(read)
     try:
-        uncertain = uncertain_wrench(least, state.windows, held)
+        uncertain = uncertain_wrench(least, read, held)
     except UNSOLVED:
         uncertain = UncertainWrench(np.zeros(6), np.zeros(6), 0.0)
     asked.say("asking whether the sensors' noise is white")
@@ -108,17 +124,20 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         colour = noise_colour(least, windows, asked.floor, sensing_alone(asked, state))
     except UNSOLVED:
         colour = Colour(None, 0.0)
-    if held.odds > 0.0 or colour.noise is not None:
-        why = [f"commands change between samples ({held.name})"] if held.odds > 0.0 else []
+    # By the statement of the model, or by a law that the log has been asked for: the search was with that already.
+    otherwise = not held.stated and (held.changes or stated is not None)
+    if otherwise or colour.noise is not None:
+        go = f"change between samples ({held.name})" if held.changes else "are held until the next sample"
+        why = [f"commands {go}"] if otherwise else []
         why += [] if colour.noise is None else ["the sensors' noise is not white"]
         asked.say(f"{' and '.join(why)}: searching again")
         state = search(asked, colour.applied(windows), until=a_force_stays)
-        late = None if colour.noise is not None else late_by_a_share(asked, state, began.windows, held)
+        late = None if colour.noise is not None else late_by_a_share(asked, state, read, held)
         if late is not None:
             gone = {**gone, **replaced(late[0], state.current)}
             asked, held = without(asked, gone), late[1]
             asked.say("commands act later than taken, by part of an interval: searching again")
-            state = search(asked, held.applied(began.windows), until=a_force_stays)
+            state = search(asked, held.applied(read), until=a_force_stays)
         state = state.but(failed={**state.failed, **gone})
     wrench = uncertain.to_dict()
     told: dict[str, Any] = {
@@ -185,27 +204,32 @@ def _with_fewer_names(asked: Setting, state: State) -> tuple[State, dict[str, An
     return again.but(failed={**again.failed, **gone}), {"commands": law.to_dict()}, []
 
 
-def _held(layout: Layout, state: State) -> tuple[FittedHypothesis, Holding]:
+def _held(layout: Layout, state: State, read: Windows) -> tuple[FittedHypothesis, Holding]:
     """Return the explanation that leaves least, whatever the search made of it, and how commands go by it.
 
     One that was tried and is about to diverge says nothing of them: then the next best is asked. The fit without any name
     is asked too: names fitted to such commands as they are have taken up what the commands do to them. It decides where
     the commands have noise and no name stands, and where another law alone explains as much as the names do.
+
+    Args:
+        layout: of the model as it is stated.
+        state: where a search has ended.
+        read: windows of commands as they were read.
     """
     sigma = state.first.fitted.sigma
     known = [state.first, *state.tried, state.refuted or state.current]
     least, held = state.first, HELD
     for end in sorted(known, key=lambda e: e.squared_error(sigma)):
         with suppress(np.linalg.LinAlgError):
-            least, held = end, holding(end, state.windows, layout)
+            least, held = end, holding(end, read, layout)
             break
     if held.name == "held" and least is not state.first:
         with suppress(np.linalg.LinAlgError):
-            plain = holding(state.first, state.windows, layout)
+            plain = holding(state.first, read, layout)
             if plain.name == "averaged" and not state.chosen:
                 return least, plain
-            alone = cost_with(plain, state.first, state.windows, layout=layout)
-            if plain.odds > 0.0 and alone <= cost_at_best(least, state.windows, sigma):
+            alone = cost_with(plain, state.first, read, layout=layout)
+            if plain.odds > 0.0 and alone <= cost_at_best(least, read, sigma):
                 return state.first, plain
     return least, held
 

@@ -28,7 +28,7 @@ def stochastic_words(stochastic: Mapping[str, Any]) -> list[str]:
     if commands and commands["between_samples"] != "held":
         given = {n: commands[n] for n in ("samples", "interpolated") if n in commands}
         path = CommandPath(commands["between_samples"], commands["share_of_next"], 1.0, **given)
-        lines.append(path.words())
+        lines.append(f"{path.words()} The model states it." if commands.get("stated") else path.words())
     uncertain = {a: v for a, v in (commands or {}).get("uncertain", {}).items() if v > 0.0}
     if uncertain:
         sizes = [f"{MOTIONS[a]} {v:.2g} {'N' if a in 'XYZ' else 'N m'}" for a, v in uncertain.items()]

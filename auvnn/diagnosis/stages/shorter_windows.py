@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from auvnn.diagnosis.hypotheses.measured_start import GROSS, noise_share
+from auvnn.diagnosis.noise_law.commands.stated import StatedCommands
 from auvnn.diagnosis.score_tests.score import Score
 from auvnn.diagnosis.stages.runaway import windows_that_hold
 from auvnn.diagnosis.stages.state import Setting, State
@@ -95,6 +96,9 @@ def search_over_shorter(asked: Setting, state: State, search: Callable[..., Stat
     try:
         windows, notes = windows_that_hold(asked.layout.model, asked.log, SHORTER, asked.driven)
         shorter = replace(asked, floor=TRUST * motion(windows) + 1e-9)
+        if asked.commands is not None:
+            shorter = replace(shorter, commands=StatedCommands(windows, asked.commands.law))
+            windows = asked.commands.law.applied(windows)
         progress = Progress(asked.layout.nuisance)
         other = search(shorter, windows, progress, promising=progress.promising)
     except (InputError, FitError, np.linalg.LinAlgError, SINGULAR):

@@ -14,6 +14,7 @@ from auvnn.diagnosis.answers.table import CandidateRow
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
+from auvnn.diagnosis.noise_law.commands.stated import StatedCommands
 from auvnn.diagnosis.residuals.additive_force_test import AdditiveForce
 from auvnn.diagnosis.residuals.variance_component_test import Unnamed
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
@@ -50,6 +51,7 @@ class Setting:
         say: called with what is being done, in words.
         pool: who makes fits of which none has to wait for another.
         driven: the model by whose statement commands go between samples, where the log is not asked for that; else None.
+        commands: how they go by the model's statement where the log is asked for it, too; None where it states nothing.
     """
 
     model: GreyBox
@@ -69,6 +71,7 @@ class Setting:
     say: Callable[[str], None]
     pool: Executor = SERIAL
     driven: GreyBox | None = None
+    commands: StatedCommands | None = None
 
     @property
     def stated(self) -> dict[str, Array]:

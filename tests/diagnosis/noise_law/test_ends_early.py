@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from auvnn.diagnosis.noise_law import answer
-from auvnn.diagnosis.noise_law.commands.holding import HELD
+from auvnn.diagnosis.noise_law.commands.law import HELD
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench
 from auvnn.diagnosis.noise_law.noise_colour import Colour
 from auvnn.metrics.coloured_noise import NoiseColour
 
-NOTHING: Any = SimpleNamespace(floor=None, layout=None, say=lambda _: None)
+NOTHING: Any = SimpleNamespace(floor=None, layout=None, commands=None, say=lambda _: None)
 
 
 class Stage(SimpleNamespace):

@@ -8,8 +8,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import torch
 
 from auvnn.diagnosis.hypotheses.measured_start import noise_share
+from auvnn.diagnosis.noise_law.commands.law import Holding
+from auvnn.diagnosis.noise_law.commands.stated import StatedCommands
 from auvnn.diagnosis.stages import shorter_windows
 from auvnn.diagnosis.stages.shorter_windows import BEYOND, Progress, search_over_shorter
 from auvnn.errors import InputError
@@ -40,6 +43,7 @@ class Asked:
     floor: object = 0.0
     notes: tuple = ("stated",)
     driven: object = None
+    commands: object = None
 
     def say(self, words):
         """Say nothing."""
@@ -85,6 +89,22 @@ def test_names_that_leave_the_noise_alone_are_taken_and_said(asked):
     assert seen == [pytest.approx(2.0, abs=0.11)]
     assert given.notes[0] == "stated" and "windows of 2 s were taken" in given.notes[1]
     assert np.shape(given.floor) == (18,)
+
+
+def test_shorter_windows_go_between_samples_as_the_model_states(asked):
+    law = Holding("averaged", 0.5, 0.0, 0.0, 4, stated=True)
+    seen = []
+
+    def search(what, windows, *_, **__):
+        seen.append((what, windows))
+        return state(1.1, ("body_lift",))
+
+    given, _ = search_over_shorter(replace(asked, commands=StatedCommands(None, law)), state(5.0), search)
+    what, windows = seen[0]
+    assert given.commands is what.commands and what.commands.law is law
+    read = what.commands.read.inputs.command
+    assert torch.equal(windows.inputs.command, law.applied(what.commands.read).inputs.command)
+    assert not torch.equal(windows.inputs.command, read)
 
 
 def test_a_name_that_takes_little_away_ends_the_search():

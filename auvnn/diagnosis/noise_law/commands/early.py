@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
-from auvnn.diagnosis.noise_law.commands.holding import HELD, LINEAR, Holding, cost_with
+from auvnn.diagnosis.noise_law.commands.holding import LINEAR, cost_with
+from auvnn.diagnosis.noise_law.commands.law import HELD, Holding
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.metrics.commands.mean_thrust import MeanThrust
 from auvnn.metrics.windows import Windows

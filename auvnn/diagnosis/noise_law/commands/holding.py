@@ -28,23 +28,22 @@ regression calibration.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
+from auvnn.diagnosis.noise_law.commands.law import HELD, Holding
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.metrics.commands.mean_thrust import MeanThrust
-from auvnn.metrics.commands.paths import LAWS, between
+from auvnn.metrics.commands.paths import between
 from auvnn.metrics.windows import Windows
-from auvnn.models.actuation.command_path import CommandPath
 
 Array = NDArray[np.float64]
 LINEAR = 0.5
@@ -58,53 +57,6 @@ PLAINER = float(np.log(10.0))
 FAR = 2.0
 # Steps of a fit to other commands: it begins where that of held ones ended.
 ITERATIONS = 6
-
-
-@dataclass(frozen=True)
-class Holding:
-    """How commands go from sample to sample, by a log.
-
-    Attributes:
-        name: "held", "linear", "ahead", "smooth" or "averaged".
-        share: of the next sample's command in an interval's mean.
-        odds: logarithm of the odds against holding; zero where it is held.
-        gain: fall of the weighted squared error, for the variance that the windows show.
-        samples: in an interval's mean, where it is averaged; else zero.
-        curves: of the thrusters, whose mean thrust is taken; None for a commanded wrench.
-    """
-
-    name: str
-    share: float
-    odds: float
-    gain: float
-    samples: int = 0
-    curves: MeanThrust | None = field(default=None, compare=False)
-
-    def applied(self, windows: Windows) -> Windows:
-        """Return windows of commands that go so."""
-        along = self.name if self.name in LAWS else "ahead"
-        return between(windows, self.share, along, samples=self.samples, curves=self.curves)
-
-    def path(self, interval: float) -> CommandPath | None:
-        """Return it as models state it; None where commands are held.
-
-        Args:
-            interval: between samples of the log, s.
-        """
-        if self.name == "held":
-            return None
-        through = "thrust" if self.curves is not None and self.curves.through_thrusts else "command"
-        return CommandPath(self.name, self.share, interval, self.samples, through)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data."""
-        told = {"between_samples": self.name, "share_of_next": self.share, "log_odds": self.odds}
-        if self.curves is not None and self.curves.through_thrusts:
-            told["interpolated"] = "thrust"
-        return {**told, "samples": self.samples} if self.samples else told
-
-
-HELD = Holding("held", 0.0, 0.0, 0.0)
 
 
 def holding(first: FittedHypothesis, windows: Windows, layout: Layout | None = None) -> Holding:

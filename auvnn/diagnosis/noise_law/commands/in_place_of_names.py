@@ -16,13 +16,8 @@ from dataclasses import replace
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
-from auvnn.diagnosis.noise_law.commands.holding import (
-    HELD,
-    Holding,
-    cost_at_best,
-    cost_with,
-    holding,
-)
+from auvnn.diagnosis.noise_law.commands.holding import cost_at_best, cost_with, fitted_to, holding
+from auvnn.diagnosis.noise_law.commands.law import HELD, Holding
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.diagnosis.stages.state import Setting, State
@@ -57,6 +52,31 @@ def in_place_of_names(asked: Setting, state: State) -> tuple[FittedHypothesis, H
         if law is not None:
             return before, law
     return None
+
+
+def stand_for_another_law(asked: Setting, state: State) -> bool:
+    """Whether names of timing only say that commands go otherwise than the model states: another law does what they did.
+
+    Args:
+        asked: what is asked, with commands as the model states them.
+        state: where a search with these has ended, with names.
+    """
+    stated, end = asked.commands, state.current
+    before = None if stated is None else without_timed(asked, state, end)
+    if stated is None or before is None:
+        return False
+    read, sigma, sums = stated.as_read(state.windows), end.fitted.sigma, end.fitted.statistics
+    least = PARAMETER * (len(end.fitted.theta) - len(before.fitted.theta))
+    least *= variance_inflation(sums.slope, sums.total, sums.run)
+    with suppress(*UNSOLVED):
+        # The explanation was fitted to commands that may be wrong, and is then too far off for the first order about it.
+        held = fitted_to(asked.layout, before, read, sigma)
+        if replaces(held, end, stated.law, read, asked.layout) is not None:
+            return True
+        return (
+            cost_at_best(held, read, sigma) - cost_with(stated.law, end, read, sigma, asked.layout) <= least
+        )
+    return False
 
 
 def replaced(before: FittedHypothesis, end: FittedHypothesis) -> dict[str, str]:

@@ -14,8 +14,9 @@ import numpy as np
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.standard_errors import of_timing
-from auvnn.diagnosis.noise_law.commands.holding import Holding, cost_at_best, cost_with
+from auvnn.diagnosis.noise_law.commands.holding import cost_at_best, cost_with
 from auvnn.diagnosis.noise_law.commands.in_place_of_names import PARAMETER, without_timed
+from auvnn.diagnosis.noise_law.commands.law import Holding
 from auvnn.diagnosis.noise_law.commands.share import with_share
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation

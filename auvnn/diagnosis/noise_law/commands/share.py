@@ -15,13 +15,13 @@ from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.commands.holding import (
     LINEAR,
     PLAINER,
-    Holding,
     cost_at_best,
     fitted_to,
     laws_of,
     least_share,
     through_thrusts,
 )
+from auvnn.diagnosis.noise_law.commands.law import Holding
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.metrics.commands.mean_thrust import MeanThrust
 from auvnn.metrics.commands.paths import LAWS, between

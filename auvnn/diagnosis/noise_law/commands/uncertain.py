@@ -18,7 +18,8 @@ from scipy.stats import f as f_distribution
 from torch import Tensor
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
-from auvnn.diagnosis.noise_law.commands.holding import LINEAR, Holding
+from auvnn.diagnosis.noise_law.commands.holding import LINEAR
+from auvnn.diagnosis.noise_law.commands.law import Holding
 from auvnn.diagnosis.residuals.forces import fins_of
 from auvnn.effects.base import AXES
 from auvnn.estimation.window_normal_equations import linearise
@@ -87,7 +88,7 @@ def uncertain_wrench(end: FittedHypothesis, windows: Windows, held: Holding) -> 
     smooth, white = np.zeros(6), noise_answered(end, windows)
     if held.name == "averaged":
         white = np.maximum(white, law_differences(model, windows, held))
-    elif held.odds > 0.0:
+    elif held.changes:
         smooth = law_differences(model, windows, held)
     return UncertainWrench(smooth, white, step, in_closed_loop(end, windows))
 

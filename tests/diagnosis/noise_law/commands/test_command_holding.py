@@ -15,12 +15,8 @@ from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law import answer
 from auvnn.diagnosis.noise_law.answer import _held
-from auvnn.diagnosis.noise_law.commands.holding import (
-    AVERAGED,
-    Holding,
-    _best,
-    holding,
-)
+from auvnn.diagnosis.noise_law.commands.holding import AVERAGED, _best, holding
+from auvnn.diagnosis.noise_law.commands.law import Holding
 from auvnn.diagnosis.noise_law.commands.share import with_share
 from auvnn.estimation.window_parts import split
 from auvnn.metrics.commands.mean_thrust import MeanThrust
@@ -240,7 +236,7 @@ def test_a_fit_that_grows_without_bound_is_passed_over(model):
         state: Any = SimpleNamespace(
             first=first, tried=list(tried), current=wild, refuted=None, windows=windows, chosen=()
         )
-        return _held(None, state)
+        return _held(None, state, windows)
 
     assert found(first, wild) == (first, holding(first, windows))
     assert found(wild)[1].name == "held"
@@ -290,7 +286,7 @@ def test_names_stand_against_another_law_only_if_they_explain_more(model, monkey
     state: Any = SimpleNamespace(
         first=first, tried=(named,), refuted=None, current=named, windows=windows, chosen=("lag",)
     )
-    least, law = _held(None, state)
+    least, law = _held(None, state, windows)
     assert (law.name == "held") == (name == "held") and (least is named) == (name == "held")
 
 
@@ -308,5 +304,5 @@ def test_noisy_commands_count_where_no_name_stands(model, monkeypatch, chosen, n
     state: Any = SimpleNamespace(
         first=first, tried=(tried,), refuted=None, current=first, windows=windows, chosen=chosen
     )
-    least, law = _held(None, state)
+    least, law = _held(None, state, windows)
     assert law.name == name and least is tried

@@ -12,7 +12,8 @@ from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.commands.early import clearly_between_samples
-from auvnn.diagnosis.noise_law.commands.holding import FAR, Holding, cost_at_best, cost_with, holding
+from auvnn.diagnosis.noise_law.commands.holding import FAR, cost_at_best, cost_with, holding
+from auvnn.diagnosis.noise_law.commands.law import Holding
 from auvnn.diagnosis.noise_law.commands.share import with_share
 from auvnn.estimation.window_parts import split
 from auvnn.logs import Log, Run

@@ -93,7 +93,7 @@ def test_where_names_leave_nothing_a_law_that_spares_some_of_them_takes_their_pl
     monkeypatch.setattr(answer, "replaced", lambda fewer, end: {"thrust_overshoot": "why"})
     monkeypatch.setattr(answer, "without", lambda asked, gone: [*gone])
     monkeypatch.setattr(answer, "search", lambda asked, windows: searched.append((asked, windows)) or again)
-    asked: Any = SimpleNamespace(say=lambda _: None)
+    asked: Any = SimpleNamespace(say=lambda _: None, commands=None)
     found = answer.answer_with_force(asked, state)
     assert searched == [(["thrust_overshoot"], "held, smooth")]
     if given:

@@ -14,8 +14,8 @@ from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law import answer
 from auvnn.diagnosis.noise_law.commands import later
-from auvnn.diagnosis.noise_law.commands.holding import HELD, Holding
 from auvnn.diagnosis.noise_law.commands.later import late_by_a_share
+from auvnn.diagnosis.noise_law.commands.law import HELD, Holding
 from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.diagnosis.stages.state import State
 from auvnn.metrics.commands.mean_thrust import MeanThrust
@@ -109,7 +109,7 @@ def test_the_answer_searches_again_without_it(late, monkeypatch):
         made.append((asked.usable, windows))
         return state.but(windows=windows, current=state.current if len(made) == 1 else state.first)
 
-    asked = SimpleNamespace(**vars(asked), usable=tuple(NAMES), floor=1e-9, say=lambda _: None)
+    asked = SimpleNamespace(**vars(asked), usable=tuple(NAMES), floor=1e-9, commands=None, say=lambda _: None)
     monkeypatch.setattr(answer, "search", searched)
     monkeypatch.setattr(answer, "_held", lambda *_: (state.first, law))
     monkeypatch.setattr(answer, "with_share", lambda *_: law)

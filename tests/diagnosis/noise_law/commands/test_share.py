@@ -10,7 +10,8 @@ from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
-from auvnn.diagnosis.noise_law.commands.holding import HELD, Holding, holding
+from auvnn.diagnosis.noise_law.commands.holding import holding
+from auvnn.diagnosis.noise_law.commands.law import HELD, Holding
 from auvnn.diagnosis.noise_law.commands.share import with_share
 from auvnn.metrics.commands.mean_thrust import MeanThrust
 from auvnn.models import GreyBox

@@ -14,7 +14,7 @@ from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
 from auvnn.diagnosis.noise_law.commands import uncertain
-from auvnn.diagnosis.noise_law.commands.holding import Holding
+from auvnn.diagnosis.noise_law.commands.law import Holding
 from auvnn.diagnosis.noise_law.commands.uncertain import (
     UncertainWrench,
     in_closed_loop,

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import torch
 
-from auvnn.diagnosis.noise_law.commands.holding import HELD, Holding
+from auvnn.diagnosis.noise_law.commands.law import HELD, Holding
 from auvnn.diagnosis.noise_law.words import stochastic_words
 from auvnn.metrics.commands.mean_thrust import MeanThrust
 from auvnn.models import GreyBox

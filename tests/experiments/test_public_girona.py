@@ -1,0 +1,185 @@
+"""The study on public simulators: its logs and names, by a stand-in with the interface of COLA2's Girona 500."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+import auvnn
+from tests.experiments.public_simulators import studied
+
+# A vehicle with the interface of the simulator's class, and numbers of our own, with the simplest steps.
+GIRONA = """
+import rospy
+from cola2_lib.rosutils import param_loader
+from cola2_lib.utils.angles import wrap_angle
+import numpy as np
+
+class Dynamics:
+    def __init__(self, name):
+        param_loader.get_ros_params(self, {
+            "mass": ("mass", 80.0), "buoyancy": ("buoyancy", 81.0), "g": ("g", 9.8), "density": ("density", 1000.0),
+            "gravity_center": ("gravity_center", [0.0, 0.0, 0.04]), "period": ("period", 0.01),
+            "max_thrusters_rpm": ("max_thrusters_rpm", 1000.0), "ctf": ("ctf", 1e-4), "ctb": ("ctb", 8e-5),
+            "tensor": ("tensor", [7.0, 0.0, 0.0, 0.0, 8.0, 0.0, 0.0, 0.0, 9.0]),
+            "damping": ("damping", [-5.0, -50.0, -5.0, -90.0, -90.0, -90.0]),
+            "quadratic_damping": ("quadratic_damping", [-90.0, -120.0, -130.0, -60.0, -60.0, -60.0]),
+            "thrusters_matrix": ("thrusters_matrix", [[-1, -1, 0, 0, 0], [0, 0, 0, 0, 1], [0, 0, -1, -1, 0],
+                                                      [0, 0, 0, 0, 0], [0, 0, 0.3, -0.3, 0], [-0.5, 0.5, 0, 0, 0]]),
+        })
+        self.thrusters_matrix = np.array(self.thrusters_matrix, float)
+        lever = 80.0 * 0.04
+        self.M = np.diag([120.0, 120.0, 120.0, 7.0, 8.0, 9.0])
+        self.M[0, 4] = self.M[4, 0] = lever
+        self.M[1, 3] = self.M[3, 1] = -lever
+        self.IM = np.linalg.inv(self.M)
+        self.u = self.old_u = np.zeros(5)
+        self.f = np.zeros(0)
+
+    def update_thrusters(self, message):
+        self.old_u, self.u = self.u, np.array(message.setpoints)
+
+    def compute_currents(self):
+        return np.zeros(6)
+
+    def damping_matrix(self, speed):
+        return np.diag(np.array(self.damping) + np.array(self.quadratic_damping) * abs(speed))
+
+    def gravity(self, pos):
+        weight, up, (roll, pitch) = self.mass * self.g, self.buoyancy * self.g, pos[3:5]
+        down = np.array([-np.sin(pitch), np.cos(pitch) * np.sin(roll), np.cos(pitch) * np.cos(roll)])
+        return -np.array([*((weight - up) * down), *np.cross([0.0, 0.0, 0.04], weight * down)])
+
+    def inverse_dynamic(self, pos, vel, u, f, current):
+        push = self.thrusters_matrix @ (np.where(u > 0, self.ctf, self.ctb) * u * abs(u))
+        linear, angular = self.M[:3] @ vel, self.M[3:] @ vel
+        turning = np.array([*np.cross(vel[3:], linear), *(np.cross(vel[:3], linear) + np.cross(vel[3:], angular))])
+        drag = self.damping_matrix(vel + current) @ (vel + current)
+        return np.asarray(self.IM @ (push + drag - turning - self.gravity(pos))).ravel()
+
+    def iterate(self):
+        c, s = np.cos(self.p[5]), np.sin(self.p[5])
+        moved = np.array([c * self.v[0] - s * self.v[1], s * self.v[0] + c * self.v[1], *self.v[2:]])
+        force = self.inverse_dynamic(self.p, self.v, (self.u + self.old_u) / 2, self.f, self.compute_currents())
+        self.p, self.v = self.p + self.period * moved, self.v + self.period * force
+        self.p[5] = wrap_angle(self.p[5])
+        self.pub_odometry()
+
+    def pub_odometry(self):
+        rospy.publish(self.p)
+"""
+
+
+@pytest.fixture(scope="module")
+def girona(tmp_path_factory):
+    """The study's modules, and a checkout with a stand-in for that simulator."""
+    checkout = tmp_path_factory.mktemp("girona")
+    (checkout / "cola2_sim" / "src").mkdir(parents=True)
+    (checkout / "cola2_sim" / "src" / "dynamics.py").write_text(GIRONA)
+    with studied() as run:
+        import girona500
+
+        yield girona500, run, girona500.simulator(checkout), checkout
+
+
+def test_the_checkout_tells_that_it_is_the_girona(girona, tmp_path):
+    girona500, run, _, checkout = girona
+    assert run.study_of(checkout) is run.GIRONA500
+    with pytest.raises(SystemExit, match=r"no cola2_sim/src/dynamics\.py"):
+        girona500.simulator(tmp_path)
+    # Nothing is left of what stood in for ROS while the class was imported.
+    assert not {*girona500.ROS} & {*sys.modules}
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("thrusters_matrix", np.eye(6)), ("quadratic_damping", [90.0] * 6), ("M", 2 * np.eye(6) * 80.0)],
+)
+def test_another_version_of_the_girona_is_refused(girona, monkeypatch, name, value):
+    girona500, _, module, checkout = girona
+    vehicle = module.Dynamics("g500")
+    assert girona500._is_known(vehicle)
+    setattr(vehicle, name, value)
+    assert not girona500._is_known(vehicle)
+    monkeypatch.setattr(girona500, "_is_known", lambda vehicle: False)
+    with pytest.raises(SystemExit, match=f"another version of the vehicle; git checkout {girona500.COMMIT}"):
+        girona500.simulator(checkout)
+
+
+def test_the_model_file_of_the_girona_has_the_forces_of_its_class(girona, tmp_path):
+    girona500, run, module, _ = girona
+    vehicle = module.Dynamics("g500")
+    model = auvnn.load(run.GIRONA500.given(vehicle, tmp_path))
+    # Two ways to write the same equations; thrust ahead and astern is another one in the stand-in.
+    vehicle.ctb = vehicle.ctf
+    assert max(girona500.disagreement(vehicle, model)) < 1e-9
+    vehicle.damping = [-5.0, -60.0, -5.0, -90.0, -90.0, -90.0]
+    off = girona500.disagreement(vehicle, model)
+    assert off[1] > 0.01 and max(off[:1] + off[2:]) < 1e-9
+
+
+def test_a_run_of_the_girona_is_a_log_that_the_package_reads(girona, tmp_path, monkeypatch):
+    girona500, _, module, _ = girona
+    monkeypatch.setattr(girona500, "DURATION", 4.0)
+    log = auvnn.Log.read(girona500.Plant(module).write(tmp_path / "log.parquet", 1))
+    assert [len(r.t) for r in log.runs] == [81] * 3
+    commands = np.stack([log[f"thruster_{i + 1}"] for i in range(5)])
+    assert (commands.std(1) > 0.02).all() and np.abs(commands).max() <= girona500.MOST
+    # Set points change every 0.1 s, every second row.
+    first = np.stack([log.runs[0][f"thruster_{i + 1}"] for i in range(5)])
+    np.testing.assert_array_equal(first[:, 1::2], first[:, 0:-1:2])
+    assert (first[:, 2::2] != first[:, 0:-2:2]).any()
+
+
+def test_what_is_hidden_in_the_girona_shows_in_the_motion_and_not_in_its_commands(girona, monkeypatch):
+    girona500, run, module, _ = girona
+    monkeypatch.setattr(girona500, "DURATION", 6.0)
+    plain = girona500.Plant(module).run(3)
+    for name, changed in run.GIRONA500.changes.items():
+        other = girona500.Plant(module, **changed).run(3)
+        moved = np.abs(other - plain)[:, 5:14].max()
+        assert moved > 0.003 if name != "nothing" else moved == 0.0, name
+        np.testing.assert_array_equal(other[0, 14:], plain[0, 14:])
+    half = len(plain) // 2
+    again = girona500.Plant(module, **run.GIRONA500.changes["payload"])
+    np.testing.assert_array_equal(again.run(3), again.run(3))
+    np.testing.assert_array_equal(again.run(3)[:half], plain[:half])
+
+
+def test_the_hidden_changes_of_the_girona_are_what_the_effects_of_the_catalogue_say(girona, tmp_path):
+    girona500, run, module, _ = girona
+    study = run.GIRONA500
+    module.Dynamics("g500")
+    plain = girona500.Plant(module).vehicle()
+    plain.ctb = plain.ctf
+    given = study.given(plain, tmp_path)
+    size = {
+        "thruster_gain": {"thruster_2": 0.7},
+        "thrust_asymmetry": {f"thruster_{i + 1}": 1 / 7 for i in range(5)},
+        "net_buoyancy": {"Z": -0.8 * plain.g},
+        "unstated_damping": {},
+        "drag_curve": {"X": 1.6, "Y": 1.6, "Z": 1.6},
+        "cg_offset": {"x": 0.005},
+    }
+    for name, values in size.items():
+        changed = module.Dynamics("g500")
+        changed.ctb = changed.ctf
+        study.changes[name]["change"](changed)
+        if name == "thrust_asymmetry":
+            # The mean of both ways is one eighth less; what the effect leaves is the other way to state that.
+            values = {"gain": {f"thruster_{i + 1}": 0.875 for i in range(5)}, "share": values}
+            model = auvnn.load(given, effects={"thruster_gain": values["gain"], name: values["share"]})
+            off = _off(girona500, changed, model)
+        elif name == "unstated_damping":
+            continue
+        else:
+            off = _off(girona500, changed, auvnn.load(given, effects={name: values}))
+        assert max(off) < 1e-6, (name, off)
+        assert max(_off(girona500, changed, auvnn.load(given))) > 0.005, name
+
+
+def _off(girona500, vehicle, model):
+    """Return by how much a model's accelerations are off, with thrust by the model's own actuators."""
+    return girona500.disagreement(vehicle, model)
