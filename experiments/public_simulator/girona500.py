@@ -101,8 +101,10 @@ class Plant(Changed):
         aims = np.column_stack([rng.uniform(*ends, 31) for ends in SETTINGS])
         aims[:, 2] += vehicle.p[2]
         aims[:, 4] += vehicle.p[5]
-        pushed, shares = np.zeros(2), np.linalg.pinv(vehicle.thrusters_matrix)
-        full, each = vehicle.ctf, vehicle.max_thrusters_rpm
+        # The controllers know the vehicle as it was.
+        known = self.module.Dynamics("g500")
+        pushed, shares = np.zeros(2), np.linalg.pinv(known.thrusters_matrix)
+        full, each = known.ctf, known.max_thrusters_rpm
         rows, every, often, steps = [], round(1 / RATE / STEP), round(PERIOD / STEP), round(DURATION / STEP)
         given = np.zeros(5)
         for i in range(steps + 1):

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).resolve().parents[2] / "experiments" / "public_simulator"
-MODULES = ("run", "logged", "remus", "remus_changes", "bluerov2", "bluerov2_changes", "BlueROV2")
+VEHICLES = ("remus", "bluerov2", "girona500")
+MODULES = ("run", "logged", *VEHICLES, *(f"{vehicle}_changes" for vehicle in VEHICLES), "BlueROV2")
 
 
 @contextmanager

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import auvnn
+from auvnn.effects import EFFECTS
 from tests.experiments.public_simulators import studied
 
 # A vehicle with the interface of the simulator's class, and numbers of our own, with the simplest steps.
@@ -148,38 +150,99 @@ def test_what_is_hidden_in_the_girona_shows_in_the_motion_and_not_in_its_command
     np.testing.assert_array_equal(again.run(3)[:half], plain[:half])
 
 
-def test_the_hidden_changes_of_the_girona_are_what_the_effects_of_the_catalogue_say(girona, tmp_path):
+MORE = {"X": 260 / 90, "Y": 260 / 120, "Z": 2.0, **dict.fromkeys("KMN", 3.0)}
+# With the coefficients as they are, a curve of power 1.6 is that of the effect, whose curves meet at v0, and a factor.
+FASTER = dict.fromkeys("XYZ", (0.16 * np.sqrt(9.8 * 1.5)) ** -0.4)
+
+
+@pytest.mark.parametrize(
+    ("name", "effects", "off"),
+    [
+        ("net_buoyancy", {"net_buoyancy": {"force": 0.8 * 9.8}}, 1e-9),
+        ("added_mass", {"added_mass": {"X": 1.5, "Y": 1.5, "Z": 1.5}}, 1e-9),
+        # The class's water moves along at the origin, that of the effect at the centre of gravity.
+        ("trapped_water", {"trapped_water": {"mass": 12.0}}, 0.03),
+        ("quadratic_damping", {"quadratic_damping": MORE}, 1e-9),
+        ("drag_curve", {"drag_curve": dict.fromkeys("XYZ", 1.6), "quadratic_damping": FASTER}, 1e-9),
+        # The class's tensor about its origin stays what it was.
+        ("cg_offset", {"cg_offset": {"x": 0.005}}, 0.003),
+    ],
+)
+def test_what_is_hidden_in_the_girona_is_what_the_effect_of_that_name_says(
+    girona, tmp_path, name, effects, off
+):
     girona500, run, module, _ = girona
-    study = run.GIRONA500
-    module.Dynamics("g500")
-    plain = girona500.Plant(module).vehicle()
-    plain.ctb = plain.ctf
-    given = study.given(plain, tmp_path)
-    size = {
-        "thruster_gain": {"thruster_2": 0.7},
-        "thrust_asymmetry": {f"thruster_{i + 1}": 1 / 7 for i in range(5)},
-        "net_buoyancy": {"Z": -0.8 * plain.g},
-        "unstated_damping": {},
-        "drag_curve": {"X": 1.6, "Y": 1.6, "Z": 1.6},
-        "cg_offset": {"x": 0.005},
-    }
-    for name, values in size.items():
-        changed = module.Dynamics("g500")
-        changed.ctb = changed.ctf
-        study.changes[name]["change"](changed)
-        if name == "thrust_asymmetry":
-            # The mean of both ways is one eighth less; what the effect leaves is the other way to state that.
-            values = {"gain": {f"thruster_{i + 1}": 0.875 for i in range(5)}, "share": values}
-            model = auvnn.load(given, effects={"thruster_gain": values["gain"], name: values["share"]})
-            off = _off(girona500, changed, model)
-        elif name == "unstated_damping":
-            continue
-        else:
-            off = _off(girona500, changed, auvnn.load(given, effects={name: values}))
-        assert max(off) < 1e-6, (name, off)
-        assert max(_off(girona500, changed, auvnn.load(given))) > 0.005, name
+    plain, changed = module.Dynamics("g500"), module.Dynamics("g500")
+    plain.ctb = changed.ctb = plain.ctf
+    run.GIRONA500.changes[name]["change"](changed)
+    model = auvnn.load(run.GIRONA500.given(plain, tmp_path))
+    assert max(girona500.disagreement(changed, model)) > max(0.004, 2 * off)
+    assert max(girona500.disagreement(changed, model.with_effects(effects))) < off
 
 
-def _off(girona500, vehicle, model):
-    """Return by how much a model's accelerations are off, with thrust by the model's own actuators."""
-    return girona500.disagreement(vehicle, model)
+def test_what_is_hidden_of_the_gironas_thrust_and_time_is_of_the_size_that_is_told(girona):
+    girona500, run, module, _ = girona
+    changes, plain = run.GIRONA500.changes, module.Dynamics("g500")
+
+    def made(name):
+        return girona500.Plant(module, **changes[name]).vehicle()
+
+    def pushed(vehicle, command):
+        still = np.zeros(6)
+        both = (vehicle.inverse_dynamic(still, still, u, vehicle.f, still) for u in (command, np.zeros(5)))
+        return plain.M @ np.subtract(*both)
+
+    each = np.eye(5) * 500.0
+    for i, command in enumerate(each):
+        np.testing.assert_allclose(
+            pushed(made("thruster_gain"), command),
+            (0.7 if i == 1 else 1.0) * pushed(plain, command),
+            atol=1e-9,
+        )
+        np.testing.assert_allclose(
+            pushed(made("thrust_asymmetry"), -command), 0.75 * pushed(plain, -command), atol=1e-9
+        )
+    # Set points that come fifteen steps later, and ones that are followed by a lag of 0.3 s.
+    late, slow = made("actuation_delay"), made("thruster_lag")
+    seen = {}
+    for vehicle in (late, slow):
+        vehicle.p, vehicle.v = np.array([0.0, 0, 5, 0, 0, 0]), np.zeros(6)
+        vehicle.update_thrusters(SimpleNamespace(setpoints=each[0]))
+        vehicle.update_thrusters(SimpleNamespace(setpoints=each[0]))
+        given, seen[id(vehicle)] = vehicle.inverse_dynamic, []
+
+        def noted(p, v, u, *more, given=given, turns=seen[id(vehicle)]):  # noqa: B008 - of this vehicle
+            turns.append(u)
+            return given(p, v, u, *more)
+
+        vehicle.inverse_dynamic = noted
+        for _ in range(30):
+            vehicle.iterate()
+    turns = [[u[0] for u in seen[id(v)]] for v in (late, slow)]
+    assert turns[0][:15] == [0.0] * 15 and turns[0][15:] == [500.0] * 15
+    ends = 500.0 * (1.0 - np.exp(-np.arange(31) * 0.01 / 0.3))
+    np.testing.assert_allclose(turns[1], (ends[1:] + ends[:-1]) / 2, rtol=1e-9)
+    # Three kilograms at 0.3 m, in a vehicle that stands level.
+    loaded, still = module.Dynamics("g500"), np.zeros(6)
+    changes["payload"]["later"](loaded)
+    more = loaded.gravity(still) - plain.gravity(still)
+    np.testing.assert_allclose(more, [0, 0, -3.0 * plain.g, 0, 0.9 * plain.g, 0], atol=1e-12)
+    np.testing.assert_allclose((loaded.M - plain.M)[2], [0, 0, 3.0, 0, -0.9, 0])
+
+
+def test_the_current_of_the_girona_is_the_same_water_whatever_the_heading(girona):
+    girona500, run, module, _ = girona
+    vehicle = girona500.Plant(module, **run.GIRONA500.changes["ocean_current"]).vehicle()
+    for heading in (0.0, 0.5 * np.pi, np.pi):
+        vehicle.p = np.array([0.0, 0.0, 5.0, 0.0, 0.0, heading])
+        c, s = np.cos(heading), np.sin(heading)
+        # The class adds it to the speed: water that moves north at 0.15 m/s comes from ahead of a vehicle that backs.
+        x, y = vehicle.compute_currents()[:2]
+        np.testing.assert_allclose([c * x - s * y, s * x + c * y], [-0.15, 0.1], atol=1e-12)
+
+
+def test_the_names_hidden_in_the_girona_are_those_of_the_catalogue(girona):
+    study = girona[1].GIRONA500
+    assert {*study.changes, *(n for names in study.also.values() for n in names)} - {"nothing"} <= set(
+        EFFECTS.names()
+    )
