@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.errors import ConfigError
 
+Array = NDArray[np.float64]
 # Stands for every actuator, each by itself.
 EACH = -1
 
@@ -64,6 +67,21 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Unexplained:
+    """What a fit leaves of the acceleration along the measured motion, N moments of all runs.
+
+    Attributes:
+        time: since the start of the run, s, (N,).
+        position: NED, m, (N, 3).
+        acceleration: of the body's origin in NED axes, m/s2, (N, 3).
+    """
+
+    time: Array
+    position: Array
+    acceleration: Array
+
+
+@dataclass(frozen=True)
 class Extent:
     """How far a log reaches: what the starting values of shapes depend on.
 
@@ -73,6 +91,7 @@ class Extent:
         longest: duration of the longest run, s.
         distance: median and largest distance from the origin of the positions, m; zeros without positions.
         runs: first and last time of each run, s; empty where all of the duration was recorded.
+        left: what a fit leaves of the acceleration; None where that is not known.
     """
 
     begin: float
@@ -80,6 +99,11 @@ class Extent:
     longest: float
     distance: tuple[float, float] = (0.0, 0.0)
     runs: tuple[tuple[float, float], ...] = ()
+    left: Unexplained | None = field(default=None, compare=False)
+
+    def unseen(self) -> Extent:
+        """Return it without what a fit leaves."""
+        return replace(self, left=None)
 
     def recorded(self) -> list[tuple[float, float]]:
         """Return the stretches of time that at least one run has recorded, s, in order and without overlap."""

@@ -5,17 +5,22 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from auvnn.effects.base import Effect
-from auvnn.effects.hooks import Body, Extent, Moment, Parameter
+from auvnn.effects.hooks import Body, Extent, Moment, Parameter, Unexplained
 from auvnn.physics.products import matvec
 
 SLOWEST, FASTEST = 0.4, 2.2
 """Angular frequencies between which waves reach an underwater vehicle, rad/s: periods of 16 to 3 s."""
 MOST = 24
 """Frequencies that are asked for at most."""
+LIKELIEST = 8
+"""Waves that are asked for where what a fit leaves is known."""
+LOOKS = 6
+"""Closer looks: at frequency and phase, and at the direction, in turn."""
 
 
 class Waves(Effect):
@@ -49,14 +54,49 @@ class Waves(Effect):
 
     @classmethod
     def starts(cls, parameters: tuple[Parameter, ...], extent: Extent) -> list[dict[str, float]]:
-        """Return frequencies as close as the longest run resolves, each in two phases and three directions."""
-        count = math.ceil((FASTEST - SLOWEST) * extent.longest / (2 * math.pi)) + 1
-        step = (FASTEST - SLOWEST) / (min(max(count, 6), MOST) - 1)
+        """Return frequencies as close as the longest run resolves, each in two phases and three directions.
+
+        Where what a fit leaves is known, those whose wave it looks most like: to a vehicle that moves by several lengths
+        of a wave, each direction is another one.
+        """
+        if extent.left is not None:
+            return _likeliest(extent, extent.left)
+        count, step = _frequencies(extent)
         return [
             {"omega": SLOWEST + k * step, "phase": phase, "direction": turn * 2 * math.pi / 3}
-            for k in range(min(max(count, 6), MOST))
+            for k in range(count)
             for phase in (0.0, math.pi / 2)
             for turn in range(3)
+        ]
+
+    @classmethod
+    def closest(
+        cls, parameters: tuple[Parameter, ...], extent: Extent, shape: dict[str, float], level: int
+    ) -> list[dict[str, float]]:
+        """Return frequencies, phases and directions around the ones found, each time nearer, in turn.
+
+        A frequency between two that were tried is out of phase at both ends of a run: what it explains is a part of what
+        the right one does, and a fit that begins there ends in another minimum. With the frequency the phase moves so
+        that it stays what it was in the middle of the log.
+        """
+        if level >= LOOKS:
+            return []
+        near = 2.0 ** -(level // 2 + 1)
+        if level % 2:
+            turns = (-2.0, -1.0, 1.0, 2.0) if level == 1 else (-1.0, 1.0)
+            return [
+                {**shape, "direction": _turned(shape["direction"] + k * near * math.pi / 3)} for k in turns
+            ]
+        step, middle = near * _frequencies(extent)[1], extent.begin + 0.5 * extent.duration
+        return [
+            {
+                **shape,
+                "omega": shape["omega"] + k * step,
+                "phase": _turned(shape["phase"] + k * step * middle + j * near * math.pi / 2),
+            }
+            for k in (-1, 0, 1)
+            for j in (-1, 0, 1)
+            if (k, j) != (0, 0)
         ]
 
     @classmethod
@@ -65,7 +105,7 @@ class Waves(Effect):
         out = dict(values)
         if out["amplitude"] < 0:
             out["amplitude"], out["phase"] = -out["amplitude"], out["phase"] + math.pi
-        return out | {n: math.remainder(out[n], 2 * math.pi) for n in ("phase", "direction")}
+        return out | {n: _turned(out[n]) for n in ("phase", "direction")}
 
     def settle(self, vehicle: Any, actuation: str) -> None:
         """Keep gravity."""
@@ -90,3 +130,55 @@ class Waves(Effect):
         displaced = body.buoyancy / self.kept("gravity").to(acceleration)
         force = displaced.unsqueeze(-1) * matvec(moment.rotation.mT, acceleration)
         return torch.cat([force, torch.linalg.cross(body.cb.expand_as(force), force)], dim=-1)
+
+
+def _turned(angle: float) -> float:
+    """Return an angle within half a turn, rad."""
+    return math.remainder(angle, 2 * math.pi)
+
+
+def _frequencies(extent: Extent) -> tuple[int, float]:
+    """Return how many frequencies are asked for, as close as the longest run resolves, and their distance, rad/s."""
+    count = min(max(math.ceil((FASTEST - SLOWEST) * extent.longest / (2 * math.pi)) + 1, 6), MOST)
+    return count, (FASTEST - SLOWEST) / (count - 1)
+
+
+def _likeliest(extent: Extent, left: Unexplained) -> list[dict[str, float]]:
+    """Return the shapes of waves whose acceleration what is left looks most like, each in four phases.
+
+    A wave accelerates the water by sin(angle) along its direction and by cos(angle) downwards, and the vehicle by some of
+    that, later or earlier: the power of both at the wave's angle, whatever their phase, says how much of what is left is
+    such a wave (a matched filter; Kay 1998, Fundamentals of Statistical Signal Processing II, chapter 4).
+    """
+    gravity = 9.81
+    count, step = _frequencies(extent)
+    omegas = SLOWEST + 0.5 * step * np.arange(2 * count - 1)
+    centred = left.acceleration - left.acceleration.mean(0)
+    north_east, depth = left.position[:, :2], np.maximum(left.position[:, 2], 0.0)
+    span = float(np.linalg.norm(np.ptp(north_east, axis=0)))
+    found: list[tuple[float, float, float]] = []
+    for omega in omegas:
+        number = omega**2 / gravity
+        # So many that the angles of neighbours differ by no more than half a radian over the way.
+        turns = int(np.clip(math.ceil(4 * math.pi * number * span / 2), 6, 72))
+        for direction in 2 * math.pi * np.arange(turns) / turns:
+            ahead = np.array([math.cos(direction), math.sin(direction)])
+            wave = np.exp(-number * depth + 1j * (number * north_east @ ahead - omega * left.time))
+            size = float((np.abs(wave) ** 2).sum())
+            along, down = centred[:, :2] @ ahead, centred[:, 2]
+            power = sum(abs(wave.conj() @ x) ** 2 / max(float(x @ x), 1e-30) for x in (along, down)) / max(
+                size, 1e-30
+            )
+            found.append((power, float(omega), float(direction)))
+    found.sort(reverse=True)
+    kept: list[tuple[float, float]] = []
+    for _, omega, direction in found:
+        if all(abs(omega - o) > step or abs(_turned(direction - d)) > 0.3 for o, d in kept):
+            kept.append((omega, direction))
+        if len(kept) == LIKELIEST:
+            break
+    return [
+        {"omega": omega, "phase": float(phase), "direction": direction}
+        for omega, direction in kept
+        for phase in np.arange(4) * math.pi / 4
+    ]

@@ -160,5 +160,6 @@ CHANGES: dict[str, dict[str, Any]] = {
     "velocity_misalignment": {"sensors": _turned},
     "velocity_lever_arm": {"sensors": _elsewhere},
 }
-# The class's inertia feels no current, which has a name of its own.
-ALSO = {"ocean_current": ("drag_only_current",)}
+# The class's inertia feels no current, which has a name of its own; and it is revolutions that lag there, which has
+# another one than a thrust that does: that was seen when the answer was.
+ALSO = {"ocean_current": ("drag_only_current",), "thruster_lag": ("propeller_lag",)}

@@ -9,7 +9,8 @@ import pytest
 import torch
 
 from auvnn.diagnosis.answers.describe_parameters import describe_parameters
-from auvnn.effects import Moment
+from auvnn.effects import Extent, Moment
+from auvnn.effects.hooks import Unexplained
 from auvnn.effects.waves import Waves
 from auvnn.testing import plain_vehicle
 
@@ -94,3 +95,47 @@ def test_answers_tell_the_wave_so_with_the_standard_errors_of_the_fit(plain):
     found = describe_parameters(effect, effect.theta.detach().numpy(), np.array([0.1, 0.2, 0.3, 0.4]))
     assert found["amplitude"] == {"value": pytest.approx(0.4), "std": 0.1, "unit": "m"}
     assert found["phase"]["value"] == pytest.approx(0.7 - math.pi) and found["direction"]["std"] == 0.4
+
+
+def orbit(seed=0, speed=1.2, seconds=60.0):
+    """Return times and places of a vehicle that turns about, (N,), (N, 3)."""
+    time = np.arange(0.0, seconds, 0.25)
+    heading = np.cumsum(np.random.default_rng(seed).normal(0.0, 0.1, len(time)))
+    steps = 0.25 * speed * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    depth = 3.0 + np.sin(0.1 * time)
+    return time, np.concatenate([steps.cumsum(0), depth[:, None]], axis=1)
+
+
+@pytest.mark.parametrize(("omega", "direction"), [(1.752, 1.05), (1.31, -2.4), (0.68, 3.0)])
+def test_the_wave_that_what_is_left_looks_like_is_asked_for_first(omega, direction):
+    """The water's acceleration by the effect's own equations, a share of it, later, with as much noise."""
+    time, place = orbit()
+    values = {"amplitude": 0.2, "omega": omega, "phase": 0.4, "direction": direction}
+    late = torch.tensor(time - 0.3)
+    left = 0.6 * water(torch.tensor(place), late, values)[1].detach().numpy()
+    left = left + np.random.default_rng(1).normal(0.0, left.std(), left.shape)
+    extent = Extent(0.0, 60.0, 60.0, left=Unexplained(time, place, left))
+    starts = Waves.starts((), extent)
+    assert len(starts) == 4 * 8 and len({s["phase"] for s in starts}) == 4
+    near = 0.5 * 2 * math.pi / 60.0
+    assert abs(starts[0]["omega"] - omega) < near
+    # What a degree of direction does is the number of waves along the way.
+    across = max(0.25, 1.0 / (omega**2 / 9.81 * np.ptp(place[:, :2], axis=0).max()))
+    assert abs(math.remainder(starts[0]["direction"] - direction, 2 * math.pi)) < across
+    # Without what is left, nothing depends on it.
+    assert Waves.starts((), extent.unseen()) == Waves.starts((), Extent(0.0, 60.0, 60.0)) != starts
+
+
+def test_closer_looks_keep_the_phase_in_the_middle_of_the_log_and_come_to_an_end():
+    extent, shape = Extent(10.0, 60.0, 60.0), {"omega": 1.3, "phase": 0.5, "direction": 0.2}
+    level, sizes = 0, []
+    while around := Waves.closest((), extent, shape, level):
+        for near in around:
+            if near["omega"] != shape["omega"]:
+                moved = near["phase"] - near["omega"] * 40.0 - (shape["phase"] - shape["omega"] * 40.0)
+                steps = (k * math.pi / 2 * 2.0 ** -(level // 2 + 1) for k in (-1, 0, 1))
+                assert min(abs(math.remainder(moved - step, 2 * math.pi)) for step in steps) < 1e-9
+        sizes.append(max(abs(n["omega"] - shape["omega"]) for n in around))
+        level += 1
+    assert level == 6 and sizes[::2] == pytest.approx([sizes[0], sizes[0] / 2, sizes[0] / 4])
+    assert sizes[1::2] == [0.0, 0.0, 0.0]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -33,3 +34,44 @@ def studied(*checkouts: Path) -> Iterator[Any]:
         for name in set(sys.modules) - before | {"run"}:
             if name in MODULES or name.startswith("python_vehicle_simulator"):
                 sys.modules.pop(name, None)
+
+
+def told_is_what_came_out(study: Any, page: str, files: Mapping[str, str]) -> None:
+    """Check that a page's table and counts are those of the answers that are kept.
+
+    Args:
+        study: changes, and names that are true of them besides.
+        page: its name, without its ending.
+        files: words that a count begins with to the ending of the file of answers, in the order of the table's columns.
+    """
+    text = (HERE / f"{page}.md").read_text()
+    answers = [
+        {r["hidden"]: r for r in json.loads((HERE / f"expected-{page}{which}.json").read_text())}
+        for which in files.values()
+    ]
+    rows = {
+        cells[0].strip("`"): cells[1:]
+        for line in text.splitlines()
+        if line.startswith("| ") and len(cells := line.strip("| ").split(" | ")) == len(files) + 4
+    }
+    rows.pop("hidden")
+    assert set(rows) == set(study.changes) and all(set(a) == set(study.changes) for a in answers)
+    right = {n: {n, *study.also.get(n, ())} - {"nothing"} for n in rows}
+    for name, cells in rows.items():
+        for answer, said in zip(answers, cells[: len(files)], strict=True):
+            words = [
+                [f"**`{e}`**" if e in right[name] else f"`{e}`" for e in g] for g in answer[name]["groups"]
+            ]
+            assert said == (", then ".join(map(" or ".join, words)) or answer[name]["verdict"]), name
+        *_, errors, seconds = cells
+        assert errors == ", ".join(f"{a[name]['error']:.2f}" for a in answers)
+        assert seconds == ", ".join(f"{a[name]['seconds']:.0f}" for a in answers)
+    for words, answer in zip(files, answers, strict=True):
+        first = {n: {*(r["groups"] or [[]])[0]} for n, r in answer.items()}
+        hits = [n for n in answer if right[n] & first[n]]
+        wrong = [n for n in answer if first[n] and not right[n] & first[n]]
+        alone = sum(len(first[n]) == 1 for n in hits)
+        assert (
+            f"- {words}: {len(hits)} of {len(answer) - 1} are named first, {alone} of them alone, and a wrong name comes "
+            f"first in {len(wrong)} of {len(answer)}." in text
+        )

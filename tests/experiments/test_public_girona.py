@@ -10,7 +10,7 @@ import pytest
 
 import auvnn
 from auvnn.effects import EFFECTS
-from tests.experiments.public_simulators import studied
+from tests.experiments.public_simulators import studied, told_is_what_came_out
 
 # A vehicle with the interface of the simulator's class, and numbers of our own, with the simplest steps.
 GIRONA = """
@@ -245,4 +245,10 @@ def test_the_names_hidden_in_the_girona_are_those_of_the_catalogue(girona):
     study = girona[1].GIRONA500
     assert {*study.changes, *(n for names in study.also.values() for n in names)} - {"nothing"} <= set(
         EFFECTS.names()
+    )
+
+
+def test_the_page_on_the_girona_tells_what_came_out(girona):
+    told_is_what_came_out(
+        girona[1].GIRONA500, "girona500", {"First logs": "-first", "Other logs, by later rules": ""}
     )

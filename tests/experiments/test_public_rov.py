@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import re
-
 import numpy as np
 import pytest
 
 import auvnn
 from auvnn.effects import EFFECTS
-from tests.experiments.public_simulators import HERE, studied
+from tests.experiments.public_simulators import studied, told_is_what_came_out
 
 # A vehicle with the interface of the simulator's class, and numbers of our own: masses, linear drag, buoyancy, and thrust
 # that grows with the square of the command.
@@ -161,32 +158,8 @@ def test_the_names_hidden_in_the_rov_are_those_of_the_catalogue(rov):
 
 
 def test_the_page_on_the_rov_tells_what_came_out(rov):
-    study = rov[1].BLUEROV2
-    text = (HERE / "bluerov2.md").read_text()
-    first, other = (
-        {r["hidden"]: r for r in json.loads((HERE / f"expected-bluerov2{which}.json").read_text())}
-        for which in ("-first", "")
+    told_is_what_came_out(
+        rov[1].BLUEROV2,
+        "bluerov2",
+        {"First logs": "-first", "Logs of `seed=150`": "-150", "Logs of `seed=250`": "-250"},
     )
-    told = {
-        n: cells
-        for n, *cells in re.findall(
-            r"^\| `?(\w+)`? \| (.*?) \| (.*?) \| [^|]* \| ([\d., ]+) \| ([\d, ]+) \|$", text, re.M
-        )
-    }
-    assert set(told) == set(first) == set(other) == set(study.changes)
-    for name, (before, after, errors, seconds) in told.items():
-        for row, said in ((first[name], before), (other[name], after)):
-            expected = ", then ".join(" or ".join(f"`{e}`" for e in group) for group in row["groups"])
-            assert said.replace("**", "") == (expected or row["verdict"]), name
-        assert errors == f"{first[name]['error']:.2f}, {other[name]['error']:.2f}"
-        assert seconds == f"{first[name]['seconds']:.0f}, {other[name]['seconds']:.0f}"
-    for words, rows in (("First logs", first), ("Other logs, by present rules", other)):
-        right = {n: {n, *study.also.get(n, ())} for n in rows}
-        hits = [r for n, r in rows.items() if n != "nothing" and right[n] & {*(r["groups"] or [[]])[0]}]
-        wrong = [r for n, r in rows.items() if r["groups"] and not right[n] & {*r["groups"][0]}]
-        alone = sum(len(r["groups"][0]) == 1 for r in hits)
-        assert (
-            f"- {words}: {len(hits)} of {len(rows) - 1} are named first, {alone} of them alone, and a wrong name comes "
-            f"first in {len(wrong)} of {len(rows)}." in text
-        )
-        assert round(float(np.median([r["seconds"] for r in rows.values()]))) == 99

@@ -19,7 +19,7 @@ HERE = Path(__file__).resolve().parents[2] / "experiments" / "worlds"
 
 # Samples that were run, and where each of them began: so far the plan was drawn twice, each drawing has 31 of them.
 SAMPLES = {
-    "rows.jsonl" if k == 0 else f"rows-{k + 1}.jsonl": (k % 31, 100000000 * (k // 31)) for k in range(37)
+    "rows.jsonl" if k == 0 else f"rows-{k + 1}.jsonl": (k % 31, 100000000 * (k // 31)) for k in range(38)
 }
 
 
@@ -56,7 +56,7 @@ def test_the_fresh_rows_are_logs_of_the_plan_on_which_rules_are_made():
 
 def test_the_fresh_logs_of_each_world_give_what_is_told():
     text = (HERE / "history.md").read_text()
-    for world, said in (("disturbed", ("20 of 21", "1 of 39")), ("shaped", ("9 of 17", "3 of 20"))):
+    for world, said in (("disturbed", ("20 of 21", "1 of 39")), ("shaped", ("9 of 17", "2 of 20"))):
         rows = [r for r in rows_of(MADE) if r["part"] in (world, f"{world}_nothing")]
         seen = [r for r in rows if r["kind"] == "effect" and worlds.visible(r)]
         named = f"{sum(map(worlds.right, seen))} of {len(seen)}"

@@ -15,8 +15,9 @@ from auvnn.diagnosis.score_tests.levers import OnLevers, lever_shapes, seen_on_l
 from auvnn.diagnosis.score_tests.probes import Probed, extent_of, probed
 from auvnn.diagnosis.score_tests.score import Score, similarity
 from auvnn.diagnosis.score_tests.shape_search import ShapeSearch, best_of
+from auvnn.diagnosis.score_tests.unexplained import unexplained
 from auvnn.diagnosis.selection.choose import ALPHA
-from auvnn.effects import effect_class
+from auvnn.effects import Extent, effect_class
 from auvnn.estimation.priors import set_parameters
 from auvnn.estimation.window_normal_equations import linearise, normal_equations
 from auvnn.estimation.window_sums.kept_products import Wanted
@@ -24,6 +25,8 @@ from auvnn.estimation.window_sums.statistics import Statistics
 from auvnn.metrics.windows import Windows
 
 Array = NDArray[np.float64]
+# How many times as much a shape between those that are tried may take away: part of its amplitude is out of phase.
+HIDDEN = 3.0
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,8 @@ class NullTests:
             chosen: those of the base that were asked for, and found, before.
             alike: also say how much they look like one another.
         """
-        sums, at, asked = self._statistics(current, remaining, base, pairs=alike)
+        extent = replace(self.extent, left=unexplained(self.windows, current))
+        sums, at, asked = self._statistics(current, remaining, base, extent, pairs=alike)
         asked_at = {n: asked.score(sums, base, n, chosen) for n in remaining}
         scores = {n: found for n, (found, _) in asked_at.items()}
         labels = [k for _, k in asked_at.values()] if alike else []
@@ -89,16 +93,23 @@ class NullTests:
         told = {n: s for n, s in scores.items() if s.degrees and n not in self.layout.nuisance}
         seen = {n: seen_on_levers(asked, sums, base, n, chosen) for n in told if effect_class(n).levers}
         del sums
-        return Tested(scores | self._closer(current, at, base, chosen, told, seen), at, matrix)
+        closer = ShapeSearch(at, self.windows, current, base, chosen, extent)
+        return Tested(scores | self._closer(closer, told, seen), at, matrix)
 
     def _statistics(
-        self, found: FittedHypothesis, remaining: Sequence[str], base: Sequence[str], *, pairs: bool
+        self,
+        found: FittedHypothesis,
+        remaining: Sequence[str],
+        base: Sequence[str],
+        extent: Extent,
+        *,
+        pairs: bool,
     ) -> tuple[Statistics, Layout, Probed]:
         """Linearise towards every parameter at a fit, those of the remaining effects at several shapes and levers."""
         model = self.layout.model.rebuilt(self.layout.model.copied_effects())
         set_parameters(model, found.names, found.fitted.theta)
         at = replace(self.layout, model=model)
-        asked = probed(at, remaining, self.extent, *lever_shapes(at, remaining, self.extent))
+        asked = probed(at, remaining, extent, *lever_shapes(at, remaining, extent))
         tested = [asked.joint_columns(label) for n in remaining for label in asked.labels(n)]
         sums, _, _ = normal_equations(
             self.windows,
@@ -111,13 +122,7 @@ class NullTests:
         return sums.finite(), at, asked
 
     def _closer(
-        self,
-        current: FittedHypothesis,
-        at: Layout,
-        base: Sequence[str],
-        chosen: Sequence[str],
-        told: dict[str, Score],
-        seen: dict[str, list[OnLevers]],
+        self, closer: ShapeSearch, told: dict[str, Score], seen: dict[str, list[OnLevers]]
     ) -> dict[str, Score]:
         """Return the scores of effects that were looked at more closely, by name.
 
@@ -126,22 +131,18 @@ class NullTests:
         significant, place and time are worth finding: the errors that wrong ones leave count as noise in the test.
 
         Args:
-            current: the fit.
-            at: the layout there.
-            base: effects that are free anyway.
-            chosen: those of the base that were asked for, and found, before.
+            closer: who looks, at the fit.
             told: tests of the effects that count.
             seen: of those on levers, the joint tests at each of their starts.
         """
+        found = self._nearer(closer, told)
         if not seen:
-            return {}
-        closer = ShapeSearch(at, self.windows, current, base, chosen, self.extent)
+            return found
         joint = {n: best_of(on).score for n, on in seen.items()}
         by = {**told, **joint}
         promises = max(by, key=lambda n: by[n].gain - by[n].degrees)
         surest = max(by, key=lambda n: by[n].evidence)
         nothing = len(told) * min(s.p_value for s in told.values()) >= ALPHA
-        found: dict[str, Score] = {}
         for n in seen if nothing else {promises, surest} & {*seen}:
             # The best of several starts, among all effects.
             if chi2.sf(joint[n].gain, joint[n].degrees) * len(seen[n]) * len(told) >= ALPHA:
@@ -149,6 +150,27 @@ class NullTests:
             self.say(f"looking at {n} more closely")
             best = closer.look(n, seen[n])
             if best is not None and best.p_value < told[n].p_value:
+                found[n] = best
+        return found
+
+    def _nearer(self, closer: ShapeSearch, told: dict[str, Score]) -> dict[str, Score]:
+        """Return the scores of effects without levers, of which closer looks around the best start say more.
+
+        They are worth it where the best of all starts is beyond chance, among all effects, and takes away so much that
+        the right shape may take away as much as any other effect does.
+
+        Args:
+            closer: who looks.
+            told: tests of the effects that count.
+        """
+        found: dict[str, Score] = {}
+        most = max((s.gain for s in told.values()), default=0.0)
+        for n, plain in told.items():
+            chance = plain.p_value * len(told) >= ALPHA
+            if effect_class(n).levers or chance or plain.gain * HIDDEN < most:
+                continue
+            best = closer.near(n, plain)
+            if best is not None and best.gain > plain.gain:
                 found[n] = best
         return found
 

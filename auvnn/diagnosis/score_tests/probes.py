@@ -28,6 +28,8 @@ from auvnn.metrics.windows import POSITION, Windows
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
+# Shapes among which a look at what is left of the acceleration chooses: more than any log can tell apart.
+MANY = 10_000
 
 
 def null_is_no_start(layout: Layout, name: str) -> bool:
@@ -179,6 +181,7 @@ def probed(
     """
     model = layout.model
     starts: dict[str, dict[str, dict[str, float]]] = {}
+    counts: dict[str, int] = {}
     effects: list[Effect] = []
     columns: dict[str, NDArray[np.int64]] = {}
     turned: dict[str, NDArray[np.int64]] = {}
@@ -192,7 +195,10 @@ def probed(
             at += len(described)
             continue
         kind = effect_class(name)
-        shapes = (shapes_of or {}).get(name) or kind.starts(described, extent)
+        given = (shapes_of or {}).get(name)
+        shapes = given or kind.starts(described, extent)
+        if given is None and extent.left is not None and shapes != kind.starts(described, extent.unseen()):
+            counts[name] = MANY
         shapes = [_within(described, shape) for shape in shapes]
         effects.append(StandIns(kind, model, shapes, name))
         size = sum(not p.shape for p in described)
@@ -211,4 +217,4 @@ def probed(
         return Probed(layout, {})
     whole = model.sharing(effects)
     asked = replace(layout, model=whole, names=tuple(columns), columns=columns, means=means)
-    return Probed(asked, starts, turned=turned)
+    return Probed(asked, starts, counts, turned)

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess
 from auvnn.diagnosis.score_tests.levers import OnLevers, lever_shapes, seen_on_levers
-from auvnn.diagnosis.score_tests.probes import Probed, extent_of, narrowed, null_is_no_start, probed
+from auvnn.diagnosis.score_tests.probes import MANY, Probed, extent_of, narrowed, null_is_no_start, probed
 from auvnn.diagnosis.score_tests.score import Score
+from auvnn.diagnosis.score_tests.unexplained import unexplained
 from auvnn.effects import Extent, effect_class
 from auvnn.estimation.priors import set_parameters
 from auvnn.metrics.windows import Windows
@@ -82,7 +83,9 @@ class ShapeSearch:
             evidence=joint.score.evidence - float(np.log(counted)),
         )
 
-    def around(self, name: str, shape: Mapping[str, float], counted: int) -> tuple[list[Score], int]:
+    def around(
+        self, name: str, shape: Mapping[str, float], counted: int, plain: Sequence[Score] = ()
+    ) -> tuple[list[Score], int]:
         """Return an effect's scores around a shape, by levels, and among how many shapes the last was chosen.
 
         Each level looks around the best that has been found before.
@@ -91,6 +94,7 @@ class ShapeSearch:
             name: the effect.
             shape: its shape parameters.
             counted: among how many shapes this one was chosen.
+            plain: its scores at that shape, where the next look is around it if no other is better.
         """
         kind, described = effect_class(name), self.layout.model.effect(name).parameters_of
         at, looks, near = self._beside(name), [], dict(shape)
@@ -99,15 +103,34 @@ class ShapeSearch:
             counted *= 1 + len(around)
             asked = replace(probed(at, [name], self.extent, {name: around}), counts={name: counted})
             looks.append(self._seen(asked, name))
-            near = self._shape(name, _best(looks).estimate)
+            near = self._shape(name, _best([*plain, *looks]).estimate)
         return looks, counted
+
+    def near(self, name: str, plain: Score) -> Score | None:
+        """Return the score of an effect without levers by closer looks around its best start; None where it has none.
+
+        Args:
+            name: the effect.
+            plain: its score at the best of its starts.
+        """
+        kind, described = effect_class(name), self.layout.model.effect(name).parameters_of
+        shape = self._shape(name, plain.estimate)
+        if not kind.closest(described, self.extent, shape, 0):
+            return None
+        counted = MANY if self.extent.left is not None else len(kind.starts(described, self.extent))
+        looks, _ = self.around(name, shape, counted, [plain])
+        best = _best([plain, *looks])
+        # What the starts alone say stays true, and counts for less of a choice.
+        sure, likely = min(2.0 * plain.p_value, best.p_value), max(plain.evidence, best.evidence)
+        return replace(best, p_value=min(1.0, sure), evidence=likely) if best is not plain else plain
 
     def start(self, name: str) -> Layout:
         """Return the layout at the fit, the effect set to the best of its shapes.
 
         Whoever asks for one effect by name is answered by a closer look where there is one.
         """
-        plain, closer = self._seen(probed(self.layout, [name], self.extent), name), self.look(name)
+        plain = self._seen(probed(self.layout, [name], self.extent), name)
+        closer = self.look(name) if effect_class(name).levers else self.near(name, plain)
         best = _best([plain] if closer is None else [plain, closer])
         model = self.layout.model.rebuilt(self.layout.model.copied_effects())
         set_parameters(model, [name], initial_guess(self.layout, name, best.estimate))
@@ -140,7 +163,8 @@ def search_shapes(
     model = layout.model.rebuilt(layout.model.copied_effects())
     set_parameters(model, found.names, found.fitted.theta)
     held = [*base, *(e for e in found.effects if e not in base)]
-    return ShapeSearch(replace(layout, model=model), windows, found, held, found.effects, extent_of(windows))
+    extent = replace(extent_of(windows), left=unexplained(windows, found))
+    return ShapeSearch(replace(layout, model=model), windows, found, held, found.effects, extent)
 
 
 def searched_start(

@@ -187,9 +187,11 @@ def test_what_acts_on_a_lever_is_looked_at_where_it_promises_most_or_leads(model
 
     looked, joint = [], [score_of("payload", 1e-9, 200.0, 50.0)]
     monkeypatch.setattr(ShapeSearch, "look", lambda self, name, seen: looked.append(name))
+    monkeypatch.setattr(ShapeSearch, "near", lambda self, name, plain: None)
 
     def closer():
-        return tests._closer(None, layout, [], [], scores, {"payload": [OnLevers(joint[0], {})]})
+        search = ShapeSearch(layout, windows, None, [], [], tests.extent)
+        return tests._closer(search, scores, {"payload": [OnLevers(joint[0], {})]})
 
     scores = {
         "payload": score_of("payload", 0.5, 9.0, -5.0),

@@ -53,6 +53,11 @@ def standing(row: Row) -> list[dict[str, Any]]:
     return out
 
 
+def first_group(row: Row) -> list[str]:
+    """Return the effects of the first step that stands; those that are missing where no step has any."""
+    return next((s["effects"] for s in standing(row) if s["effects"]), list(row["missing"]))
+
+
 def named_first(row: Row) -> bool:
     """Whether a hidden effect, and it alone, was named in the first step."""
     return row["verdict"] == "named" and bool(row["missing"]) and row["missing"][0] in effects_of(row)
@@ -114,7 +119,7 @@ def named_or_tied(row: Row, limit: float = TIED) -> bool:
     return (
         row["verdict"] == "ambiguous"
         and bool(mine)
-        and all(tied(row, mine[0], [n], limit) for n in steps_of(row)[0]["effects"] if n != mine[0])
+        and all(tied(row, mine[0], [n], limit) for n in first_group(row) if n != mine[0])
     )
 
 

@@ -95,8 +95,7 @@ def wrong_first(row: Row) -> bool:
     if told["verdict"] == "named":
         return bool(told["missing"]) and told["missing"][0] not in hidden
     if told["verdict"] == "ambiguous":
-        first = next((s["effects"] for s in counting.steps_of(told) if s["effects"]), told["missing"])
-        return not {*first} & {*hidden}
+        return not {*counting.first_group(told)} & {*hidden}
     if told["verdict"] == "partial":
         near = told.get("nearest") or []
         return bool(near) and near[0] not in hidden
