@@ -17,6 +17,10 @@ SLOWEST, FASTEST = 0.4, 2.2
 """Angular frequencies between which waves reach an underwater vehicle, rad/s: periods of 16 to 3 s."""
 MOST = 24
 """Frequencies that are asked for at most."""
+FINEST, WORK = 400, 6e6
+"""Frequencies that what is left is compared with at most; waves times moments, beyond which some moments are left out."""
+GRAVITY = 9.81
+"""Of the waves that what is left is compared with, m/s2; those of the effect have the vehicle's own."""
 LIKELIEST = 8
 """Waves that are asked for where what a fit leaves is known."""
 LOOKS = 6
@@ -87,7 +91,7 @@ class Waves(Effect):
             return [
                 {**shape, "direction": _turned(shape["direction"] + k * near * math.pi / 3)} for k in turns
             ]
-        step, middle = near * _frequencies(extent)[1], extent.begin + 0.5 * extent.duration
+        step, middle = near * _step(extent), extent.begin + 0.5 * extent.duration
         return [
             {
                 **shape,
@@ -137,6 +141,13 @@ def _turned(angle: float) -> float:
     return math.remainder(angle, 2 * math.pi)
 
 
+def _step(extent: Extent) -> float:
+    """Return how far frequencies that are asked for are apart, rad/s; where what is left is known, as runs resolve."""
+    if extent.left is None:
+        return _frequencies(extent)[1]
+    return max(2 * math.pi / max(extent.longest, 4.0), 2 * (FASTEST - SLOWEST) / FINEST)
+
+
 def _frequencies(extent: Extent) -> tuple[int, float]:
     """Return how many frequencies are asked for, as close as the longest run resolves, and their distance, rad/s."""
     count = min(max(math.ceil((FASTEST - SLOWEST) * extent.longest / (2 * math.pi)) + 1, 6), MOST)
@@ -150,26 +161,29 @@ def _likeliest(extent: Extent, left: Unexplained) -> list[dict[str, float]]:
     that, later or earlier: the power of both at the wave's angle, whatever their phase, says how much of what is left is
     such a wave (a matched filter; Kay 1998, Fundamentals of Statistical Signal Processing II, chapter 4).
     """
-    gravity = 9.81
-    count, step = _frequencies(extent)
-    omegas = SLOWEST + 0.5 * step * np.arange(2 * count - 1)
-    centred = left.acceleration - left.acceleration.mean(0)
-    north_east, depth = left.position[:, :2], np.maximum(left.position[:, 2], 0.0)
-    span = float(np.linalg.norm(np.ptp(north_east, axis=0)))
+    step = _step(extent)
+    omegas = np.arange(SLOWEST, FASTEST + 0.25 * step, 0.5 * step)
+    span = float(np.linalg.norm(np.ptp(left.position[:, :2], axis=0)))
+    # So many directions that the angles of neighbours differ by no more than half a radian over the way.
+    turns = [int(np.clip(math.ceil(2 * math.pi * omega**2 / GRAVITY * span), 6, 72)) for omega in omegas]
+    # Of moments at even distances one wave is like another.
+    count = min(len(left.time), max(64, int(WORK / sum(turns))))
+    some = np.random.default_rng(0).permutation(len(left.time))[:count]
+    time, place, acceleration = left.time[some], left.position[some], left.acceleration[some]
+    acceleration = acceleration - acceleration.mean(0)
+    level, upright = np.maximum(
+        [0.5 * (acceleration[:, :2] ** 2).sum(), (acceleration[:, 2] ** 2).sum()], 1e-30
+    )
     found: list[tuple[float, float, float]] = []
-    for omega in omegas:
-        number = omega**2 / gravity
-        # So many that the angles of neighbours differ by no more than half a radian over the way.
-        turns = int(np.clip(math.ceil(4 * math.pi * number * span / 2), 6, 72))
-        for direction in 2 * math.pi * np.arange(turns) / turns:
-            ahead = np.array([math.cos(direction), math.sin(direction)])
-            wave = np.exp(-number * depth + 1j * (number * north_east @ ahead - omega * left.time))
-            size = float((np.abs(wave) ** 2).sum())
-            along, down = centred[:, :2] @ ahead, centred[:, 2]
-            power = sum(abs(wave.conj() @ x) ** 2 / max(float(x @ x), 1e-30) for x in (along, down)) / max(
-                size, 1e-30
-            )
-            found.append((power, float(omega), float(direction)))
+    for omega, count in zip(omegas, turns, strict=True):
+        number, directions = omega**2 / GRAVITY, 2 * math.pi * np.arange(count) / count
+        ahead = np.stack([np.cos(directions), np.sin(directions)])
+        angle = number * place[:, :2] @ ahead - omega * time[:, None]
+        wave = np.exp(-number * np.maximum(place[:, 2:], 0.0) - 1j * angle)
+        along = (wave * (acceleration[:, :2] @ ahead)).sum(0)
+        power = np.abs(along) ** 2 / level + np.abs(acceleration[:, 2] @ wave) ** 2 / upright
+        power /= np.maximum((np.abs(wave) ** 2).sum(0), 1e-30)
+        found += [(float(p), float(omega), float(d)) for p, d in zip(power, directions, strict=True)]
     found.sort(reverse=True)
     kept: list[tuple[float, float]] = []
     for _, omega, direction in found:

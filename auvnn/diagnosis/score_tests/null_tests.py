@@ -83,7 +83,10 @@ class NullTests:
             chosen: those of the base that were asked for, and found, before.
             alike: also say how much they look like one another.
         """
-        extent = replace(self.extent, left=unexplained(self.windows, current))
+        # Of what depends on where the vehicle is, the right shape shows in what is left.
+        somewhere = any({"x", "y"} <= {*effect_class(n).channels} for n in remaining)
+        left = unexplained(self.windows, current) if somewhere else None
+        extent = replace(self.extent, left=left)
         sums, at, asked = self._statistics(current, remaining, base, extent, pairs=alike)
         asked_at = {n: asked.score(sums, base, n, chosen) for n in remaining}
         scores = {n: found for n, (found, _) in asked_at.items()}
