@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from auvnn.effects.base import Effect
 from auvnn.effects.hooks import Body, Extent, Moment, Parameter, Unexplained
 from auvnn.physics.products import matvec
 
+Array = NDArray[Any]
 SLOWEST, FASTEST = 0.4, 2.2
 """Angular frequencies between which waves reach an underwater vehicle, rad/s: periods of 16 to 3 s."""
 MOST = 24
@@ -21,6 +23,8 @@ FINEST, WORK = 400, 6e6
 """Frequencies that what is left is compared with at most; waves times moments, beyond which some moments are left out."""
 GRAVITY = 9.81
 """Of the waves that what is left is compared with, m/s2; those of the effect have the vehicle's own."""
+CLOSE = 200
+"""Waves that look most like some moments and are compared with all of them."""
 LIKELIEST = 8
 """Waves that are asked for where what a fit leaves is known."""
 LOOKS = 6
@@ -163,28 +167,21 @@ def _likeliest(extent: Extent, left: Unexplained) -> list[dict[str, float]]:
     """
     step = _step(extent)
     omegas = np.arange(SLOWEST, FASTEST + 0.25 * step, 0.5 * step)
-    span = float(np.linalg.norm(np.ptp(left.position[:, :2], axis=0)))
-    # So many directions that the angles of neighbours differ by no more than half a radian over the way.
-    turns = [int(np.clip(math.ceil(2 * math.pi * omega**2 / GRAVITY * span), 6, 72)) for omega in omegas]
+    span = _span(left)
+    turns = [_directions(omega, span) for omega in omegas]
     # Of moments at even distances one wave is like another.
     count = min(len(left.time), max(64, int(WORK / sum(turns))))
     some = np.random.default_rng(0).permutation(len(left.time))[:count]
-    time, place, acceleration = left.time[some], left.position[some], left.acceleration[some]
-    acceleration = acceleration - acceleration.mean(0)
-    level, upright = np.maximum(
-        [0.5 * (acceleration[:, :2] ** 2).sum(), (acceleration[:, 2] ** 2).sum()], 1e-30
-    )
     found: list[tuple[float, float, float]] = []
-    for omega, count in zip(omegas, turns, strict=True):
-        number, directions = omega**2 / GRAVITY, 2 * math.pi * np.arange(count) / count
-        ahead = np.stack([np.cos(directions), np.sin(directions)])
-        angle = number * place[:, :2] @ ahead - omega * time[:, None]
-        wave = np.exp(-number * np.maximum(place[:, 2:], 0.0) - 1j * angle)
-        along = (wave * (acceleration[:, :2] @ ahead)).sum(0)
-        power = np.abs(along) ** 2 / level + np.abs(acceleration[:, 2] @ wave) ** 2 / upright
-        power /= np.maximum((np.abs(wave) ** 2).sum(0), 1e-30)
+    for omega, size in zip(omegas, turns, strict=True):
+        directions = 2 * math.pi * np.arange(size) / size
+        power = _power(left, some, float(omega), directions)
         found += [(float(p), float(omega), float(d)) for p, d in zip(power, directions, strict=True)]
     found.sort(reverse=True)
+    if count < len(left.time):
+        whole = np.arange(len(left.time))
+        found = [(float(_power(left, whole, o, np.array([d]))[0]), o, d) for _, o, d in found[:CLOSE]]
+        found.sort(reverse=True)
     kept: list[tuple[float, float]] = []
     for _, omega, direction in found:
         if all(abs(omega - o) > step or abs(_turned(direction - d)) > 0.3 for o, d in kept):
@@ -196,3 +193,28 @@ def _likeliest(extent: Extent, left: Unexplained) -> list[dict[str, float]]:
         for omega, direction in kept
         for phase in np.arange(4) * math.pi / 4
     ]
+
+
+def _power(left: Unexplained, some: Array, omega: float, directions: Array) -> Array:
+    """Return how much of what is left at some moments is a wave, by direction, (D,)."""
+    place, acceleration = left.position[some], left.acceleration[some]
+    acceleration = acceleration - acceleration.mean(0)
+    level, upright = np.maximum(
+        [0.5 * (acceleration[:, :2] ** 2).sum(), (acceleration[:, 2] ** 2).sum()], 1e-30
+    )
+    number, ahead = omega**2 / GRAVITY, np.stack([np.cos(directions), np.sin(directions)])
+    angle = number * place[:, :2] @ ahead - omega * left.time[some, None]
+    wave = np.exp(-number * np.maximum(place[:, 2:], 0.0) - 1j * angle)
+    along = (wave * (acceleration[:, :2] @ ahead)).sum(0)
+    power = np.abs(along) ** 2 / level + np.abs(acceleration[:, 2] @ wave) ** 2 / upright
+    return np.asarray(power / np.maximum((np.abs(wave) ** 2).sum(0), 1e-30), dtype=np.float64)
+
+
+def _span(left: Unexplained) -> float:
+    """Return how far the vehicle went, m."""
+    return float(np.linalg.norm(np.ptp(left.position[:, :2], axis=0)))
+
+
+def _directions(omega: float, span: float) -> int:
+    """Return how many directions there are that differ by half a radian of the wave's angle over the way, 180 at most."""
+    return int(np.clip(math.ceil(2 * math.pi * omega**2 / GRAVITY * span), 6, 180))

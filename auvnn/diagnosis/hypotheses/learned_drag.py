@@ -24,6 +24,7 @@ from auvnn.damping.bank import DampingBank
 from auvnn.effects.learned_drag import products
 from auvnn.logs import Log
 from auvnn.models import GreyBox
+from auvnn.models.actuation.command_path import carried_over
 
 Array = NDArray[np.float64]
 # Standard deviation of each correction, as a share of the learned force at usual speeds: of nu_j and |nu_j| nu_j,
@@ -80,4 +81,5 @@ def with_drag_only(model: GreyBox, log: Log) -> tuple[GreyBox, Array | None]:
     law = cast(DampingBank, DragLaw(coefficients))
     size = np.sqrt(np.mean(wrench**2, axis=0))
     spread = np.outer(size, np.where(OWN, SHARE, COUPLED) / unit).ravel()
-    return GreyBox(model.vehicle, model.copied_effects(), law, model.actuation), np.maximum(spread, 1e-9)
+    made = GreyBox(model.vehicle, model.copied_effects(), law, model.actuation)
+    return carried_over(made, model), np.maximum(spread, 1e-9)

@@ -16,19 +16,19 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.commands.early import clearly_between_samples
-from auvnn.diagnosis.noise_law.commands.holding import cost_at_best, cost_with, holding
+from auvnn.diagnosis.noise_law.commands.holding import cost_at_best, cost_with, fitted_to, holding
 from auvnn.diagnosis.noise_law.commands.in_place_of_names import (
     in_place_of_names,
+    kept_as_stated,
     replaced,
     replaces,
-    stand_for_another_law,
     without,
     without_timed,
 )
 from auvnn.diagnosis.noise_law.commands.later import late_by_a_share
 from auvnn.diagnosis.noise_law.commands.law import HELD, Holding
 from auvnn.diagnosis.noise_law.commands.share import with_share
-from auvnn.diagnosis.noise_law.commands.stated import unless_likelier
+from auvnn.diagnosis.noise_law.commands.stated import StatedCommands
 from auvnn.diagnosis.noise_law.commands.uncertain import UncertainWrench, uncertain_wrench
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.noise_law.left_force import leaves_force
@@ -45,9 +45,12 @@ from auvnn.diagnosis.search import a_force_stays, search
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.diagnosis.stages.what_is_left import settled
 from auvnn.metrics.force_law import ForceLaw
-from auvnn.metrics.windows import Windows
+from auvnn.models.actuation.command_path import with_commands
 
 Array = NDArray[np.float64]
+CONTRADICTED = (
+    "commands do not go between the samples of this log as the model states it: it was asked without that"
+)
 UNDECIDED = (
     "names were not compared together with a stochastic force: with one, free running grows without bound; "
     "choose shorter windows with window="
@@ -90,23 +93,16 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         state: where the first search ended.
     """
     began, stated = state, asked.commands
+    kept = None if stated is None else kept_as_stated(asked, state, _by_size(state)[0])
+    if stated is not None and kept is None:
+        return _unstated(asked, state, stated)
     if not state.leaves_something:
-        if stated is not None and not stand_for_another_law(asked, state):
-            return _names_alone(asked, began, state, {"commands": stated.law.to_dict()}, [])
-        if stated is not None:
-            asked.say("commands may go otherwise than the model states: searching again")
-            unstated = replace(asked, commands=None)
-            return answer_with_force(
-                unstated, search(unstated, stated.as_read(state.windows), until=ends_early)
-            )
+        if kept is not None:
+            return _names_alone(asked, began, state, {"commands": kept.to_dict()}, [])
         return _names_alone(asked, began, *_with_fewer_names(asked, state))
-    read = state.windows if stated is None else stated.as_read(state.windows)
-    least, held = _held(asked.layout, state, read)
-    if stated is not None:
-        with suppress(*UNSOLVED):
-            held = unless_likelier(asked.layout, stated.law, held, least, read)
-    gone = dict[str, str]()
-    if not held.stated:
+    read, gone = state.windows if stated is None else stated.as_read(state.windows), dict[str, str]()
+    if kept is None:
+        least, held = _held(asked.layout, state)
         untimed = without_timed(asked, state, least)
         law = None if untimed is None else replaces(untimed, least, held, read, asked.layout)
         if untimed is not None and law is not None:
@@ -114,9 +110,13 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
             asked, least, held = without(asked, gone), untimed, law
         with suppress(*UNSOLVED):
             held = with_share(asked.layout, least, read, held)
+    else:
+        least, held = _by_size(state)[0], kept
     windows = held.applied(read)
     try:
-        uncertain = uncertain_wrench(least, read, held)
+        # By errors with commands as read, as it is asked of all logs.
+        about = least if kept is None else fitted_to(asked.layout, least, read)
+        uncertain = uncertain_wrench(about, read, held)
     except UNSOLVED:
         uncertain = UncertainWrench(np.zeros(6), np.zeros(6), 0.0)
     asked.say("asking whether the sensors' noise is white")
@@ -124,11 +124,10 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         colour = noise_colour(least, windows, asked.floor, sensing_alone(asked, state))
     except UNSOLVED:
         colour = Colour(None, 0.0)
-    # By the statement of the model, or by a law that the log has been asked for: the search was with that already.
-    otherwise = not held.stated and (held.changes or stated is not None)
+    # With commands as the model states them the search has been already.
+    otherwise = kept is None and held.odds > 0.0
     if otherwise or colour.noise is not None:
-        go = f"change between samples ({held.name})" if held.changes else "are held until the next sample"
-        why = [f"commands {go}"] if otherwise else []
+        why = [f"commands change between samples ({held.name})"] if otherwise else []
         why += [] if colour.noise is None else ["the sensors' noise is not white"]
         asked.say(f"{' and '.join(why)}: searching again")
         state = search(asked, colour.applied(windows), until=a_force_stays)
@@ -159,6 +158,36 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         return _names_alone(asked, began, state, told, [])
     state, law, predicted = beside
     return state, {**told, "force": left(law)}, [] if predicted is None else [_words(predicted)]
+
+
+def _unstated(
+    asked: Setting, state: State, stated: StatedCommands
+) -> tuple[State, dict[str, Any], list[str]]:
+    """Return the answer of a search that knows nothing of the model's statement; that with it where there is none.
+
+    Args:
+        asked: what is asked.
+        state: where the search by the statement ended.
+        stated: how commands go by the model.
+    """
+    asked.say("commands go otherwise than the model states: searching again")
+    plain = replace(asked.layout, model=with_commands(asked.layout.model, None))
+    anew = replace(asked, commands=None, model=with_commands(asked.model, None), layout=plain)
+    try:
+        begun = search(anew, stated.as_read(state.windows), until=ends_early)
+        state, told, words = answer_with_force(anew, begun)
+    except UNSOLVED:
+        # The answer stands: it did not need what could not be solved here.
+        return state, {"commands": stated.law.to_dict()}, []
+    return state, {"commands": HELD.to_dict(), **told}, [*words, CONTRADICTED]
+
+
+def _by_size(state: State) -> list[FittedHypothesis]:
+    """Return the explanations that a search has fitted, that which leaves least first."""
+    sigma = state.first.fitted.sigma
+    return sorted(
+        [state.first, *state.tried, state.refuted or state.current], key=lambda e: e.squared_error(sigma)
+    )
 
 
 def _names_alone(
@@ -204,32 +233,26 @@ def _with_fewer_names(asked: Setting, state: State) -> tuple[State, dict[str, An
     return again.but(failed={**again.failed, **gone}), {"commands": law.to_dict()}, []
 
 
-def _held(layout: Layout, state: State, read: Windows) -> tuple[FittedHypothesis, Holding]:
+def _held(layout: Layout, state: State) -> tuple[FittedHypothesis, Holding]:
     """Return the explanation that leaves least, whatever the search made of it, and how commands go by it.
 
     One that was tried and is about to diverge says nothing of them: then the next best is asked. The fit without any name
     is asked too: names fitted to such commands as they are have taken up what the commands do to them. It decides where
     the commands have noise and no name stands, and where another law alone explains as much as the names do.
-
-    Args:
-        layout: of the model as it is stated.
-        state: where a search has ended.
-        read: windows of commands as they were read.
     """
     sigma = state.first.fitted.sigma
-    known = [state.first, *state.tried, state.refuted or state.current]
     least, held = state.first, HELD
-    for end in sorted(known, key=lambda e: e.squared_error(sigma)):
+    for end in _by_size(state):
         with suppress(np.linalg.LinAlgError):
-            least, held = end, holding(end, read, layout)
+            least, held = end, holding(end, state.windows, layout)
             break
     if held.name == "held" and least is not state.first:
         with suppress(np.linalg.LinAlgError):
-            plain = holding(state.first, read, layout)
+            plain = holding(state.first, state.windows, layout)
             if plain.name == "averaged" and not state.chosen:
                 return least, plain
-            alone = cost_with(plain, state.first, read, layout=layout)
-            if plain.odds > 0.0 and alone <= cost_at_best(least, read, sigma):
+            alone = cost_with(plain, state.first, state.windows, layout=layout)
+            if plain.odds > 0.0 and alone <= cost_at_best(least, state.windows, sigma):
                 return state.first, plain
     return least, held
 

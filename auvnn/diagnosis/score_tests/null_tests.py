@@ -15,7 +15,7 @@ from auvnn.diagnosis.score_tests.levers import OnLevers, lever_shapes, seen_on_l
 from auvnn.diagnosis.score_tests.probes import Probed, extent_of, probed
 from auvnn.diagnosis.score_tests.score import Score, similarity
 from auvnn.diagnosis.score_tests.shape_search import ShapeSearch, best_of
-from auvnn.diagnosis.score_tests.unexplained import unexplained
+from auvnn.diagnosis.score_tests.unexplained import is_somewhere, unexplained
 from auvnn.diagnosis.selection.choose import ALPHA
 from auvnn.effects import Extent, effect_class
 from auvnn.estimation.priors import set_parameters
@@ -83,9 +83,7 @@ class NullTests:
             chosen: those of the base that were asked for, and found, before.
             alike: also say how much they look like one another.
         """
-        # Of what depends on where the vehicle is, the right shape shows in what is left.
-        somewhere = any({"x", "y"} <= {*effect_class(n).channels} for n in remaining)
-        left = unexplained(self.windows, current) if somewhere else None
+        left = unexplained(self.windows, current) if any(map(is_somewhere, remaining)) else None
         extent = replace(self.extent, left=left)
         sums, at, asked = self._statistics(current, remaining, base, extent, pairs=alike)
         asked_at = {n: asked.score(sums, base, n, chosen) for n in remaining}

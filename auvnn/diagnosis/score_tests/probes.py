@@ -28,8 +28,8 @@ from auvnn.metrics.windows import POSITION, Windows
 from auvnn.models import GreyBox
 
 Array = NDArray[np.float64]
-# Shapes among which a look at what is left of the acceleration chooses: more than any log can tell apart.
-MANY = 10_000
+# Shapes among which a look at what is left of the acceleration chooses, at most: neighbours are as good as the same.
+MANY = 100_000
 
 
 def null_is_no_start(layout: Layout, name: str) -> bool:

@@ -13,7 +13,7 @@ from auvnn.diagnosis.hypotheses.stated_priors import Layout, initial_guess
 from auvnn.diagnosis.score_tests.levers import OnLevers, lever_shapes, seen_on_levers
 from auvnn.diagnosis.score_tests.probes import MANY, Probed, extent_of, narrowed, null_is_no_start, probed
 from auvnn.diagnosis.score_tests.score import Score
-from auvnn.diagnosis.score_tests.unexplained import unexplained
+from auvnn.diagnosis.score_tests.unexplained import is_somewhere, unexplained
 from auvnn.effects import Extent, effect_class
 from auvnn.estimation.priors import set_parameters
 from auvnn.metrics.windows import Windows
@@ -120,9 +120,10 @@ class ShapeSearch:
         counted = MANY if self.extent.left is not None else len(kind.starts(described, self.extent))
         looks, _ = self.around(name, shape, counted, [plain])
         best = _best([plain, *looks])
-        # What the starts alone say stays true, and counts for less of a choice.
-        sure, likely = min(2.0 * plain.p_value, best.p_value), max(plain.evidence, best.evidence)
-        return replace(best, p_value=min(1.0, sure), evidence=likely) if best is not plain else plain
+        # What the starts alone say stays true: one of two answers is chosen.
+        sure, likely = min(plain.p_value, best.p_value), max(plain.evidence, best.evidence)
+        paid = replace(best, p_value=min(1.0, 2.0 * sure), evidence=likely - float(np.log(2.0)))
+        return paid if best is not plain else plain
 
     def start(self, name: str) -> Layout:
         """Return the layout at the fit, the effect set to the best of its shapes.
@@ -150,7 +151,7 @@ class ShapeSearch:
 
 
 def search_shapes(
-    layout: Layout, windows: Windows, found: FittedHypothesis, base: Sequence[str]
+    layout: Layout, windows: Windows, found: FittedHypothesis, base: Sequence[str], name: str = ""
 ) -> ShapeSearch:
     """Return who looks closer at effects that a fit does not hold yet.
 
@@ -159,11 +160,14 @@ def search_shapes(
         windows: of the log.
         found: the fit.
         base: effects that were free in it whatever was asked for.
+        name: of the effect that will be looked at, where that is known.
     """
     model = layout.model.rebuilt(layout.model.copied_effects())
     set_parameters(model, found.names, found.fitted.theta)
     held = [*base, *(e for e in found.effects if e not in base)]
-    extent = replace(extent_of(windows), left=unexplained(windows, found))
+    extent = extent_of(windows)
+    if is_somewhere(name):
+        extent = replace(extent, left=unexplained(windows, found))
     return ShapeSearch(replace(layout, model=model), windows, found, held, found.effects, extent)
 
 
@@ -186,7 +190,7 @@ def searched_start(
         return None
     # One that the model has is among those that are uncertain anyway: here it is the one that is asked for.
     others = [n for n in base if n != name]
-    return search_shapes(layout, windows, found, others).start(name)
+    return search_shapes(layout, windows, found, others, name).start(name)
 
 
 def best_of(seen: Sequence[OnLevers]) -> OnLevers:

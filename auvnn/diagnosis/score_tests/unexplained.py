@@ -9,14 +9,20 @@ import torch
 from numpy.typing import NDArray
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
+from auvnn.effects import effect_class
 from auvnn.effects.hooks import Unexplained
 from auvnn.estimation.window_normal_equations import linearise
-from auvnn.metrics.windows import VELOCITY, Windows
+from auvnn.metrics.windows import ATTITUDE, POSITION, VELOCITY, Windows
 from auvnn.physics.attitude import quat_to_matrix
 
 Array = NDArray[np.float64]
 # Least time over which a difference of velocities is taken, s: noise is much of it over a shorter one; and least number.
 OVER, LEAST = 0.25, 8
+
+
+def is_somewhere(name: str) -> bool:
+    """Whether an effect depends on where the vehicle is, so that its shape shows in what is left along the way."""
+    return bool(name) and {"x", "y"} <= {*effect_class(name).channels}
 
 
 def unexplained(windows: Windows, found: FittedHypothesis) -> Unexplained | None:
@@ -37,12 +43,22 @@ def unexplained(windows: Windows, found: FittedHypothesis) -> Unexplained | None
         error = torch.cat([r.error for r in linearise(fitted.model, free, fitted.initial, ())])
     times = windows.times[:, windows.warmup :].numpy()
     velocity = error[..., VELOCITY][..., :3].numpy()
+    turned = (windows.mask[..., ATTITUDE] > 0).all(-1).numpy()
     known = (windows.mask[..., VELOCITY][..., :3] > 0).all(-1).numpy() & np.isfinite(velocity).all(-1)
+    placed = (windows.mask[..., POSITION] > 0).all(-1).numpy()
     rotation = quat_to_matrix(windows.eta[..., 3:7]).numpy()
-    parts = [
-        _between(times[k], velocity[k], windows.eta[k, :, :3].numpy(), rotation[k], known[k])
-        for k in range(len(windows))
-    ]
+    parts = []
+    for k in range(len(windows)):
+        if placed[k].sum() < 2:
+            continue
+        # Positions are slower than velocities in many logs; an attitude that is missing turns nothing.
+        where = np.stack(
+            [np.interp(times[k], times[k][placed[k]], x[placed[k]]) for x in windows.eta[k, :, :3].numpy().T],
+            axis=-1,
+        )
+        parts.append(_between(times[k], velocity[k], where, rotation[k], known[k] & turned[k]))
+    if not parts:
+        return None
     time, position, acceleration = (np.concatenate(x) for x in zip(*parts, strict=True))
     return Unexplained(time, position, acceleration) if len(time) >= LEAST else None
 

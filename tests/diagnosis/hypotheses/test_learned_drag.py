@@ -13,6 +13,7 @@ from auvnn.diagnosis import diagnose
 from auvnn.diagnosis.hypotheses.learned_drag import with_drag_only
 from auvnn.effects import effect_class
 from auvnn.models import GreyBox
+from auvnn.models.actuation.command_path import CommandPath, with_commands
 from auvnn.training import train
 from tests.small_logs import make_log, small_vehicle
 
@@ -62,7 +63,10 @@ def test_only_drag_is_kept():
     with torch.no_grad():
         for p in bank.parameters():
             p.copy_(torch.randn(p.shape, generator=generator, dtype=p.dtype))
-    model, spread = with_drag_only(GreyBox(BARE.vehicle, (), bank), log)
+    path = CommandPath("smooth", 0.4, 0.2)
+    model, spread = with_drag_only(with_commands(GreyBox(BARE.vehicle, (), bank), path), log)
+    # What the model states beside its numbers stays.
+    assert model.commands == path
     nu = torch.as_tensor(log.runs[0].nu.copy())
     assert model.damping is not None and spread is not None and spread.shape == (252,) and (spread > 0).all()
     with torch.no_grad():

@@ -16,7 +16,7 @@ from auvnn.diagnosis.score_tests.null_tests import NullTests
 from auvnn.diagnosis.score_tests.probes import MANY, extent_of, probed
 from auvnn.diagnosis.score_tests.shape_search import searched_start
 from auvnn.diagnosis.score_tests.unexplained import unexplained
-from auvnn.metrics.windows import POSITION, VELOCITY
+from auvnn.metrics.windows import ATTITUDE, POSITION, VELOCITY
 from auvnn.models import GreyBox
 from tests.small_logs import make_log, small_vehicle
 
@@ -58,7 +58,7 @@ def test_it_is_the_force_over_the_mass_that_it_moves(model):
     expected = -force / (vehicle.mass + vehicle.added_mass[2, 2])
     assert left.acceleration.mean(0)[2] == pytest.approx(expected, rel=0.2)
     assert np.abs(left.acceleration.mean(0)[:2]).max() < 0.1 * abs(expected)
-    assert len(left.time) == len(left.position) and (np.diff(np.sort(left.time)) >= 0).all()
+    assert len(left.time) == len(left.position) == len(left.acceleration)
 
 
 def test_nothing_is_left_to_look_at_without_positions_or_with_few_velocities(waves):
@@ -75,6 +75,22 @@ def test_nothing_is_left_to_look_at_without_positions_or_with_few_velocities(wav
     left = unexplained(replace(windows, mask=some), found)
     whole = unexplained(windows, found)
     assert left is not None and whole is not None and len(left.time) < len(whole.time)
+
+
+def test_slow_positions_are_interpolated_and_what_has_no_attitude_is_left_out(waves):
+    windows, _, _, found = waves
+    whole = unexplained(windows, found)
+    slow, blind = windows.mask.clone(), windows.mask.clone()
+    slow[:, 1::10, POSITION] = slow[:, 2::10, POSITION] = slow[:, 4::10, POSITION] = 0
+    gone = (slow[..., POSITION] == 0).all(-1)
+    eta = windows.eta.clone()
+    eta[..., :3][gone] = 0.0
+    left = unexplained(replace(windows, mask=slow, eta=eta), found)
+    assert left is not None and whole is not None
+    assert np.abs(left.position - whole.position).max() < 0.15
+    blind[:, 5:, ATTITUDE] = 0
+    some = unexplained(replace(windows, mask=blind), found)
+    assert some is None or len(some.time) < 0.2 * len(whole.time)
 
 
 def test_what_is_chosen_by_what_is_left_counts_as_one_of_many(waves):

@@ -18,6 +18,7 @@ from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
 from auvnn.diagnosis.noise_law.commands.holding import cost_at_best, cost_with, fitted_to, holding
 from auvnn.diagnosis.noise_law.commands.law import HELD, Holding
+from auvnn.diagnosis.noise_law.commands.stated import still_stated
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.diagnosis.stages.state import Setting, State
@@ -52,6 +53,21 @@ def in_place_of_names(asked: Setting, state: State) -> tuple[FittedHypothesis, H
         if law is not None:
             return before, law
     return None
+
+
+def kept_as_stated(asked: Setting, state: State, least: FittedHypothesis) -> Holding | None:
+    """Return the law of the commands that the model states where a search by it has ended; None where it does not hold.
+
+    Args:
+        asked: what is asked, with commands as the model states them.
+        state: where the search ended.
+        least: the explanation that leaves least.
+    """
+    if asked.commands is None:
+        return None
+    if state.leaves_something:
+        return still_stated(asked.layout, asked.commands, least, state.windows)
+    return None if stand_for_another_law(asked, state) else asked.commands.law
 
 
 def stand_for_another_law(asked: Setting, state: State) -> bool:

@@ -8,14 +8,18 @@ another law.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import Layout
-from auvnn.diagnosis.noise_law.commands.holding import cost_with
-from auvnn.diagnosis.noise_law.commands.law import HELD, Holding
+from auvnn.diagnosis.noise_law.commands.holding import cost_at_best, cost_with, fitted_to, holding
+from auvnn.diagnosis.noise_law.commands.law import Holding
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
 from auvnn.diagnosis.selection.model_comparison import ODDS
+from auvnn.estimation.prediction_error import FitError
 from auvnn.metrics.commands.mean_thrust import MeanThrust
 from auvnn.metrics.commands.stated import interval_of
 from auvnn.metrics.windows import Windows
@@ -57,26 +61,28 @@ def stated_commands(model: GreyBox, windows: Windows) -> StatedCommands | None:
     return StatedCommands(windows, law)
 
 
-def unless_likelier(
-    layout: Layout, stated: Holding, found: Holding, least: FittedHypothesis, read: Windows
-) -> Holding:
-    """Return the stated law, with its odds against holding, or the one asked of the log where that is clearly likelier.
+def still_stated(
+    layout: Layout, stated: StatedCommands, least: FittedHypothesis, windows: Windows
+) -> Holding | None:
+    """Return the stated law, with its odds against holding; None where the log is clearly likelier by another one.
+
+    Another law, holding among them, is asked of a fit to commands as read: about one to stated commands that are wrong
+    the first order says nothing of others. What cannot be compared stays as it is stated.
 
     Args:
         layout: of the model as it is stated.
-        stated: the law that the model states.
-        found: how commands go by the log.
-        least: the explanation by which it was asked.
-        read: windows of commands as read.
-
-    Raises:
-        numpy.linalg.LinAlgError: free running with the fit grows without bound.
+        stated: how commands go by the model, and windows of commands as read.
+        least: the explanation that leaves least, fitted to commands that go so.
+        windows: those it was fitted to.
     """
-    sums = least.fitted.statistics
+    read, sums, sigma = stated.as_read(windows), least.fitted.statistics, least.fitted.sigma
     factor = variance_inflation(sums.slope, sums.total, sums.run)
-    held, by_statement, otherwise = (
-        cost_with(law, least, read, layout=layout) / factor for law in (HELD, stated, found)
-    )
-    if 0.5 * (by_statement - otherwise) > ODDS:
-        return found
-    return replace(stated, odds=0.5 * (held - by_statement), gain=held - by_statement)
+    with suppress(FitError, np.linalg.LinAlgError):
+        held = fitted_to(layout, least, read, sigma)
+        plain, by_statement = cost_at_best(held, read, sigma), cost_at_best(least, windows, sigma)
+        otherwise = cost_with(holding(held, read, layout), held, read, sigma, layout)
+        if 0.5 * (by_statement - min(plain, otherwise)) / factor > ODDS:
+            return None
+        gain = (plain - by_statement) / factor
+        return replace(stated.law, odds=0.5 * gain, gain=gain)
+    return stated.law

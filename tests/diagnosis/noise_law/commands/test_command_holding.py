@@ -236,7 +236,7 @@ def test_a_fit_that_grows_without_bound_is_passed_over(model):
         state: Any = SimpleNamespace(
             first=first, tried=list(tried), current=wild, refuted=None, windows=windows, chosen=()
         )
-        return _held(None, state, windows)
+        return _held(None, state)
 
     assert found(first, wild) == (first, holding(first, windows))
     assert found(wild)[1].name == "held"
@@ -286,7 +286,7 @@ def test_names_stand_against_another_law_only_if_they_explain_more(model, monkey
     state: Any = SimpleNamespace(
         first=first, tried=(named,), refuted=None, current=named, windows=windows, chosen=("lag",)
     )
-    least, law = _held(None, state, windows)
+    least, law = _held(None, state)
     assert (law.name == "held") == (name == "held") and (least is named) == (name == "held")
 
 
@@ -304,5 +304,5 @@ def test_noisy_commands_count_where_no_name_stands(model, monkeypatch, chosen, n
     state: Any = SimpleNamespace(
         first=first, tried=(tried,), refuted=None, current=first, windows=windows, chosen=chosen
     )
-    least, law = _held(None, state, windows)
+    least, law = _held(None, state)
     assert law.name == name and least is tried
