@@ -30,6 +30,7 @@ from auvnn.estimation.window_sums.sufficient_statistics import (
 from auvnn.executors import Executor
 from auvnn.log_chunks.scan import Part, WindowCut
 from auvnn.log_chunks.windows import windows_of
+from auvnn.metrics.commands.stated import as_stated
 from auvnn.progress import Progress
 
 Array = NDArray[np.float64]
@@ -92,8 +93,9 @@ def moments_of(point: LinearisationPoint, task: PartTask) -> list[ScoreMoments]:
 
 def _reduced(point: LinearisationPoint, task: PartTask, rounds: int) -> Any:
     torch.set_num_threads(1)
-    windows = windows_of(task.part, point.cut)
     model = point.probed.layout.model
+    # As in the search on some of the windows.
+    windows = as_stated(model, windows_of(task.part, point.cut))
     start = None if task.initial is None else torch.as_tensor(task.initial)
     here = (
         fit_initial_states(model, windows, point.sigma, start, rounds) if rounds or start is None else start

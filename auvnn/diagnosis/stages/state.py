@@ -18,6 +18,7 @@ from auvnn.diagnosis.noise_law.commands.stated import StatedCommands
 from auvnn.diagnosis.residuals.additive_force_test import AdditiveForce
 from auvnn.diagnosis.residuals.variance_component_test import Unnamed
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
+from auvnn.diagnosis.score_tests.unexplained import unexplained
 from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.diagnosis.selection.rivals import without_lost
 from auvnn.executors import Executor
@@ -247,8 +248,9 @@ class Searched:
 
     @property
     def extent(self) -> Any:
-        """How far the log reaches."""
-        return self.setting.tests(self.state.windows).extent
+        """How far the log reaches, and what the fit without any name leaves of the acceleration."""
+        reach = self.setting.tests(self.state.windows).extent
+        return replace(reach, left=unexplained(self.state.windows, self.state.first))
 
     @property
     def first(self) -> FittedHypothesis:

@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import sys
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -32,8 +33,10 @@ from auvnn.log_chunks.scan import Plan, WindowCut
 from auvnn.log_chunks.windows import plan_files
 from auvnn.logs import Log
 from auvnn.logs.reading.mapping_file.mapping import Mapping
+from auvnn.metrics.commands.stated import as_stated
 from auvnn.metrics.windows import cut_windows
 from auvnn.models import GreyBox
+from auvnn.models.actuation.command_path import CommandPath, with_commands
 from tests.small_logs import make_log, small_vehicle
 
 CURRENT = {"ocean_current": {"v_north": 0.15, "v_east": -0.1}}
@@ -109,6 +112,25 @@ def test_tests_of_effects_are_those_of_the_log_in_memory(paths, small_parts, mon
         for field in ("p_value", "statistic", "inflation", "estimate", "std", "evidence", "gain"):
             close(getattr(found.scores[name], field), getattr(alone, field))
         assert found.scores[name].degrees == alone.degrees
+
+
+def test_parts_go_between_samples_as_the_model_states(paths, small_parts):
+    asked = ["ocean_current"]
+    plan, cut = planned(paths)
+    at, windows, base = point(paths, cut, asked)
+    path = CommandPath("linear", 0.5, 0.1)
+    stated = replace(at, layout=replace(at.layout, model=with_commands(at.layout.model, path)))
+    with executor_for() as pool:
+        held, found = (score_tests(MapReduce(pool, plan.parts), p, base, asked) for p in (at, stated))
+    model = stated.probed.layout.model
+    assert model.commands == path
+    along = as_stated(model, windows)
+    statistics, _ = reduce_windows(
+        model, along, fit_initial_states(model, along, at.sigma), model.effect_names, at.sigma
+    )
+    close(found.sums.cost, statistics.cost.sum())
+    close(found.sums.slope, statistics.slope.sum(0))
+    assert not np.allclose(found.sums.cost, held.sums.cost, rtol=0.05)
 
 
 def test_moments_of_parts_are_those_of_all():

@@ -128,7 +128,7 @@ def test_slopes_are_those_of_differences(name, euler):
     model = built(MODELS[name])
     eta, nu, command = drawn(model, 4)
     # Away from the edges of the thrust tables, where there is no slope.
-    command = (command * 20).floor() / 20 + 0.023
+    command = (command * 20).floor() / 20 + 0.0233
     state = torch.cat([eta if euler else eta6_to_eta7(eta), nu], dim=-1)
     found = model.linearise(state, command, 0.1, time=3.0)
     assert found.A.shape == (4, len(found.states), len(found.states))
