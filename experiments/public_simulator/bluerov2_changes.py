@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from logged import with_values
+from logged import turned, with_values
 
 
 def _buoyant(vehicle: Any) -> None:
@@ -80,12 +80,6 @@ def _dead(given: np.ndarray) -> np.ndarray:
     return np.sign(given) * np.maximum(np.abs(given) - 0.06, 0.0) / (1.0 - 0.06)
 
 
-def _turned(nu: np.ndarray) -> np.ndarray:
-    # The velocity sensor is turned by three degrees about the vertical.
-    cos, sin = np.cos(np.radians(3.0)), np.sin(np.radians(3.0))
-    return np.array([cos * nu[0] + sin * nu[1], cos * nu[1] - sin * nu[0], *nu[2:]])
-
-
 # What is hidden by the name that it has in the catalogue: what changes of the vehicle, its commands or its sensors.
 CHANGES: dict[str, dict[str, Any]] = {
     "nothing": {},
@@ -104,7 +98,7 @@ CHANGES: dict[str, dict[str, Any]] = {
     "actuation_delay": {"change": _later},
     "gyro_bias": {"sensors": lambda nu: nu + np.array([0, 0, 0, 0, 0, 0.01])},
     "velocity_scale": {"sensors": lambda nu: nu * [1.03, 1.03, 1.03, 1, 1, 1]},
-    "velocity_misalignment": {"sensors": _turned},
+    "velocity_misalignment": {"sensors": turned},
 }
 # The class lets a current act in the drag alone, which has a name of its own; the linear damping that is hidden is one
 # that the model does not state at all, which has had one since these changes were first asked for.

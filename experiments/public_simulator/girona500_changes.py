@@ -6,7 +6,7 @@ from collections import deque
 from typing import Any
 
 import numpy as np
-from logged import with_values
+from logged import turned, with_values
 
 
 def _stream(vehicle: Any) -> None:
@@ -124,12 +124,6 @@ def _later(vehicle: Any) -> None:
     _by_steps(vehicle, delayed)
 
 
-def _turned(nu: np.ndarray) -> np.ndarray:
-    # The velocity sensor is turned by three degrees about the vertical.
-    cos, sin = np.cos(np.radians(3.0)), np.sin(np.radians(3.0))
-    return np.array([cos * nu[0] + sin * nu[1], cos * nu[1] - sin * nu[0], *nu[2:]])
-
-
 def _elsewhere(nu: np.ndarray) -> np.ndarray:
     # The velocity sensor stands 0.5 m aft of the origin.
     return np.array([*(nu[:3] + np.cross(nu[3:], [-0.5, 0.0, 0.0])), *nu[3:]])
@@ -157,7 +151,7 @@ CHANGES: dict[str, dict[str, Any]] = {
     "actuation_delay": {"change": _later},
     "gyro_bias": {"sensors": lambda nu: nu + np.array([0, 0, 0, 0, 0, 0.01])},
     "velocity_scale": {"sensors": lambda nu: nu * [1.04, 1.04, 1.04, 1, 1, 1]},
-    "velocity_misalignment": {"sensors": _turned},
+    "velocity_misalignment": {"sensors": turned},
     "velocity_lever_arm": {"sensors": _elsewhere},
 }
 # The class's inertia feels no current, which has a name of its own; and it is revolutions that lag there, which has

@@ -79,6 +79,12 @@ def with_values(**values: Any) -> Change:
     return change
 
 
+def turned(nu: np.ndarray) -> np.ndarray:
+    """Return velocities of a sensor that is turned by three degrees about the vertical, (6,)."""
+    cos, sin = np.cos(np.radians(3.0)), np.sin(np.radians(3.0))
+    return np.array([cos * nu[0] + sin * nu[1], cos * nu[1] - sin * nu[0], *nu[2:]])
+
+
 def measured(eta: np.ndarray, nu: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Return quaternion, velocities and position with the noise of usual sensors."""
     noise = rng.standard_normal(12)

@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 HERE = Path(__file__).resolve().parents[2] / "experiments" / "public_simulator"
 VEHICLES = ("remus", "bluerov2", "girona500")
 MODULES = ("run", "logged", *VEHICLES, *(f"{vehicle}_changes" for vehicle in VEHICLES), "BlueROV2")
@@ -34,6 +36,25 @@ def studied(*checkouts: Path) -> Iterator[Any]:
         for name in set(sys.modules) - before | {"run"}:
             if name in MODULES or name.startswith("python_vehicle_simulator"):
                 sys.modules.pop(name, None)
+
+
+def shows_in_the_motion_alone(study: Any, module: Any) -> None:
+    """Check that each change moves the vehicle, that commands are first the same, and that runs can be had again.
+
+    Args:
+        study: plant and changes.
+        module: of the simulator.
+    """
+    plain = study.plant(module).run(3)
+    for name, changed in study.changes.items():
+        other = study.plant(module, **changed).run(3)
+        moved = np.abs(other - plain)[:, 5:14].max()
+        assert moved > 0.003 if name != "nothing" else moved == 0.0, name
+        np.testing.assert_array_equal(other[0, 14:], plain[0, 14:])
+    half = len(plain) // 2
+    again = study.plant(module, **study.changes["payload"])
+    np.testing.assert_array_equal(again.run(3), again.run(3))
+    np.testing.assert_array_equal(again.run(3)[:half], plain[:half])
 
 
 def told_is_what_came_out(study: Any, page: str, files: Mapping[str, str]) -> None:
