@@ -131,6 +131,19 @@ def test_the_wave_that_what_is_left_looks_like_is_asked_for(omega, direction, am
     assert Waves.starts((), extent.unseen()) == Waves.starts((), Extent(0.0, seconds, seconds)) != starts
 
 
+def test_a_weak_wave_in_a_long_run_is_found_by_all_moments():
+    """Noise has three times its size: what some of the moments put first is compared with all of them."""
+    time, place = orbit(seconds=600.0)
+    values = {"amplitude": 0.2, "omega": 1.31, "phase": 0.4, "direction": -2.4}
+    wave = water(torch.tensor(place), torch.tensor(time), values)[1].detach().numpy()
+    for seed in range(6):
+        left = wave + np.random.default_rng(seed).normal(0.0, 3.0 * wave.std(), wave.shape)
+        extent = Extent(0.0, 600.0, 600.0, left=Unexplained(time, place, left))
+        first = Waves.starts((), extent)[0]
+        assert abs(first["omega"] - 1.31) < math.pi / 600
+        assert abs(math.remainder(first["direction"] + 2.4, 2 * math.pi)) < 0.35
+
+
 def test_closer_looks_keep_the_phase_in_the_middle_of_the_log_and_come_to_an_end():
     extent, shape = Extent(10.0, 60.0, 60.0), {"omega": 1.3, "phase": 0.5, "direction": 0.2}
     level, sizes = 0, []

@@ -1,4 +1,4 @@
-"""A closer look at effects that act on a lever: where the load hangs, and the onset in steps that a fit can follow."""
+"""A closer look at effects with shapes: where a load hangs, when it was taken, the frequency of a wave between others."""
 
 from __future__ import annotations
 
