@@ -23,6 +23,7 @@ class ConstantForce(Effect):
     confused_with = ("net_buoyancy", "cg_offset", "ocean_current", "thruster_gain")
     manoeuvre = "reciprocal"
     told_apart_by = "legs on several headings, and drifting without thrust"
+    plainer = ("net_buoyancy", "cg_offset")
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

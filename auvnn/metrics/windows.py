@@ -11,6 +11,7 @@ from torch import Tensor
 
 from auvnn.errors import InputError
 from auvnn.logs import Log, Run
+from auvnn.logs.altitude import altitude_over_intervals
 from auvnn.metrics.coloured_noise import NoiseColour
 from auvnn.metrics.force_law import ForceLaw
 from auvnn.models.inputs import Inputs
@@ -222,8 +223,8 @@ def gathered(pieces: Sequence[Piece], warmup: float) -> Windows:
     def gather(get: Callable[[Run, np.ndarray], np.ndarray]) -> np.ndarray:
         return np.stack([get(run, command)[i] for (run, command, *_), i in zip(pieces, index, strict=True)])
 
-    def optional(name: str) -> np.ndarray | None:
-        known = {run.number: run.fins if name == "fins" else run.filled(name) for run, *_ in pieces}
+    def optional(drives: Callable[[Run], np.ndarray | None]) -> np.ndarray | None:
+        known = {run.number: drives(run) for run, *_ in pieces}
         if any(value is None for value in known.values()):
             return None
         return gather(lambda run, _: np.asarray(known[run.number]))
@@ -253,10 +254,10 @@ def gathered(pieces: Sequence[Piece], warmup: float) -> Windows:
     mask[..., [CHANNELS.index(n) for n in estimated]] = False
     filled = np.where(seen, measured, 0.0)
     filled[..., 3] = np.where(attitude[..., 0], filled[..., 3], 1.0)
-    fins, voltage, altitude = optional("fins"), optional("voltage"), optional("altitude")
+    held = (lambda run: run.fins, lambda run: run.filled("voltage"), altitude_over_intervals)
     inputs = Inputs(
         _double(gather(lambda _, command: command)),
-        *(None if x is None else _double(x) for x in (fins, voltage, altitude)),
+        *(None if x is None else _double(x) for x in map(optional, held)),
     )
     eta = _double(filled[..., :7])
     has_rate = bool(mask[..., ACCELERATION].any())

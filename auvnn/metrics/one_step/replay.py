@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from auvnn.effects import Sensed
 from auvnn.errors import InputError
 from auvnn.logs import Run
+from auvnn.logs.altitude import altitude_at_samples
 from auvnn.metrics.derivative import integrated
 from auvnn.models import GreyBox, Inputs
 from auvnn.models.actuation.acting import speeds_follow
@@ -56,7 +57,7 @@ class OneStepReplay:
             torch.tensor(np.where(np.expand_dims(known, 1), command, 0.0)),
             tensor(run.fins),
             tensor(run.filled("voltage")),
-            tensor(run.filled("altitude")),
+            tensor(altitude_at_samples(run)),
         )
         self.t = run.t
         self.times = torch.tensor(run.t)
