@@ -7,7 +7,9 @@ import pytest
 
 from auvnn.logs import Log, Run
 from auvnn.logs.altitude import altitude_at_samples, altitude_over_intervals
+from auvnn.metrics.one_step.replay import OneStepReplay
 from auvnn.metrics.windows import cut_windows
+from auvnn.models import load
 
 NOISE = 0.02
 
@@ -105,3 +107,23 @@ def test_windows_are_driven_by_it():
     assert given is not None
     left = given.numpy() - height(cut.times.numpy() + 0.5 * run.dt)
     assert float(left[:, :-1].std()) < 0.35 * NOISE
+
+
+def test_predictions_one_step_ahead_are_driven_by_it_at_their_samples():
+    run, height = heaving(rate=5.0)
+    many = Run(0, run.t, run.quaternion, run.nu, thrusters=np.zeros((run.samples, 8)), altitude=run.altitude)
+    given = OneStepReplay(load("bluerov2_heavy"), many).inputs.altitude
+    assert given is not None
+    assert np.std(given.numpy() - height(run.t)) < 0.4 * NOISE
+
+
+def test_before_a_break_of_the_recording_it_is_the_height_at_the_sample():
+    run, _ = heaving()
+    kept = np.r_[0:400, 700:1200]
+    there = {"thrusters": run.thrusters[kept], "altitude": run.altitude[kept]}
+    broken = Run(0, run.t[kept], run.quaternion[kept], run.nu[kept], **there)
+    at, over = altitude_at_samples(broken), altitude_over_intervals(broken)
+    assert over[399] == at[399] and over[-1] == at[-1]
+    assert over[398] == pytest.approx(0.5 * (at[398] + at[399]), abs=1e-12)
+    # The height after the break is another one: half of it would be far off.
+    assert abs(at[400] - at[399]) > 0.1
