@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import torch
 from torch import Tensor
@@ -29,6 +29,8 @@ class BodyLift(Effect):
     confused_with = ("munk_moment", "coupled_damping", "added_mass_coriolis")
     manoeuvre = "oblique"
     told_apart_by = "steady speed at several angles of drift and attack"
+    plainer = ("munk_moment",)
+    contains: ClassVar = {"munk_moment": ()}
 
     @classmethod
     def describe(cls, vehicle: Any, actuation: str) -> tuple[Parameter, ...]:

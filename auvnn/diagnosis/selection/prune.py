@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from auvnn.diagnosis.hypotheses.fit import FittedHypothesis, fit_hypothesis, log_evidence
 from auvnn.diagnosis.hypotheses.stated_priors import Layout, shapes
 from auvnn.diagnosis.score_tests.variance_inflation import variance_inflation
+from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.diagnosis.selection.predictive_density import improves_predictive_density
+from auvnn.effects import effect_class
 from auvnn.estimation.nuisance_elimination import NormalEquations
 from auvnn.estimation.prediction_error import FitError
 from auvnn.estimation.priors import set_parameters
@@ -52,7 +54,8 @@ class Pruning:
         """Return the explanation without those effects that it no longer needs, and their names.
 
         An effect that was taken first may have stood in for the ones that came after it. It goes where the
-        evidence is no lower without it, or where it does not pay on runs left out, everything else refitted.
+        evidence is no lower without it, or where it does not pay on runs left out, everything else refitted. One that
+        contains another name, which is enough by itself, must be so much likelier as a new name.
 
         Args:
             taken: the explanation, the newest effect last.
@@ -82,9 +85,10 @@ class Pruning:
                 # What cannot be fitted without it needs it.
                 continue
             factor = self._factor(taken)
+            least = ODDS if {*effect_class(name).contains} & {*left} else 0.0
             needed = (
                 log_evidence(self.layout, taken, factor).evidence
-                > log_evidence(self.layout, without, factor).evidence
+                > log_evidence(self.layout, without, factor).evidence + least
             )
             if not needed or not improves_predictive_density(taken, without):
                 gone.append(name)

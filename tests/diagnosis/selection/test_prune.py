@@ -62,3 +62,32 @@ def test_what_is_there_is_clearly_needed_and_what_is_not_there_is_not():
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(prune, "BEYOND_DOUBT", share * half)
             assert asked.clearly_needed(alone, "net_buoyancy") is wanted
+
+
+@pytest.mark.parametrize(
+    ("beside", "ahead", "gone"),
+    [("munk_moment", 4.0, ["body_lift"]), ("munk_moment", 5.0, []), ("net_buoyancy", 4.0, [])],
+)
+def test_what_contains_another_name_must_be_likelier_by_the_odds_of_a_name(monkeypatch, beside, ahead, gone):
+    """Odds of a hundred to one, 4.6 in the logarithm; any other name stays where it is likelier at all."""
+    model = SimpleNamespace(rebuilt=lambda _: None, copied_effects=lambda: None)
+    fitted = SimpleNamespace(model=model, sigma=None)
+
+    def explained(effects: tuple[str, ...], evidence: float) -> Any:
+        return SimpleNamespace(effects=effects, evidence=evidence, fitted=fitted)
+
+    monkeypatch.setattr(
+        prune, "fit_hypothesis", lambda _, __, ___, effects, **____: explained(effects, 10.0 - ahead)
+    )
+    monkeypatch.setattr(prune, "set_parameters", lambda *_: None)
+    monkeypatch.setattr(prune, "replace", lambda *_, **__: None)
+    monkeypatch.setattr(prune, "log_evidence", lambda _, explanation, __: explanation)
+    monkeypatch.setattr(prune, "improves_predictive_density", lambda *_: True)
+    monkeypatch.setattr(prune.Pruning, "clearly_needed", lambda *_: False)
+    monkeypatch.setattr(prune.Pruning, "_factor", lambda *_: 1.0)
+    monkeypatch.setattr(prune.Pruning, "_settled", lambda _, found, *__: explained(found.effects, 10.0))
+    names = ("body_lift", beside, "tether")
+    layout: Any = SimpleNamespace(means=dict.fromkeys(names, 0.0))
+    windows: Any = None
+    found, told = prune.Pruning(layout, windows, lambda _: None).withdrawn(explained(names, 10.0), [])
+    assert told == gone and found.effects == tuple(n for n in names if n not in gone)
