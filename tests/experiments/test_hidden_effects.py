@@ -109,6 +109,23 @@ def test_strangers_run_once_more_are_as_the_text_says():
     assert sum(r["verdict"] == "adequate" for r in rows) == 2
 
 
+def test_strangers_with_further_seeds_are_as_the_text_says():
+    rows, text = rows_of("rows-strangers-2.jsonl"), (HERE / "README.md").read_text()
+    assert len({(r["seed"], r["hidden"], r["size"]) for r in rows}) == len(rows) == 48
+    assert not {r["seed"] for r in rows} & {r["seed"] for r in rows_of("rows-strangers.jsonl")}
+    right = [r for r in rows if r["verdict"] == "unknown" and not r["missing"]]
+    assert f"{len(right)} of {len(rows)} are `unknown` without a name" in text
+    assert all(r["axis"] in r["axes_true"] for r in right)
+    wrong = [(r["hidden"], r["size"], *r["missing"]) for r in rows if r["missing"]]
+    assert sorted(wrong) == [
+        *[("stranger_loose_mass", "medium", "cg_offset")] * 3,
+        ("stranger_turn_roll", "large", "constant_force"),
+        *[("stranger_turn_roll", "medium", "cg_offset")] * 3,
+    ]
+    nothing = [r for r in rows if r["verdict"] == "adequate"]
+    assert len(nothing) == 2 and all(r["p_value"] == 1.0 and r["size"] == "medium" for r in nothing)
+
+
 def test_logs_run_again_have_the_answers_that_the_text_says():
     def key(row):
         return tuple(row[k] for k in ("part", "hidden", "size", "seed", "vehicle"))
