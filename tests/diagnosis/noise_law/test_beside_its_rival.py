@@ -86,6 +86,15 @@ def test_a_lag_begins_where_an_overshoot_that_explains_something_has_ended(evide
     assert {n: v.tolist() for n, v in begins.items()} == expected
 
 
+@pytest.mark.parametrize(("more", "expected"), [([], {"munk_moment": [1.0]}), (["munk_moment"], {})])
+def test_what_shares_no_parameter_with_what_contains_it_is_fitted_once(more, expected):
+    """The Munk moment is a part of a lift, in other terms: it begins at its null, as it has if it was fitted."""
+    layout: Any = SimpleNamespace(described=lambda _: [SimpleNamespace(name="pitch", null=1.0)])
+    others = [explained(5.0, n, Muw=-3.0) for n in ("body_lift", *more)]
+    begins = contained_in(layout, others, explained(0.0, ""), {"munk_moment"})
+    assert {n: v.tolist() for n, v in begins.items()} == expected
+
+
 @pytest.mark.parametrize(("gains", "expected"), [(30.0, 30.0), (5.0, 8.0), (None, 8.0)])
 def test_the_plainer_cause_is_kept_where_that_beginning_leads_further_than_its_null(
     monkeypatch, gains, expected

@@ -65,11 +65,13 @@ def contained_in(
         current: the explanation without their last effects.
         open_to: effects that may be named.
     """
-    begins = {}
+    begins, known = {}, {h.name for h in found}
     for h in found:
         values = h.explanation.fitted.model.effect(h.name).values()
         for name, shared in effect_class(h.name).contains.items():
-            if name in open_to and h.evidence > current.evidence:
+            # With nothing in common it begins at its null, as any fit of it does.
+            again = bool(shared) or name not in known
+            if again and name in open_to and h.evidence > current.evidence:
                 described = layout.described(name)
                 begins[name] = np.array([values[p.name] if p.name in shared else p.null for p in described])
     return begins
