@@ -54,8 +54,9 @@ class Pruning:
         """Return the explanation without those effects that it no longer needs, and their names.
 
         An effect that was taken first may have stood in for the ones that came after it. It goes where the
-        evidence is no lower without it, or where it does not pay on runs left out, everything else refitted. One that
-        contains another name, which is enough by itself, must be so much likelier as a new name.
+        evidence is no lower without it, or where it does not pay on runs left out, everything else refitted. Where it
+        contains another one of the names, as a lift does a Munk moment, the evidence must be higher with it by the odds
+        that a new name needs.
 
         Args:
             taken: the explanation, the newest effect last.

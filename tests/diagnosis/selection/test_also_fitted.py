@@ -85,6 +85,21 @@ def test_one_mass_is_fitted_beside_six_factors_of_the_added_mass(fell, fitted):
     assert found == []
 
 
+@pytest.mark.parametrize(
+    ("leader", "plainer", "other"),
+    [
+        ("body_lift", "munk_moment", "coupled_damping"),
+        ("constant_force", "net_buoyancy", "ocean_current"),
+        ("constant_force", "cg_offset", "ocean_current"),
+    ],
+)
+def test_the_plainer_cause_of_what_leads_is_fitted_however_little_its_slope_says(leader, plainer, other):
+    """The slopes rank the effects here: what is confused with the one in the lead and no plainer is not fitted."""
+    significant = [score(leader, 100.0, 90.0), score(other, 60.0, 50.0), score(plainer, 10.0, 5.0)]
+    told = rivals_to_fit([fit(leader, 900.0)], significant, fit("", 1000.0))
+    assert [s.effect for s in told] == [plainer]
+
+
 def test_what_is_fitted_besides_is_weighed_with_those_that_lead(monkeypatch):
     leads, more = scored("added_mass", 44.0, 6), scored("trapped_water", 14.0, 1)
     asked: list[Any] = []
