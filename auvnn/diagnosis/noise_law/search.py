@@ -30,8 +30,6 @@ from auvnn.diagnosis.noise_law.hypothesis import (
 from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
 from auvnn.diagnosis.noise_law.model_average import averaged
 from auvnn.diagnosis.noise_law.rounds.beside_all_names import (
-    Change,
-    Refit,
     as_good_in_place,
     costs_little,
     no_longer_needed,
@@ -42,6 +40,7 @@ from auvnn.diagnosis.noise_law.rounds.beside_all_names import (
 )
 from auvnn.diagnosis.noise_law.rounds.name_after_name import NameAfterName
 from auvnn.diagnosis.noise_law.rounds.path import Path
+from auvnn.diagnosis.noise_law.rounds.plainer_causes import Change, Refit, nearly_in_place, plainer_rivals
 from auvnn.diagnosis.noise_law.under_law import NULL_STEPS
 from auvnn.diagnosis.selection.model_comparison import ODDS
 from auvnn.diagnosis.selection.moved_by_unnamed import moved_by_unnamed, widened
@@ -134,6 +133,8 @@ class ForceSearch(NameAfterName):
             earlier = _to_ask(path)
         if path.groups:
             self.say("comparing effects that could not be told apart, beside all names")
+            while self._plainer(path, [g[0].effects[-1] for g in path.groups], path.tied):
+                continue
             rest, refit = self.rest(path), self._refit(path.current, whole=True)
             while found := that_leads_instead(self.layout, path.groups, path.current, refit, rest):
                 path.exchange(*found, tied=False)
@@ -217,7 +218,7 @@ class ForceSearch(NameAfterName):
             open_to = [n for n in names if path.members(n) < GROUP]
             found = as_good_in_place(open_to, path.current, able, self._refit(path.current))
             if found is None:
-                return False
+                return self._plainer(path, open_to, able)
             name, other = found
             better = other.evidence - path.current.evidence
             plainer = other.name in effect_class(name).plainer
@@ -225,6 +226,16 @@ class ForceSearch(NameAfterName):
                 path.exchange(name, other, tied=better < ODDS)
                 return True
             path.tie(name, other)
+
+    def _plainer(self, path: Path, names: Sequence[str], rivals: Rivals) -> bool:
+        """Go on with a plainer cause that explains nearly all of what a name does; return whether there was one."""
+        changes = plainer_rivals(names, path.current, rivals)
+        if not changes:
+            return False
+        found = nearly_in_place(changes, path.current, self._refit(path.current, whole=True), self.rest(path))
+        if found is not None:
+            path.exchange(*found, tied=True)
+        return found is not None
 
     def _told(self, tried: Sequence[Hypothesis]) -> list[FittedHypothesis]:
         """Return explanations with their errors of free running, those aside whose free running grows without bound."""

@@ -191,7 +191,9 @@ def test_the_best_of_those_against_which_a_leader_loses_leads_instead(monkeypatc
     def of(fits):
         return one_by_one(
             lambda name, rival: (
-                fit(fits[rival.effects[-1]], name, rival.effects[-1]) if rival.effects[-1] in fits else None
+                fit(fits[rival.effects[-1]], name, rival.effects[-1])
+                if rival is not None and rival.effects[-1] in fits
+                else None
             )
         )
 

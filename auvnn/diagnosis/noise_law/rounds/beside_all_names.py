@@ -29,6 +29,7 @@ from auvnn.diagnosis.noise_law.law_fit import UNSOLVED, LawFits
 from auvnn.diagnosis.noise_law.rounds.leaders import RIVALS
 from auvnn.diagnosis.noise_law.rounds.looking_ahead import RIVALS_SHARE
 from auvnn.diagnosis.noise_law.rounds.path import with_last
+from auvnn.diagnosis.noise_law.rounds.plainer_causes import Change, Refit, nearly_all
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused
 from auvnn.diagnosis.selection.rivals import Rivals
 from auvnn.effects import effect_class
@@ -48,10 +49,6 @@ SEEN = float(np.log(10.0))
 FAR = 1000.0
 # Logarithm of the odds from which a name that costs little stands.
 MUCH = 300.0
-# A name, and a rival that is to take its place, or None.
-Change = tuple[str, FittedHypothesis | None]
-# Returns of each change the fit of all names with it, None where that fails; no fit has to wait for another.
-Refit = Callable[[Sequence[Change]], Sequence[Hypothesis | None]]
 
 
 def refitted(
@@ -246,6 +243,8 @@ def that_leads_instead(
         (name, other)
         for name, rival, other in _in_the_lead(groups, refit)
         if loses(other, current, rest, _extra(layout, rival, name))
+        if name not in effect_class(rival).plainer
+        or not nearly_all(other, current, refit([(name, None)])[0], rest)
     ]
     return max(found, key=lambda pair: pair[1].evidence, default=None)
 

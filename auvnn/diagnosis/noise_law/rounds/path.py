@@ -108,6 +108,11 @@ class Path:
         """The effects that the log cannot tell from names."""
         return [e.effects[-1] for g in self.groups for e in g[1:]]
 
+    @property
+    def tied(self) -> dict[str, list[FittedHypothesis]]:
+        """By the name that leads a group, the explanations with each of the others in its place."""
+        return {g[0].effects[-1]: g[1:] for g in self.groups}
+
     def take_apart(self, rival: str) -> None:
         """Say of an effect that could not be told from a name that it is no rival: the log needs it beside the name.
 
