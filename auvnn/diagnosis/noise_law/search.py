@@ -210,10 +210,11 @@ class ForceSearch(NameAfterName):
         """Go on with a rival that does better in the place of a name; return whether there was one.
 
         Those that do as well are told together with the name, which stays, and so are those that do better by less than
-        the model is known to be wrong, unless they are the plainer cause.
+        the model is known to be wrong, unless they are the plainer cause. Of two names of which the log needs one the
+        likelier stays: which of them went first was decided beside names that may be gone since.
         """
         while True:
-            known = self._passed(path)
+            known = [n for n in self._passed(path) if n not in path.needless]
             able = {n: [e for e in of if e.effects[-1] not in known] for n, of in rivals.items()}
             open_to = [n for n in names if path.members(n) < GROUP]
             found = as_good_in_place(open_to, path.current, able, self._refit(path.current))
@@ -221,8 +222,8 @@ class ForceSearch(NameAfterName):
                 return self._plainer(path, open_to, able)
             name, other = found
             better = other.evidence - path.current.evidence
-            plainer = other.name in effect_class(name).plainer
-            if better > 0.0 and (plainer or better > self.rest(path)):
+            plainer, name_again = other.name in effect_class(name).plainer, other.name in path.needless
+            if better > 0.0 and (plainer or name_again or better > self.rest(path)):
                 path.exchange(name, other, tied=better < ODDS)
                 return True
             path.tie(name, other)

@@ -127,7 +127,7 @@ def scripted(
     asked._one_step = {}
     asked._tested = lambda *_: SimpleNamespace(p_value=0.0)
     asked._settled = lambda h: h
-    asked._takes_up = lambda *_: False
+    asked._takes_up = asked._plainer = lambda *_: False
     asked.fits = lambda: SimpleNamespace(told=lambda e: diverging(e), closer=lambda h: h)
     asked.about = lambda *_: None
     asked.predicted, asked.in_closed_loop, asked.say = lambda _: None, False, lambda _: None

@@ -161,3 +161,49 @@ def test_every_rival_that_does_as_well_is_told_three_in_a_group_at_most(monkeypa
     monkeypatch.setattr(module, "as_good_in_place", as_good)
     path = asked.changed(NAMED, before)
     assert [s["effects"] for s in path.steps] == [["payload", "cg_offset"], ["waves", "tether", "gyro_bias"]]
+
+
+@pytest.mark.parametrize(
+    ("evidence", "order"), [(99.0, ["payload", "waves"]), (102.0, ["waves", "payload"]), (110.0, ["waves"])]
+)
+def test_of_two_names_of_which_one_is_needed_the_likelier_stays(monkeypatch, evidence, order):
+    """Whichever went first, however far the model is wrong; and each comes back once."""
+    asked, before, _ = begun(monkeypatch)
+    asked.rest = lambda _: 50.0
+    rival = SimpleNamespace(effects=("waves",))
+    monkeypatch.setattr(module, "rivals_tried", lambda *_: {"payload": [rival], "waves": []})
+    gone: list[str] = []
+
+    def needless(these: Any, *_: Any) -> Any:
+        if "waves" not in these or gone:
+            return None
+        gone.append("waves")
+        return "waves", found(100.0, "payload")
+
+    def as_good(these: Any, current: Any, able: Any, refit: Any) -> Any:
+        free = "payload" in these and [e.effects[-1] for e in able["payload"]] == ["waves"]
+        return ("payload", found(evidence, "waves")) if free else None
+
+    monkeypatch.setattr(module, "no_longer_needed", needless)
+    monkeypatch.setattr(module, "as_good_in_place", as_good)
+    path = asked.changed(NAMED, before)
+    assert [s["effects"] for s in path.steps] == [order] and path.needless == []
+    assert path.chosen == order[:1] and path.current.evidence == (100.0 if evidence < 100.0 else evidence)
+
+
+def test_what_gave_its_place_does_not_come_back(monkeypatch):
+    asked, before, _ = begun(monkeypatch)
+    rivals = {"payload": [SimpleNamespace(effects=("tether",))], "tether": []}
+    rivals["tether"].append(SimpleNamespace(effects=("payload",)))
+    monkeypatch.setattr(module, "rivals_tried", lambda *_: rivals)
+    asked.rest = lambda _: 0.0
+
+    def as_good(these: Any, current: Any, able: Any, refit: Any) -> Any:
+        better = current.evidence + 10.0
+        return next(
+            ((n, found(better, "waves", e.effects[-1])) for n in these for e in able.get(n, ())), None
+        )
+
+    monkeypatch.setattr(module, "as_good_in_place", as_good)
+    path = asked.changed(NAMED, before)
+    assert path.chosen == ["tether", "waves"] and path.dropped == ["payload"] and path.needless == []

@@ -102,6 +102,7 @@ def test_a_plainer_cause_that_leads_stays_in_the_lead(monkeypatch, lead, rest, w
 @pytest.mark.parametrize(("rest", "order"), [(14.0, ["net_buoyancy", "constant_force"]), (4.0, None)])
 def test_a_search_tells_the_plainer_cause_first_and_the_name_with_it(monkeypatch, rest, order):
     asked, before, _ = begun(monkeypatch)
+    del asked._plainer
     before.steps = [{"verdict": "named", "effects": ["constant_force"], "p_value": 0.01}]
     asked.rest = lambda _: rest
     rival = SimpleNamespace(effects=("net_buoyancy",))
@@ -133,6 +134,7 @@ def test_a_plainer_cause_in_a_group_leads_it_at_the_end(monkeypatch, short, orde
         ("net_buoyancy",): [],
     }
     asked, _ = scripted(monkeypatch, further)
+    del asked._plainer
     monkeypatch.setattr(name_after_name, "tied", lambda _, good, before: good)
     monkeypatch.setattr(name_after_name, "decided", lambda good, *_: good)
     monkeypatch.setattr(search, "those_that_lose", lambda *_: set())

@@ -21,6 +21,7 @@ class Path:
         steps: of the search.
         groups: explanations between which the log cannot decide.
         dropped: names that later ones made needless, or that gave their place to a rival; they are not asked for again.
+        needless: those of them that later ones made needless, and that may come back in the place of one of these.
         not_named: explanations with one name more that were not named.
         stands_out: see `WithForce`.
         explains: see `WithForce`.
@@ -36,6 +37,7 @@ class Path:
     stands_out: bool = False
     explains: bool = False
     null: Hypothesis | None = None
+    needless: list[str] = field(default_factory=list)
 
     @classmethod
     def of_names(cls, named: Hypothesis, steps: Sequence[SearchStep]) -> Path:
@@ -65,6 +67,7 @@ class Path:
             self.explains = self.explains and null is not None and explains_an_axis(current, null)
         self.current, self.not_named = current, []
         self.dropped.append(name)
+        self.needless.append(name)
         self.chosen = [c for c in self.chosen if c != name]
         self.steps = [s for s in self.steps if s["effects"][0] != name]
         self.groups = [g for g in self.groups if g[0].effects[-1] != name]
@@ -87,6 +90,7 @@ class Path:
         self._step(name, [e.effects[-1] for e in group])
         self.chosen = [other.name if c == name else c for c in self.chosen]
         self.dropped.append(name)
+        self.needless = [n for n in self.needless if n != other.name]
         self.current, self.not_named = other, []
 
     def tie(self, name: str, other: Hypothesis) -> None:
@@ -101,6 +105,7 @@ class Path:
             group = [with_last(self.current, name)]
             self.groups.append(group)
         group.append(other.explanation)
+        self.needless = [n for n in self.needless if n != other.name]
         self._step(name, [e.effects[-1] for e in group])
 
     @property
