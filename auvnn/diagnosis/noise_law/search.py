@@ -133,7 +133,7 @@ class ForceSearch(NameAfterName):
             earlier = _to_ask(path)
         if path.groups:
             self.say("comparing effects that could not be told apart, beside all names")
-            while self._plainer(path, [g[0].effects[-1] for g in path.groups], path.tied):
+            while self._plainer(path, list(path.tied), path.tied):
                 continue
             rest, refit = self.rest(path), self._refit(path.current, whole=True)
             while found := that_leads_instead(self.layout, path.groups, path.current, refit, rest):

@@ -21,7 +21,7 @@ class Path:
         steps: of the search.
         groups: explanations between which the log cannot decide.
         dropped: names that later ones made needless, or that gave their place to a rival; they are not asked for again.
-        needless: those of them that later ones made needless, and that may come back in the place of one of these.
+        needless: those of them that later ones made needless; they may still take the place of another name.
         not_named: explanations with one name more that were not named.
         stands_out: see `WithForce`.
         explains: see `WithForce`.

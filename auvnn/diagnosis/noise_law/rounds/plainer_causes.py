@@ -1,6 +1,6 @@
 """A plainer cause that explains nearly all of what a name does, where the model is known to be wrong.
 
-What is wrong in it is taken up by whatever has most parameters: a constant force in all degrees of freedom explains
+What the model gets wrong is taken up by whatever has most parameters: a constant force in all degrees of freedom explains
 what a missing buoyancy does, and the mean of every other error, and is ahead by any odds. Where some further effect
 still gains something beside all names, the plainer cause is therefore told with the name, and first.
 
