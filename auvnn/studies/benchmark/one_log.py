@@ -126,6 +126,8 @@ def _answered(case: Case, begun: dict[str, Any]) -> dict[str, Any]:
             depends_on=found.depends_on,
             acts_in=found.acts_in,
         )
+        if case.oracle:
+            row.update(_seen(case, model, log, made, found))
     of_the_catalogue = case.kind in ("effect", "several")
     if of_the_catalogue:
         row["errors"] = errors_of(case, hidden, row["parameters"])
@@ -175,17 +177,20 @@ def _costly(case: Case, model: Any, name: str, size: str) -> dict[str, float]:
 def _seen(case: Case, model: Any, log: Any, made: Any, found: Any) -> dict[str, Any]:
     """Return what the hidden effect costs, and what an oracle sees of it that knows the world's law.
 
-    Rivals are the names of the first step that are not hidden, and the three that lead the table.
+    What a stranger costs is not asked: no model can hold it. Rivals are the names of the first step that are not hidden, and the three that lead the table.
     """
     from auvnn.studies.benchmark.costs import cost_of
     from auvnn.studies.benchmark.identifiability.oracle import Oracle
 
-    hidden = {name: made.truth["hidden"][name] for name in case.effects}
+    hidden = {case.hidden: {}} if case.kind == "stranger" else {n: made.truth["hidden"][n] for n in case.effects}
     first = next((list(s["effects"]) for s in found.steps if s["effects"]), [])
     rivals = dict.fromkeys([*first, *[c["effect"] for c in found.candidates[:3]]])
     known = [n for n in rivals if n not in hidden and n in EFFECTS]
     oracle = Oracle(model, made, case.runs, list(hidden))
-    return {"cost": cost_of(model, log, hidden), "oracle_distances": oracle.distances(known)}
+    distances = oracle.distances(known)
+    if case.kind == "stranger":
+        return {"oracle_distances": distances}
+    return {"cost": cost_of(model, log, hidden), "oracle_distances": distances}
 
 
 def _ties(case: Case, model: Any, log: Any, truth: Mapping[str, Any], found: Any) -> dict[str, Any]:

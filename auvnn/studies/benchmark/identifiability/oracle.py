@@ -9,7 +9,7 @@ parameters free within their bounds. It is exact to first order in the states an
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -64,7 +64,7 @@ class Oracle:
         model: what the user knows.
         made: the simulation, by an independent plant.
         runs: how many of its runs are the log.
-        hidden: names of what is hidden and shall be seen.
+        hidden: names of what is hidden and shall be seen: effects, or strangers to the catalogue.
     """
 
     def __init__(self, model: GreyBox, made: Simulation, runs: int, hidden: Sequence[str]) -> None:
@@ -113,11 +113,17 @@ class Oracle:
             sigma, float(sensors.get("correlation") or 0.0), (late * moving) ** 2, measured, rms, correlation
         )
 
-    def _shift(self, other: Values) -> tuple[Array, Array]:
-        """Return what other effects would change, in a step (R, K, 12) and in the reports (R, K + 1, 12)."""
-        gone = accelerations(self.course, other) - self.now[0]
+    def _shift(self, other: Values, course: Course | None = None) -> tuple[Array, Array]:
+        """Return what other effects would change, in a step (R, K, 12) and in the reports (R, K + 1, 12).
+
+        Args:
+            other: effects in the place of those that act.
+            course: the same motion with other strangers; by default with those that act.
+        """
+        course = course or self.course
+        gone = accelerations(course, other) - self.now[0]
         push = np.einsum("rkij,rkj->rki", self.spread, gone)
-        return push, differences(self.now[1], reports(self.course, other))
+        return push, differences(self.now[1], reports(course, other))
 
     def _slopes(self, name: str, shape: Mapping[str, float]) -> list[tuple[Column, Array, Array]]:
         """Return the slopes with each live parameter of an effect that is added, and how far it may go."""
@@ -154,8 +160,10 @@ class Oracle:
         return out
 
     def _away(self, name: str) -> tuple[Array, Array]:
-        """Return what a hidden effect changes, all of it: whoever has it not must make up for that."""
-        push, seen = self._shift({n: v for n, v in self.truth.items() if n != name})
+        """Return what a hidden effect or stranger changes, all of it: whoever has it not must make up for that."""
+        others = {n: v for n, v in self.course.task.strangers.items() if n != name}
+        left = {n: v for n, v in self.truth.items() if n != name}
+        push, seen = self._shift(left, replace(self.course, task=replace(self.course.task, strangers=others)))
         return -push, -seen
 
     def distances(self, rivals: Sequence[str] = ()) -> dict[str, dict[str, float]]:

@@ -103,6 +103,18 @@ def test_a_wandering_force_hides_what_does_not_stand_out():
     assert seen[0] > 3.0 * seen[1] and 1.5 < seen[1] / seen[2] < 3.5
 
 
+def test_the_oracle_sees_a_stranger_in_proportion_and_less_beside_what_has_its_mean():
+    model, seen = load("rov95"), []
+    how: dict[str, Any] = dict(seed=3, runs=2, duration=6.0, plant="numpy", max_step=0.025)
+    for strength in (0.05, 0.1):
+        log = simulate(model, "multisine", "realistic", {"stranger_turn_roll": {"strength": strength}}, **how)
+        oracle = Oracle(model, log, 2, ["stranger_turn_roll"])
+        seen.append(oracle.distances(["cg_offset", "net_buoyancy"])["stranger_turn_roll"])
+    assert seen[1][NONE] == pytest.approx(2.0 * seen[0][NONE], rel=0.1)
+    assert 0.0 < seen[0]["cg_offset"] < 0.8 * seen[0][NONE], "a moment with one sign has a mean"
+    assert seen[0]["net_buoyancy"] == pytest.approx(seen[0][NONE], rel=0.05), "a force in heave turns nothing"
+
+
 def row(hidden: str, *found: tuple[str, list[str]], true=(), kind="effect", **more: Any) -> dict[str, Any]:
     return {
         "hidden": hidden, "kind": kind, "world": "w", "verdict": found[0][0], "made": True,
