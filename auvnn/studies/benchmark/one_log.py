@@ -177,12 +177,15 @@ def _costly(case: Case, model: Any, name: str, size: str) -> dict[str, float]:
 def _seen(case: Case, model: Any, log: Any, made: Any, found: Any) -> dict[str, Any]:
     """Return what the hidden effect costs, and what an oracle sees of it that knows the world's law.
 
-    What a stranger costs is not asked: no model can hold it. Rivals are the names of the first step that are not hidden, and the three that lead the table.
+    What a stranger costs is not asked: no model can hold it. Rivals are the names of the first step that are not hidden,
+    and the three that lead the table.
     """
     from auvnn.studies.benchmark.costs import cost_of
     from auvnn.studies.benchmark.identifiability.oracle import Oracle
 
-    hidden = {case.hidden: {}} if case.kind == "stranger" else {n: made.truth["hidden"][n] for n in case.effects}
+    hidden = (
+        {case.hidden: {}} if case.kind == "stranger" else {n: made.truth["hidden"][n] for n in case.effects}
+    )
     first = next((list(s["effects"]) for s in found.steps if s["effects"]), [])
     rivals = dict.fromkeys([*first, *[c["effect"] for c in found.candidates[:3]]])
     known = [n for n in rivals if n not in hidden and n in EFFECTS]
