@@ -38,7 +38,7 @@ from auvnn.diagnosis.noise_law.rounds.leaders import fitted_alone, sensing_alone
 from auvnn.diagnosis.noise_law.search import ForceSearch
 from auvnn.diagnosis.noise_law.split_windows import fitted_over_parts
 from auvnn.diagnosis.noise_law.standing_names import beside_names, stand
-from auvnn.diagnosis.noise_law.withheld import goes_further, state_with
+from auvnn.diagnosis.noise_law.withheld import goes_further, state_with, withheld
 from auvnn.diagnosis.noise_law.words import left
 from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.diagnosis.search import a_force_stays, search
@@ -281,6 +281,12 @@ def _with_force(
         again = beside.run(null, alone, asked.most)
         if again.predicted is None or goes_further(again, result):
             result, predicted = again, again.predicted
+        if predicted is not None and withheld(asked, state, result, chance=False):
+            # What takes up a part of what these names leave is looked at before they are not given for that.
+            beside.refuses_none = True
+            again = beside.run(null, alone, asked.most)
+            if goes_further(again, result):
+                result, predicted = again, again.predicted
     over_parts = state.but(first=first, windows=windows)
     ended = state_with(asked, state, over_parts, result, uncertain, chance=predicted is None)
     return ended, result.estimate.law, predicted

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from auvnn.diagnosis.noise_law import under_law
+from auvnn.diagnosis.noise_law import answer, under_law
 from auvnn.diagnosis.noise_law.predicted_by_inputs import InputPrediction
 from auvnn.diagnosis.noise_law.rounds import name_after_name
 from auvnn.diagnosis.noise_law.search import ForceSearch
@@ -59,3 +59,52 @@ def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_is_no_name(
     assert asked._takes_up(found, path, null) is expected
     # With the one that leaves such a thing, not with what else was named; of the model's effects the change counts.
     assert all(given == (["thrust_asymmetry"], {"waves": None}) for given in compared)
+    asked.refuses_none = True
+    assert not asked._takes_up(found, path, null), "where that is all that would be left to name"
+
+
+@pytest.mark.parametrize(
+    ("predicted", "strict", "withheld", "further", "runs", "taken"),
+    [
+        # The search; with further names that cost little; with those that take up what earlier ones get wrong.
+        ("X", False, True, {2}, ["", "looks", "looks refuses"], 2),
+        ("X", False, True, {1, 2}, ["", "looks", "looks refuses"], 2),
+        ("X", False, True, {1}, ["", "looks", "looks refuses"], 1),
+        ("X", False, True, set(), ["", "looks", "looks refuses"], 0),
+        # Names that are given as they are need no others.
+        ("X", False, False, {2}, ["", "looks"], 0),
+        # Nothing is predicted, or nothing that costs little may be left out.
+        (None, False, True, {2}, [""], 0),
+        ("X", True, True, {2}, [""], 0),
+    ],
+)
+def test_what_takes_up_is_looked_at_before_names_are_not_given_for_what_they_leave(
+    predicted, strict, withheld, further, runs, taken, monkeypatch
+):
+    made: list[str] = []
+
+    class Search:
+        def __init__(self, *_: object, **__: object) -> None:
+            self.names, self.looks_further, self.refuses_none = SimpleNamespace(), False, False
+
+        def begin(self, *_: object) -> object:
+            return object()
+
+        def run(self, *_: object) -> SimpleNamespace:
+            how = [w for w, on in (("looks", self.looks_further), ("refuses", self.refuses_none)) if on]
+            made.append(" ".join(how))
+            law = SimpleNamespace(law=None)
+            return SimpleNamespace(predicted=predicted, number=len(made) - 1, estimate=law)
+
+    monkeypatch.setattr(answer, "ForceSearch", Search)
+    for name in ("leaves_force", "fitted_alone", "white"):
+        monkeypatch.setattr(answer, name, lambda *_: True)
+    monkeypatch.setattr(answer, "fitted_over_parts", lambda asked, first, windows: (first, windows))
+    monkeypatch.setattr(answer, "withheld", lambda *_, chance: withheld and not chance)
+    monkeypatch.setattr(answer, "goes_further", lambda again, before: again.number in further)
+    monkeypatch.setattr(answer, "state_with", lambda asked, state, over, result, *_, chance: result.number)
+    asked: Any = SimpleNamespace(floor=None, most=4, tolerance=SimpleNamespace(strict=strict))
+    state: Any = SimpleNamespace(windows=None, first=None, refuted=None, current=None, but=lambda **_: None)
+    found = answer._with_force(asked, state, SimpleNamespace(closed_loop=False))
+    assert found is not None and found[0] == taken
+    assert made == runs

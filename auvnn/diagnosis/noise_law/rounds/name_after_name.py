@@ -55,8 +55,9 @@ class NameAfterName(UnderLaw):
         closed_loop: whether commands are known to answer the motion; else it is asked of the fit without any name.
     """
 
-    # How many names may be given; a search says it where it begins.
+    # How many names may be given, said where a search begins; whether those count that take up what others get wrong.
     most: float = np.inf
+    refuses_none = False
 
     def __init__(self, asked: Setting, windows: Windows, *, closed_loop: bool = False) -> None:
         """Begin without a law."""
@@ -132,8 +133,7 @@ class NameAfterName(UnderLaw):
                 break
             path.take_apart(group[0].name)
             group = [h for h in group if h.name not in path.rivals]
-            names = [h.name for h in group]
-            verdict = "ambiguous" if len(group) > 1 else "named"
+            verdict, names = "ambiguous" if len(group) > 1 else "named", [h.name for h in group]
             path.steps.append({"verdict": verdict, "effects": names, "p_value": result.sure[group[0].name]})
             path.current = current = self._settled(group[0])
             if not path.chosen:
@@ -290,7 +290,7 @@ class NameAfterName(UnderLaw):
             null: the explanation without any.
         """
         forms = forms_that_leave(further.name, path.chosen)
-        if not forms and not any(confused(further.name, name) for name in path.chosen):
+        if self.refuses_none or not (forms or any(confused(further.name, n) for n in path.chosen)):
             return False
         one_of_them = (path.current.evidence - null.evidence) / len(path.chosen)
         little = further.evidence - path.current.evidence < LITTLE * one_of_them
