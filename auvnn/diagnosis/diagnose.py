@@ -202,6 +202,8 @@ def searched(
             asked, state = search_over_shorter(asked, state, search)
         if stochastic:
             state, told, words = answer_with_force(asked, state)
+            # However commands have turned out to go, what is told of the answer is worked out with such commands.
+            asked = asked.with_commands(state.current.fitted.model.commands)
         state = beside_unnamed(asked, beyond_stated(asked, without_stated(asked, settled(asked, state))))
         found = answer(asked, state)
     except (np.linalg.LinAlgError, SINGULAR) as problem:

@@ -126,6 +126,27 @@ def test_strangers_with_further_seeds_are_as_the_text_says():
     assert len(nothing) == 2 and all(r["p_value"] == 1.0 and r["size"] == "medium" for r in nothing)
 
 
+def test_what_an_oracle_sees_of_strangers_is_as_the_text_says():
+    rows, text = rows_of("rows-strangers-3.jsonl"), (HERE / "README.md").read_text()
+    assert len({(r["seed"], r["hidden"], r["size"]) for r in rows}) == len(rows) == 48
+    assert not {r["seed"] for r in rows} & {r["seed"] for r in rows_of("rows-strangers-2.jsonl")}
+    right = [r for r in rows if r["verdict"] in ("unknown", "partial") and not r["missing"]]
+    there = sum(r["axis"] in r["axes_true"] for r in right)
+    assert f"{len(right)} of {len(rows)} are `unknown` or `partial` without a name (85 %" in text
+    assert f"{there} of them in the right degree of freedom (83 %" in text
+    wrong = [r for r in rows if r["missing"]]
+    assert [r["missing"] for r in wrong] == [["cg_offset"]] * 4 and {r["size"] for r in wrong} == {"medium"}
+    kinds = sorted(r["hidden"] for r in wrong)
+    assert kinds == ["stranger_loose_mass"] * 3 + ["stranger_turn_roll"]
+    adequate = sorted(r["hidden"] for r in rows if r["verdict"] == "adequate")
+    assert adequate == ["stranger_pitch_thrust"] * 2 + ["stranger_square_wave"]
+    seen = [r["oracle_distances"][r["hidden"]] for r in rows]
+    medium = [d["nothing"] for r, d in zip(rows, seen, strict=True) if r["size"] == "medium"]
+    assert 13.0 <= min(medium) < 13.5
+    told = [r["oracle_distances"][r["hidden"]]["cg_offset"] for r in wrong]
+    assert f"by {min(told):.1f} to {max(told):.1f} of them" in text
+
+
 def test_logs_run_again_have_the_answers_that_the_text_says():
     def key(row):
         return tuple(row[k] for k in ("part", "hidden", "size", "seed", "vehicle"))

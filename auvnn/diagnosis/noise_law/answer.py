@@ -44,8 +44,8 @@ from auvnn.diagnosis.residuals.variance_component_test import white
 from auvnn.diagnosis.search import a_force_stays, search
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.diagnosis.stages.what_is_left import settled
+from auvnn.metrics.commands.stated import interval_of
 from auvnn.metrics.force_law import ForceLaw
-from auvnn.models.actuation.command_path import with_commands
 
 Array = NDArray[np.float64]
 CONTRADICTED = (
@@ -130,17 +130,18 @@ def answer_with_force(asked: Setting, state: State) -> tuple[State, dict[str, An
         why = [f"commands change between samples ({held.name})"] if otherwise else []
         why += [] if colour.noise is None else ["the sensors' noise is not white"]
         asked.say(f"{' and '.join(why)}: searching again")
+        # What names cost in free running is worked out with commands that go so, too.
+        asked = asked.with_commands(held.path(interval_of(read))) if otherwise else asked
         state = search(asked, colour.applied(windows), until=a_force_stays)
         late = None if colour.noise is not None else late_by_a_share(asked, state, read, held)
         if late is not None:
-            gone = {**gone, **replaced(late[0], state.current)}
-            asked, held = without(asked, gone), late[1]
+            gone, held = {**gone, **replaced(late[0], state.current)}, late[1]
+            asked = without(asked, gone).with_commands(held.path(interval_of(read)))
             asked.say("commands act later than taken, by part of an interval: searching again")
             state = search(asked, held.applied(read), until=a_force_stays)
         state = state.but(failed={**state.failed, **gone})
-    wrench = uncertain.to_dict()
     told: dict[str, Any] = {
-        "commands": {**held.to_dict(), **({"uncertain": wrench} if wrench else {})},
+        "commands": {**held.to_dict(), **({"uncertain": w} if (w := uncertain.to_dict()) else {})},
         "noise": colour.to_dict(),
     }
     if not state.leaves_something:
@@ -171,8 +172,7 @@ def _unstated(
         stated: how commands go by the model.
     """
     asked.say("commands go otherwise than the model states: searching again")
-    plain = replace(asked.layout, model=with_commands(asked.layout.model, None))
-    anew = replace(asked, commands=None, model=with_commands(asked.model, None), layout=plain)
+    anew = replace(asked.with_commands(None), commands=None)
     try:
         begun = search(anew, stated.as_read(state.windows), until=ends_early)
         state, told, words = answer_with_force(anew, begun)
@@ -224,7 +224,8 @@ def _with_fewer_names(asked: Setting, state: State) -> tuple[State, dict[str, An
     gone = replaced(fewer, state.current)
     asked.say(f"commands change between samples ({law.name}): searching again")
     try:
-        again = search(without(asked, gone), law.applied(state.windows))
+        fewer_asked = without(asked, gone).with_commands(law.path(interval_of(state.windows)))
+        again = search(fewer_asked, law.applied(state.windows))
     except UNSOLVED:
         # The first answer stands: it did not need what could not be solved here.
         return state, {}, []

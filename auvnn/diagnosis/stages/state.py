@@ -26,6 +26,7 @@ from auvnn.executors.serial import SERIAL
 from auvnn.logs import Log
 from auvnn.metrics.windows import Windows
 from auvnn.models import GreyBox
+from auvnn.models.actuation.command_path import CommandPath, with_commands
 
 Array = NDArray[np.float64]
 
@@ -78,6 +79,15 @@ class Setting:
     def stated(self) -> dict[str, Array]:
         """The values of the parameters of effects that the model has, by effect."""
         return {n: m for n, m in self.layout.means.items() if n in self.model.effect_names}
+
+    def with_commands(self, path: CommandPath | None) -> Setting:
+        """Return the same of models that run free by another statement of how commands go between samples.
+
+        Args:
+            path: None for commands that are held.
+        """
+        layout = replace(self.layout, model=with_commands(self.layout.model, path))
+        return replace(self, model=with_commands(self.model, path), layout=layout)
 
     def chooser(self, windows: Windows) -> Chooser:
         """Return who weighs explanations of these windows."""

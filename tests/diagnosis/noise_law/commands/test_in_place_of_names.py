@@ -86,16 +86,26 @@ def test_where_names_leave_nothing_a_law_that_spares_some_of_them_takes_their_pl
         current=None,
         interrupted=False,
     )
+    monkeypatch.setattr(answer, "interval_of", lambda windows: 0.25)
     again = State("law", None, None, chosen=tuple(NAMES[:names]), failed={"waves": "no"})  # type: ignore[arg-type]
     again = again.step("unknown" if leaves else "adequate", [], 0.0)
-    law = SimpleNamespace(name="smooth", applied=lambda w: f"{w}, smooth", to_dict=lambda: {"a": 1})
+    law = SimpleNamespace(
+        name="smooth",
+        applied=lambda w: f"{w}, smooth",
+        to_dict=lambda: {"a": 1},
+        path=lambda interval: ("smooth", interval),
+    )
     monkeypatch.setattr(answer, "in_place_of_names", lambda *_: ("fewer", law))
     monkeypatch.setattr(answer, "replaced", lambda fewer, end: {"thrust_overshoot": "why"})
-    monkeypatch.setattr(answer, "without", lambda asked, gone: [*gone])
+    monkeypatch.setattr(
+        answer, "without", lambda asked, gone: SimpleNamespace(with_commands=lambda path: (*gone, path))
+    )
     monkeypatch.setattr(answer, "search", lambda asked, windows: searched.append((asked, windows)) or again)
     asked: Any = SimpleNamespace(say=lambda _: None, commands=None)
     found = answer.answer_with_force(asked, state)
-    assert searched == [(["thrust_overshoot"], "held, smooth")]
+    assert searched == [(("thrust_overshoot", ("smooth", 0.25)), "held, smooth")], (
+        "what names cost is worked out with commands that go so, too"
+    )
     if given:
         assert found[1:] == ({"commands": {"a": 1}}, []) and found[0].chosen == again.chosen
         assert found[0].failed == {"waves": "no", "thrust_overshoot": "why"}

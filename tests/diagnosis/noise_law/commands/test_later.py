@@ -19,7 +19,9 @@ from auvnn.diagnosis.noise_law.commands.law import HELD, Holding
 from auvnn.diagnosis.selection.choose import Chooser
 from auvnn.diagnosis.stages.state import State
 from auvnn.metrics.commands.mean_thrust import MeanThrust
+from auvnn.metrics.commands.stated import interval_of
 from auvnn.models import GreyBox
+from auvnn.models.actuation.command_path import CommandPath
 from tests.small_logs import make_log, small_vehicle, thinned
 
 STEP = 5
@@ -109,7 +111,15 @@ def test_the_answer_searches_again_without_it(late, monkeypatch):
         made.append((asked.usable, windows))
         return state.but(windows=windows, current=state.current if len(made) == 1 else state.first)
 
-    asked = SimpleNamespace(**vars(asked), usable=tuple(NAMES), floor=1e-9, commands=None, say=lambda _: None)
+    paths: list[CommandPath] = []
+
+    def given(asked: Any, usable: tuple[str, ...]) -> Any:
+        """Return what is asked, of these effects, that keeps how models are to run."""
+        made = SimpleNamespace(**{**vars(asked), "usable": usable})
+        made.with_commands = lambda path: paths.append(path) or made
+        return made
+
+    asked = given(SimpleNamespace(**vars(asked), floor=1e-9, commands=None, say=lambda _: None), tuple(NAMES))
     monkeypatch.setattr(answer, "search", searched)
     monkeypatch.setattr(answer, "_held", lambda *_: (state.first, law))
     monkeypatch.setattr(answer, "with_share", lambda *_: law)
@@ -117,13 +127,18 @@ def test_the_answer_searches_again_without_it(late, monkeypatch):
     monkeypatch.setattr(answer, "uncertain_wrench", lambda *_: SimpleNamespace(to_dict=dict))
     monkeypatch.setattr(answer, "noise_colour", lambda *_: answer.Colour(None, 0.0))
     monkeypatch.setattr(answer, "sensing_alone", lambda *_: None)
-    monkeypatch.setattr(answer, "without", lambda asked, gone: SimpleNamespace(**{**vars(asked), "usable": tuple(
-        n for n in asked.usable if n not in gone)}))  # fmt: skip
+    monkeypatch.setattr(
+        answer, "without", lambda asked, gone: given(asked, tuple(n for n in asked.usable if n not in gone))
+    )
     began = state.but(windows=raw, steps=({"verdict": "unknown", "effects": [], "p_value": 0.0},))
     monkeypatch.setattr(answer, "_names_alone", lambda asked, began, state, told, words: (state, told, words))
     monkeypatch.setattr(State, "leaves_something", property(lambda self: self.windows is raw))
     found, told, _ = answer.answer_with_force(asked, began)
     assert [usable for usable, _ in made] == [tuple(NAMES), ("net_buoyancy",)]
+    # What names cost in free running is worked out with commands that go so: as they were first found, then later.
+    shares = [law.share, told["commands"]["share_of_next"]]
+    assert [p.share_of_next for p in paths] == pytest.approx(shares) and shares[0] != shares[1]
+    assert [p.interval for p in paths] == pytest.approx([interval_of(raw)] * 2)
     assert "thruster_lag" in found.failed and told["commands"]["share_of_next"] == pytest.approx(
         0.4, abs=0.05
     )

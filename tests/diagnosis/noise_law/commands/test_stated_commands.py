@@ -11,6 +11,7 @@ import pytest
 import torch
 
 from auvnn.diagnosis import diagnose
+from auvnn.diagnosis.diagnose import searched
 from auvnn.diagnosis.hypotheses.candidates import windows_for
 from auvnn.diagnosis.hypotheses.fit import fit_hypothesis
 from auvnn.diagnosis.hypotheses.stated_priors import lay_out
@@ -20,7 +21,8 @@ from auvnn.diagnosis.noise_law.commands.stated import stated_commands, still_sta
 from auvnn.diagnosis.noise_law.words import stochastic_words
 from auvnn.diagnosis.stages.state import State
 from auvnn.logs import Log
-from auvnn.metrics.commands.stated import as_stated
+from auvnn.metrics.commands.stated import as_stated, interval_of
+from auvnn.metrics.rollouts import roll, scale_of
 from auvnn.models import GreyBox
 from auvnn.models.actuation.command_path import CommandPath, with_commands
 from tests.small_logs import make_log, small_vehicle, thinned
@@ -157,3 +159,26 @@ def test_a_statement_that_the_log_contradicts_gives_no_name(plain):
     assert [words for words in said if "searching again" in words]
     assert found.stochastic["commands"]["between_samples"] == "held"
     assert [words for words in found.warnings if "as the model states it" in words]
+
+
+def test_what_is_told_of_an_answer_is_worked_out_with_commands_that_go_as_the_log_says(plain):
+    """With held commands free running would show errors that no name takes away, and the name would seem to cost less."""
+    log = made(plain, held=False, net_buoyancy={"force": 6.0})
+    found, under_way = searched(plain, log, ["net_buoyancy"], advice=False, whiteness=False)
+    told, best = found.stochastic["commands"], under_way.state.current.fitted.model
+    assert found.missing == ["net_buoyancy"] and told["between_samples"] != "held"
+    for model in (under_way.setting.model, under_way.layout.model, best):
+        path = model.commands
+        assert path is not None and path.between_samples == told["between_samples"]
+        assert path.share_of_next == pytest.approx(told["share_of_next"])
+        assert path.counts_at(interval_of(windows_for(plain, log)))
+    assert plain.commands is None, "the model that was given stays as it is"
+
+    def cost(path: CommandPath | None) -> float:
+        models = (with_commands(m, path) for m in (plain, best.without_absent(["net_buoyancy"])))
+        without, whole = (roll(m, log, "5", scale_of(log)) for m in models)
+        assert without is not None and whole is not None
+        return without.total(scale_of(log)) / whole.total(scale_of(log)) - 1.0
+
+    assert found.matters["net_buoyancy"]["cost"] == pytest.approx(cost(best.commands), rel=0.2)
+    assert cost(best.commands) > 2.0 * cost(None)
