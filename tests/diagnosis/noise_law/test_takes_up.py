@@ -73,6 +73,8 @@ def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_is_no_name(
         ("X", False, True, set(), ["", "looks", "looks refuses"], 0),
         # Names that are given as they are need no others.
         ("X", False, False, {2}, ["", "looks"], 0),
+        # With names that cost little nothing is predicted.
+        (["X", None], False, True, {2}, ["", "looks"], 1),
         # Nothing is predicted, or nothing that costs little may be left out.
         (None, False, True, {2}, [""], 0),
         ("X", True, True, {2}, [""], 0),
@@ -94,7 +96,8 @@ def test_what_takes_up_is_looked_at_before_names_are_not_given_for_what_they_lea
             how = [w for w, on in (("looks", self.looks_further), ("refuses", self.refuses_none)) if on]
             made.append(" ".join(how))
             law = SimpleNamespace(law=None)
-            return SimpleNamespace(predicted=predicted, number=len(made) - 1, estimate=law)
+            told = predicted[len(made) - 1] if isinstance(predicted, list) else predicted
+            return SimpleNamespace(predicted=told, number=len(made) - 1, estimate=law)
 
     monkeypatch.setattr(answer, "ForceSearch", Search)
     for name in ("leaves_force", "fitted_alone", "white"):
