@@ -9,7 +9,6 @@ import pytest
 
 from auvnn.diagnosis.answers.tolerance import Tolerance
 from auvnn.diagnosis.noise_law.rounds import names_given
-from auvnn.diagnosis.noise_law.rounds.a_round import Round
 from auvnn.diagnosis.noise_law.rounds.free_running_cost import Cost
 from tests.diagnosis.noise_law.stand_ins import given, hypothesis
 
@@ -119,44 +118,3 @@ def test_what_is_known_to_be_confused_with_a_name_is_compared_with_it_whatever_i
     cheap, dear = (-0.2, 0.01), (0.2, 0.2)
     assert paying({"tether": dear, "biofouling": cheap}, monkeypatch) == ["tether", "biofouling"]
     assert paying({"tether": dear, "waves": cheap}, monkeypatch) == ["tether"]
-
-
-@pytest.mark.parametrize(
-    ("others", "chosen", "sure", "expected"),
-    [
-        # Everything else as it is, the drag that grows with time matters; refitted, the drag stands in for it.
-        ({}, [], True, True),
-        ({"waves": -0.1}, [], True, True),
-        # What the catalogue knows to be confused with it may explain as much.
-        ({"quadratic_damping": 20.0}, [], True, True),
-        # Several effects gain something where the model is wrong in its form.
-        ({"waves": 0.1}, [], True, False),
-        ({"waves": 0.1, "quadratic_damping": 20.0}, [], True, False),
-        ({}, ["waves"], True, False),
-        ({}, [], False, False),
-    ],
-)
-def test_a_first_name_that_alone_explains_anything_counts_by_what_it_does_with_everything_else_as_it_is(
-    others, chosen, sure, expected, monkeypatch
-):
-    asked: dict[str, bool] = {}
-
-    def cost_of(_, h, *__, others_stay):
-        asked[h.name] = others_stay
-        return Cost(0.2 if others_stay else 0.01, 0.0, 0.0, 0.0, False)
-
-    levels: list[float] = []
-    monkeypatch.setattr(names_given, "cost_of_name", cost_of)
-    monkeypatch.setattr(names_given, "p_value_of", lambda *_: 1e-12)
-    monkeypatch.setattr(names_given, "brings_most", lambda *_: False)
-    monkeypatch.setattr(
-        names_given, "predicts_better", lambda h, now, least, *, ranks: levels.append(least) or ranks or sure
-    )
-    found = [hypothesis("biofouling", 0.0, 24.0), *[hypothesis(n, 0.0, e) for n, e in others.items()]]
-    current = hypothesis("", 0.0, 0.0)
-    at = Round(None, current, [], chosen, null=current)  # type: ignore[arg-type]
-    good = given(white_noise=False).good(at, 10, found, 10.0)
-    assert ("biofouling" in [h.name for h in good]) is expected
-    assert asked["biofouling"] is expected
-    if not others and not chosen:
-        assert names_given.GAIN_FURTHER in levels, "surely in the mean"

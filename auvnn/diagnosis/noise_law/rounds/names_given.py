@@ -70,7 +70,7 @@ class NamesGiven:
             odds: logarithm of the odds that a name needs.
         """
         likely = self.likely(at, among, found, odds)
-        clear = [h.name for h in likely if _shows(h, at) or _alone(h, at, found)]
+        clear = [h.name for h in likely if _shows(h, at)]
         sure = GAIN_FURTHER if at.chosen else GAIN
         most = [h.name for h in likely if not predicts_better(h, at.current, sure, ranks=False)]
         return self.paying(likely, at.current, FURTHER_COST if at.chosen else FIRST_COST, clear, most)
@@ -153,8 +153,7 @@ class NamesGiven:
             likely: explanations, the most evident first.
             current: the explanation without any of the names.
             share: of the tolerance.
-            clear: names that take away most of a force, or alone explain anything: what they do with everything else as
-                it is with them counts, too.
+            clear: names that take away most of a force: what they do with everything else as it is counts, too.
             most: names with which most windows are predicted better, and not surely the mean: the median window counts.
         """
         if self.tolerance.strict:
@@ -184,22 +183,3 @@ class NamesGiven:
 def _shows(found: Hypothesis, at: Round) -> bool:
     """Whether a further name takes away most of the force of a degree of freedom, see `brings_most`."""
     return at.null is not None and bool(at.chosen) and brings_most(found, at.current, at.null)
-
-
-def _alone(found: Hypothesis, at: Round, among: Sequence[Hypothesis]) -> bool:
-    """Whether a first name surely predicts better, and nothing that is not confused with it is likelier than no name.
-
-    A model that is wrong in its form is wrong in ways that several effects take up a part of. Where one alone explains
-    anything, what it does is no less because coefficients that are uncertain anyway could stand in for most of it.
-
-    Args:
-        found: explanation with the name.
-        at: the round.
-        among: all that were judged in it.
-    """
-    now = at.current
-    if at.chosen or any(
-        h.evidence > now.evidence and not confused(h.name, found.name) for h in among if h is not found
-    ):
-        return False
-    return predicts_better(found, now, GAIN_FURTHER, ranks=False)
