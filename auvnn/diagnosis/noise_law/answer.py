@@ -224,8 +224,8 @@ def _with_fewer_names(asked: Setting, state: State) -> tuple[State, dict[str, An
     gone = replaced(fewer, state.current)
     asked.say(f"commands change between samples ({law.name}): searching again")
     try:
-        fewer_asked = without(asked, gone).with_commands(law.path(interval_of(state.windows)))
-        again = search(fewer_asked, law.applied(state.windows))
+        anew = without(asked, gone).with_commands(law.path(interval_of(state.windows)))
+        again = search(anew, law.applied(state.windows))
     except UNSOLVED:
         # The first answer stands: it did not need what could not be solved here.
         return state, {}, []
@@ -284,7 +284,7 @@ def _with_force(
             result, predicted = again, again.predicted
         if predicted is not None and withheld(asked, state, result, chance=False):
             # What takes up a part of what these names leave is looked at before they are not given for that.
-            beside.refuses_none = True
+            beside.passes_over_none = True
             again = beside.run(null, alone, asked.most)
             if goes_further(again, result):
                 result, predicted = again, again.predicted

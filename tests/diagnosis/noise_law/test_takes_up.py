@@ -59,7 +59,7 @@ def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_is_no_name(
     assert asked._takes_up(found, path, null) is expected
     # With the one that leaves such a thing, not with what else was named; of the model's effects the change counts.
     assert all(given == (["thrust_asymmetry"], {"waves": None}) for given in compared)
-    asked.refuses_none = True
+    asked.passes_over_none = True
     assert not asked._takes_up(found, path, null), "where that is all that would be left to name"
 
 
@@ -67,10 +67,10 @@ def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_is_no_name(
     ("predicted", "strict", "withheld", "further", "runs", "taken"),
     [
         # The search; with further names that cost little; with those that take up what earlier ones get wrong.
-        ("X", False, True, {2}, ["", "looks", "looks refuses"], 2),
-        ("X", False, True, {1, 2}, ["", "looks", "looks refuses"], 2),
-        ("X", False, True, {1}, ["", "looks", "looks refuses"], 1),
-        ("X", False, True, set(), ["", "looks", "looks refuses"], 0),
+        ("X", False, True, {2}, ["", "looks", "looks all"], 2),
+        ("X", False, True, {1, 2}, ["", "looks", "looks all"], 2),
+        ("X", False, True, {1}, ["", "looks", "looks all"], 1),
+        ("X", False, True, set(), ["", "looks", "looks all"], 0),
         # Names that are given as they are need no others.
         ("X", False, False, {2}, ["", "looks"], 0),
         # With names that cost little nothing is predicted.
@@ -87,13 +87,13 @@ def test_what_takes_up_is_looked_at_before_names_are_not_given_for_what_they_lea
 
     class Search:
         def __init__(self, *_: object, **__: object) -> None:
-            self.names, self.looks_further, self.refuses_none = SimpleNamespace(), False, False
+            self.names, self.looks_further, self.passes_over_none = SimpleNamespace(), False, False
 
         def begin(self, *_: object) -> object:
             return object()
 
         def run(self, *_: object) -> SimpleNamespace:
-            how = [w for w, on in (("looks", self.looks_further), ("refuses", self.refuses_none)) if on]
+            how = [w for w, on in (("looks", self.looks_further), ("all", self.passes_over_none)) if on]
             made.append(" ".join(how))
             law = SimpleNamespace(law=None)
             told = predicted[len(made) - 1] if isinstance(predicted, list) else predicted

@@ -55,9 +55,9 @@ class NameAfterName(UnderLaw):
         closed_loop: whether commands are known to answer the motion; else it is asked of the fit without any name.
     """
 
-    # How many names may be given, said where a search begins; whether those count that take up what others get wrong.
+    # How many names may be given, said where a search begins; and whether `_takes_up` passes over none of them.
     most: float = np.inf
-    refuses_none = False
+    passes_over_none = False
 
     def __init__(self, asked: Setting, windows: Windows, *, closed_loop: bool = False) -> None:
         """Begin without a law."""
@@ -290,7 +290,7 @@ class NameAfterName(UnderLaw):
             null: the explanation without any.
         """
         forms = forms_that_leave(further.name, path.chosen)
-        if self.refuses_none or not (forms or any(confused(further.name, n) for n in path.chosen)):
+        if self.passes_over_none or not (forms or any(confused(further.name, n) for n in path.chosen)):
             return False
         one_of_them = (path.current.evidence - null.evidence) / len(path.chosen)
         little = further.evidence - path.current.evidence < LITTLE * one_of_them
