@@ -97,8 +97,9 @@ def exerts_less(
     further: str,
     names: Sequence[str],
     stated: Mapping[str, Array] | None = None,
+    times: float = 1.0,
 ) -> bool:
-    """Whether an effect exerts less than others together, where it acts most.
+    """Whether an effect exerts less than others together, or than several times that, where it acts most.
 
     What the form of an effect gets wrong is less than what the effect does itself, in the degrees of freedom in which it
     acts: a thrust curve of another shape leaves a mean force that is a part of what the curve changes.
@@ -109,12 +110,13 @@ def exerts_less(
         further: the effect.
         names: the others; all are in the fit.
         stated: of effects that the model has with other values, these: what counts then is the change.
+        times: by which the force of the others is multiplied.
     """
     forces = forces_of(found, windows, [further, *names], stated)
     own, others = forces[further], np.sqrt(sum(forces[name] ** 2 for name in names))
     share = np.nan_to_num(share_of(own, actuators_of(found.fitted.model, windows)))
     acts = (share > 0.0) & (share >= MOST * share.max())
-    return bool(acts.any() and (own < others)[acts].all())
+    return bool(acts.any() and (own < times * others)[acts].all())
 
 
 def share_of(force: Array, actuators: Array) -> Array:

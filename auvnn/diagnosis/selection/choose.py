@@ -36,6 +36,8 @@ ALPHA = 0.05
 LEADERS, REACH, REACH_SHARE = 5, 30.0, 0.5
 # What takes up what earlier names get wrong explains less than such a share of what these explain in the mean.
 LITTLE = 0.5
+# What the form of an effect gets wrong exerts less than so many times what the effect does.
+FORM = 2.0
 # Within this share of its plausible scale of its null, an effect does nothing.
 NOTHING = 1e-4
 

@@ -15,7 +15,7 @@ from auvnn.diagnosis.hypotheses.refine_step import refine_step
 from auvnn.diagnosis.residuals.autocorrelation import is_autocorrelated
 from auvnn.diagnosis.residuals.forces import exerts_less
 from auvnn.diagnosis.score_tests.score import Score
-from auvnn.diagnosis.selection.choose import ALPHA, LITTLE
+from auvnn.diagnosis.selection.choose import ALPHA, FORM, LITTLE
 from auvnn.diagnosis.selection.model_comparison import forms_that_leave
 from auvnn.diagnosis.stages.state import Setting, State
 from auvnn.effects.acting_beside import in_order, last_names, needed_beside
@@ -117,7 +117,8 @@ def search_round(
 def _what_others_leave(asked: Setting, state: State, further: FittedHypothesis | None) -> list[str]:
     """Return further effects that are known to look like what the form of an earlier one gets wrong, and are no more.
 
-    Such an effect explains little beside the earlier ones, or exerts less than those do whose form is in question.
+    Such an effect exerts less than those do whose form is in question; or explains little beside the earlier ones, and
+    exerts less than twice that: what a form gets wrong is not many times what the effect itself does.
 
     Args:
         asked: for what the model states of its effects.
@@ -130,9 +131,9 @@ def _what_others_leave(asked: Setting, state: State, further: FittedHypothesis |
         return []
     explanations = state.first, state.current, further
     first, current, after = (e.squared_error(state.first.fitted.sigma) for e in explanations)
-    if current - after < LITTLE * (first - current) / len(state.chosen):
-        return [*forms]
-    return [n for n, of in forms.items() if exerts_less(further, state.windows, n, of, asked.stated)]
+    little = current - after < LITTLE * (first - current) / len(state.chosen)
+    times = FORM if little else 1.0
+    return [n for n, of in forms.items() if exerts_less(further, state.windows, n, of, asked.stated, times)]
 
 
 def regroup(asked: Setting, state: State) -> State:

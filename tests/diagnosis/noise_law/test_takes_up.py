@@ -14,34 +14,43 @@ from auvnn.diagnosis.noise_law.search import ForceSearch
 
 
 @pytest.mark.parametrize(
-    ("further", "gained", "predicted", "less", "expected"),
+    ("further", "gained", "predicted", "exerts", "expected"),
     [
-        ("constant_force", 40.0, 0.3, False, True),
+        ("constant_force", 40.0, 0.3, 1.5, True),
         # What the form of an asymmetry gets wrong looks like a constant force, whatever inputs predict.
-        ("constant_force", 40.0, 0.05, False, True),
-        ("constant_force", 40.0, None, False, True),
+        ("constant_force", 40.0, 0.05, 1.5, True),
+        ("constant_force", 40.0, None, 1.5, True),
+        # But it does not exert many times what the asymmetry does.
+        ("constant_force", 40.0, 0.3, 2.5, False),
+        ("constant_force", 40.0, None, 2.5, False),
         # Known to be confused with one before it, and no more than that.
-        ("thruster_gain", 40.0, 0.3, True, True),
-        ("thruster_gain", 40.0, 0.05, True, False),
-        ("thruster_gain", 40.0, None, True, False),
+        ("thruster_gain", 40.0, 0.3, 0.5, True),
+        ("thruster_gain", 40.0, 0.3, 2.5, True),
+        ("thruster_gain", 40.0, 0.05, 0.5, False),
+        ("thruster_gain", 40.0, None, 0.5, False),
         # Half as much as the two names before it, each, is more than what they get wrong, if it also exerts more.
-        ("constant_force", 49.0, 0.3, False, True),
-        ("constant_force", 51.0, 0.3, False, False),
-        ("constant_force", 400.0, None, True, True),
-        ("constant_force", 400.0, None, False, False),
+        ("constant_force", 49.0, 0.3, 1.5, True),
+        ("constant_force", 51.0, 0.3, 1.5, False),
+        ("constant_force", 400.0, None, 0.5, True),
+        ("constant_force", 400.0, None, 1.5, False),
         # Not known to be confused with what was named before it.
-        ("gyro_bias", 40.0, 0.3, True, False),
+        ("gyro_bias", 40.0, 0.3, 0.5, False),
     ],
 )
 def test_a_further_name_that_takes_up_what_an_earlier_one_gets_wrong_is_no_name(
-    further, gained, predicted, less, expected, monkeypatch
+    further, gained, predicted, exerts, expected, monkeypatch
 ):
     told = None if predicted is None else InputPrediction("X", "u", 0.5, predicted)
     asked: Any = ForceSearch.__new__(ForceSearch)
     asked.in_closed_loop, asked.asked = True, SimpleNamespace(stated={"waves": None})
     monkeypatch.setattr(under_law, "predicted_by_inputs", lambda *_, **__: told)
     compared = []
-    monkeypatch.setattr(name_after_name, "exerts_less", lambda *given: compared.append(given[3:]) or less)
+
+    def exerts_less(*given: Any) -> bool:
+        compared.append(given[3:5])
+        return exerts < given[5]
+
+    monkeypatch.setattr(name_after_name, "exerts_less", exerts_less)
     monkeypatch.setattr(asked, "say", lambda _: None, raising=False)
     monkeypatch.setattr(asked, "about", lambda _: None)
     monkeypatch.setattr(asked, "_sums", lambda _: None)

@@ -58,6 +58,7 @@ def test_it_is_compared_where_it_acts_most(fit, times, less):
     surge = times * of_asymmetry(fit[1])
     found = with_force(fit, [surge, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert exerts_less(*found, "constant_force", ["thrust_asymmetry"]) is less
+    assert exerts_less(*found, "constant_force", ["thrust_asymmetry"], times=2.0) is (times < 2.0)
 
 
 def test_a_small_part_where_the_earlier_one_does_not_act_does_not_count_and_a_large_one_does(fit):

@@ -61,7 +61,8 @@ def named(best: Any, *rivals: Any) -> Choice:
 @pytest.fixture(autouse=True)
 def whole_steps(monkeypatch):
     monkeypatch.setattr(module, "_finer", lambda asked, found, windows: (found, windows))
-    monkeypatch.setattr(module, "exerts_less", lambda *_: False)
+    # As in the log of an asymmetry that exerts a force of 1, of a further effect that exerts 1.5.
+    monkeypatch.setattr(module, "exerts_less", lambda *given: given[-1] > 1.5)
 
 
 TIED = (fit(60.0, "payload"), fit(60.0, "waves"), fit(60.0, "tether"))
@@ -170,11 +171,19 @@ def test_a_small_constant_force_beside_an_asymmetry_of_the_thrust_is_passed_over
     assert not passed or "constant_force" not in asked.offered[1]
 
 
+def test_one_that_explains_little_and_exerts_more_than_twice_what_the_form_does_is_none_of_its_errors(
+    monkeypatch,
+):
+    monkeypatch.setattr(module, "exerts_less", lambda *given: given[-1] > 2.0)
+    asked: Any = Asked([named(fit(58.0, "thrust_asymmetry", "constant_force"))])
+    assert search_round(asked, begun("thrust_asymmetry")).chosen[-1] == "constant_force"
+
+
 def test_so_is_one_that_explains_much_and_exerts_less_than_the_form_that_leaves_it(monkeypatch):
     asked_of = []
 
-    def less(found, windows, further, names, stated):
-        asked_of.append((further, names, [*stated]))
+    def less(found, windows, further, names, stated, times):
+        asked_of.append((further, names, [*stated], times))
         return further == "constant_force"
 
     monkeypatch.setattr(module, "exerts_less", less)
@@ -183,7 +192,7 @@ def test_so_is_one_that_explains_much_and_exerts_less_than_the_form_that_leaves_
     asked: Any = Asked([named(bias), named(other)])
     assert search_round(asked, begun(*chosen)).chosen[-1] == "tether"
     # With the one that leaves such a thing, not with what else was named.
-    assert asked_of == [("constant_force", ["thrust_asymmetry"], ["waves"])]
+    assert asked_of == [("constant_force", ["thrust_asymmetry"], ["waves"], 1.0)]
 
 
 def test_what_comes_in_the_place_of_one_that_is_passed_over_may_be_passed_over_too(monkeypatch):

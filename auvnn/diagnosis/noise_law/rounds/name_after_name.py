@@ -33,7 +33,7 @@ from auvnn.diagnosis.noise_law.under_law import NULL_STEPS, UnderLaw
 from auvnn.diagnosis.residuals.forces import exerts_less
 from auvnn.diagnosis.score_tests.null_tests import NullTests, Tested
 from auvnn.diagnosis.selection.acting_together import named_with
-from auvnn.diagnosis.selection.choose import ALPHA, LITTLE
+from auvnn.diagnosis.selection.choose import ALPHA, FORM, LITTLE
 from auvnn.diagnosis.selection.model_comparison import ODDS, confused, forms_that_leave
 from auvnn.diagnosis.stages.state import Setting
 from auvnn.effects import effect_class
@@ -281,8 +281,8 @@ class NameAfterName(UnderLaw):
 
         Where thrust ahead and astern follow curves of another shape, a mean force is left beside the asymmetry that is
         named: an effect that the catalogue knows to be confused with an earlier one, that explains little beside it, and
-        beside which measured inputs still predict the force, is no further cause. Nor is one that is known to look like
-        what the form of an earlier one gets wrong (`leaves`), and that explains little or exerts less than that one does.
+        beside which measured inputs still predict the force, is no further cause. Nor is what is known to look like what
+        the form of an earlier one gets wrong (`leaves`), exerting less than it; or than twice that if it explains little.
 
         Args:
             further: the explanation with it.
@@ -294,7 +294,7 @@ class NameAfterName(UnderLaw):
             return False
         one_of_them = (path.current.evidence - null.evidence) / len(path.chosen)
         little = further.evidence - path.current.evidence < LITTLE * one_of_them
-        if forms and not little:
-            about = self.about(further.explanation)
-            return exerts_less(further.explanation, about, further.name, forms, self.asked.stated)
-        return little and (bool(forms) or self.predicted(further) is not None)
+        if forms:
+            about, times = self.about(further.explanation), FORM if little else 1.0
+            return exerts_less(further.explanation, about, further.name, forms, self.asked.stated, times)
+        return little and self.predicted(further) is not None
