@@ -19,7 +19,7 @@ HERE = Path(__file__).resolve().parents[2] / "experiments" / "worlds"
 
 # Samples that were run, and where each of them began: so far the plan was drawn twice, each drawing has 31 of them.
 SAMPLES = {
-    "rows.jsonl" if k == 0 else f"rows-{k + 1}.jsonl": (k % 31, 100000000 * (k // 31)) for k in range(43)
+    "rows.jsonl" if k == 0 else f"rows-{k + 1}.jsonl": (k % 31, 100000000 * (k // 31)) for k in range(44)
 }
 
 
