@@ -171,14 +171,6 @@ def test_a_small_constant_force_beside_an_asymmetry_of_the_thrust_is_passed_over
     assert not passed or "constant_force" not in asked.offered[1]
 
 
-def test_one_that_explains_little_and_exerts_more_than_twice_what_the_form_does_is_none_of_its_errors(
-    monkeypatch,
-):
-    monkeypatch.setattr(module, "exerts_less", lambda *given: given[-1] > 2.0)
-    asked: Any = Asked([named(fit(58.0, "thrust_asymmetry", "constant_force"))])
-    assert search_round(asked, begun("thrust_asymmetry")).chosen[-1] == "constant_force"
-
-
 def test_so_is_one_that_explains_much_and_exerts_less_than_the_form_that_leaves_it(monkeypatch):
     asked_of = []
 
@@ -193,6 +185,14 @@ def test_so_is_one_that_explains_much_and_exerts_less_than_the_form_that_leaves_
     assert search_round(asked, begun(*chosen)).chosen[-1] == "tether"
     # With the one that leaves such a thing, not with what else was named.
     assert asked_of == [("constant_force", ["thrust_asymmetry"], ["waves"], 1.0)]
+
+
+def test_one_that_explains_little_and_exerts_more_than_twice_what_the_form_does_is_given(
+    monkeypatch,
+):
+    monkeypatch.setattr(module, "exerts_less", lambda *given: given[-1] > 2.0)
+    asked: Any = Asked([named(fit(58.0, "thrust_asymmetry", "constant_force"))])
+    assert search_round(asked, begun("thrust_asymmetry")).chosen[-1] == "constant_force"
 
 
 def test_what_comes_in_the_place_of_one_that_is_passed_over_may_be_passed_over_too(monkeypatch):
